@@ -1,0 +1,12 @@
+//! What a vehicle has seen of its surroundings: evidence in voxels, and the distance to the nearest obstacle.
+
+mod clearance;
+mod ray;
+mod sectors;
+mod voxel;
+
+pub use clearance::{ClearanceMap, Nearest};
+pub use sectors::{SECTORS, Sectors};
+pub use voxel::{Change, MapError, RayEnd, VoxelIndex, VoxelMap, VoxelMapConfig, VoxelState};
+
+pub(crate) use ray::{sweep, traverse};

@@ -1,0 +1,328 @@
+//! The hard safety filter: the last word on a velocity before it is flown.
+
+use nalgebra::{Vector2, Vector3};
+
+use super::Neighbour;
+use super::halfspace::{HalfSpace, nearest_2d, nearest_3d};
+
+/// Distances to keep, and how the vehicle moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilterConfig {
+    /// `D`: distance to keep between the centres of two vehicles, metres.
+    pub separation_m: f64,
+    /// `r`: distance to keep from the vehicle's centre to obstacles, metres: hull radius and margin.
+    pub obstacle_clearance_m: f64,
+    /// Obstacle points stand for columns that reach this far above and below them, metres: a planar lidar
+    /// sees one layer.
+    pub obstacle_half_height_m: f64,
+    /// Fastest velocity let through, m/s.
+    pub max_speed_m_s: f64,
+    /// `a`: deceleration that can be relied on, m/s2.
+    pub decel_m_s2: f64,
+    /// `t`: time from a state to the vehicle braking because of it, seconds: age of the state, tick, lag of
+    /// the autopilot.
+    pub latency_s: f64,
+    /// Hull radius that `separation_m` is meant for, metres; larger neighbours are kept further away by the
+    /// difference.
+    pub hull_radius_m: f64,
+    /// Standard deviations of the relative position by which the distance is widened.
+    pub sigmas: f64,
+    /// Age at which a neighbour's state is no longer fresh, seconds: it is then taken to keep its velocity,
+    /// whatever happens.
+    pub fresh_s: f64,
+    /// Speed with which the ghost of a neighbour grows that has fallen silent, m/s.
+    pub ghost_growth_m_s: f64,
+    /// Most that a ghost grows, metres.
+    pub ghost_max_m: f64,
+    /// Vertical distances between vehicles count for as much less: downwash makes a vehicle this much taller
+    /// than wide.
+    pub vertical_stretch: f64,
+}
+
+impl Default for FilterConfig {
+    fn default() -> Self {
+        FilterConfig {
+            separation_m: 1.2,
+            obstacle_clearance_m: 0.45,
+            obstacle_half_height_m: 0.6,
+            max_speed_m_s: 3.0,
+            decel_m_s2: 2.0,
+            latency_s: 0.5,
+            hull_radius_m: 0.25,
+            sigmas: 1.0,
+            fresh_s: 0.4,
+            ghost_growth_m_s: 0.5,
+            ghost_max_m: 3.0,
+            vertical_stretch: 1.5,
+        }
+    }
+}
+
+/// The vehicle's own motion, and what it wants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Position now (ENU, metres).
+    pub position: Vector3<f64>,
+    /// Velocity now (ENU, m/s).
+    pub velocity: Vector3<f64>,
+    /// Standard deviation of the position, metres.
+    pub sigma_m: f64,
+    /// Velocity that the planners want (ENU, m/s).
+    pub desired: Vector3<f64>,
+    /// Whether height is held by the autopilot, so that only the horizontal velocity can be changed.
+    pub planar: bool,
+}
+
+/// What a velocity is limited by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// The neighbour with this id.
+    Neighbour(u32),
+    /// The obstacle point at this place of the list.
+    Obstacle(usize),
+    /// The speed limit alone.
+    Speed,
+}
+
+/// What the filter had to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outcome {
+    /// Nothing: the velocity is the desired one.
+    Clear,
+    /// The velocity was changed, to satisfy this limit among others: the one that the desired velocity
+    /// violated most.
+    Limited(Cause),
+    /// No velocity satisfies all limits. The one given violates them least.
+    Infeasible {
+        /// The limit violated most by standing still.
+        by: Cause,
+        /// By how much the velocity given violates limits, m/s.
+        excess_m_s: f64,
+    },
+    /// A number in the input was not finite. The velocity is zero.
+    Unsound,
+}
+
+/// A velocity that may be flown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Filtered {
+    /// The velocity (ENU, m/s). In planar flight its z is that of the desired velocity, untouched.
+    pub velocity: Vector3<f64>,
+    /// What was done to it.
+    pub outcome: Outcome,
+}
+
+/// A limit `normal . v <= bound` and where it comes from.
+#[derive(Clone, Copy, Debug)]
+struct Limit {
+    space: HalfSpace<3>,
+    cause: Cause,
+}
+
+/// The velocity nearest to the desired one with which this vehicle can still stop in time.
+///
+/// Each neighbour and obstacle, at distance `d` in the unit direction `n`, bounds the velocity towards it, `n
+/// . v <= b`, so that braking with `a` after the latency `t` ends before the gap `g` is used up (`v t + v^2 /
+/// 2a = share of g`):
+///
+/// | what | gap | bound `b` for `g >= 0` |
+/// |---|---|---|
+/// | obstacle | `g = d - r` | `sqrt((a t)^2 + 2 a g) - a t` |
+/// | neighbour that keeps its distance too | `g = d - D` | `sqrt((a t)^2 + a g + w^2 / 2) - a t`: half the gap is for each; `w` is the speed with which it leads away |
+/// | neighbour that does not, or is silent | `g = d - D` | `n . v_j + sqrt((a t)^2 + 2 a g) - a t` |
+///
+/// For `g < 0`, `b = g / t` (half that when shared): the vehicle must leave. `D` is widened by the position
+/// errors, and for a neighbour that has been silent by the growth of its ghost. Distances between vehicles
+/// are stretched vertically.
+///
+/// **Guarantee.** If every vehicle brakes with at least `a`, begins to within `t`, and filters its velocity
+/// in this way, then for vehicles at `d >= D` the gap shrinks no faster than the sum of both bounds, and that
+/// sum falls to zero with the gap: `g` stays at or above zero, short of what lag and noise beyond `t` and the
+/// position errors take. Zero velocity satisfies every bound with `g >= 0` against what stands or cooperates,
+/// so there is a feasible velocity as long as distances have been kept.
+///
+/// When no velocity is feasible, limits are relaxed in this order, each by as little as possible and equally:
+/// those of neighbours (obstacles do not give way), then all. The caller should climb or land by rank. If the
+/// input is not finite, the velocity is zero.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use skein_planning::separation::{FilterConfig, Motion, Outcome, filter};
+///
+/// let motion = Motion {
+///     position: Vector3::new(0.0, 0.0, 3.0),
+///     velocity: Vector3::zeros(),
+///     sigma_m: 0.0,
+///     desired: Vector3::new(2.0, 0.0, 0.0),
+///     planar: true,
+/// };
+/// let wall = [Vector3::new(0.95, 0.0, 3.0)];
+/// let filtered = filter(&motion, &[], &wall, &FilterConfig::default());
+/// assert!(matches!(filtered.outcome, Outcome::Limited(_)));
+/// assert!(filtered.velocity.x < 0.8);
+/// ```
+#[must_use]
+pub fn filter(
+    motion: &Motion,
+    neighbours: &[Neighbour],
+    obstacles: &[Vector3<f64>],
+    config: &FilterConfig,
+) -> Filtered {
+    let numbers = motion.position.iter().chain(motion.velocity.iter()).chain(motion.desired.iter());
+    let sound = numbers.chain([&motion.sigma_m]).copied().all(f64::is_finite);
+    if !sound || !neighbours.iter().all(Neighbour::is_sound) {
+        return Filtered { velocity: Vector3::zeros(), outcome: Outcome::Unsound };
+    }
+    let mut limits: Vec<Limit> = Vec::with_capacity(neighbours.len() + 16);
+    limits.extend(neighbours.iter().map(|neighbour| neighbour_limit(motion, neighbour, config)));
+    limits.extend(
+        obstacles.iter().enumerate().filter_map(|(at, point)| obstacle_limit(motion, at, point, config)),
+    );
+    if motion.planar { solve_planar(motion, &limits, config) } else { solve(motion, &limits, config) }
+}
+
+/// Fastest approach to something when `share` of the gap is there to brake in, and it leads away at
+/// `lead_m_s`.
+fn approach(gap_m: f64, share: f64, lead_m_s: f64, config: &FilterConfig) -> f64 {
+    let (a, t) = (config.decel_m_s2, config.latency_s);
+    if gap_m < 0.0 {
+        return share * gap_m / t.max(0.05);
+    }
+    let lag = a * t;
+    (lag * lag + 2.0 * a * share * gap_m + 0.5 * lead_m_s * lead_m_s).sqrt() - lag
+}
+
+/// A bound for a vehicle that lags behind its commands: while it is faster than the bound, it is told to be
+/// as much slower, but not to turn back.
+fn led(bound: f64, speed: f64) -> f64 {
+    if bound > 0.0 && speed > bound { (2.0 * bound - speed).max(0.0) } else { bound }
+}
+
+fn neighbour_limit(motion: &Motion, neighbour: &Neighbour, config: &FilterConfig) -> Limit {
+    let offset = neighbour.predicted() - motion.position;
+    let stretch = config.vertical_stretch.max(1.0);
+    let squashed = Vector3::new(offset.x, offset.y, offset.z / stretch);
+    let distance = squashed.norm();
+    // Two at one place have no direction between them; any will do, and noise parts them.
+    let towards = squashed.try_normalize(1e-6).unwrap_or_else(Vector3::x);
+    // Gradient of the stretched distance.
+    let gradient = Vector3::new(towards.x, towards.y, towards.z / stretch);
+    let normal = gradient.normalize();
+    let steepness = gradient.norm();
+
+    let silent_s = (neighbour.age_s - config.fresh_s).max(0.0);
+    let ghost = (config.ghost_growth_m_s * silent_s).min(config.ghost_max_m);
+    let error = (motion.sigma_m * motion.sigma_m + neighbour.sigma_m * neighbour.sigma_m).sqrt();
+    let larger = (neighbour.radius_m - config.hull_radius_m).max(0.0);
+    let gap = distance - (config.separation_m + config.sigmas * error + ghost + larger);
+
+    let its_speed = gradient.dot(&neighbour.velocity);
+    let bound = if neighbour.cooperative && silent_s == 0.0 {
+        approach(gap, 0.5, its_speed.max(0.0), config)
+    } else {
+        its_speed.min(0.0) + approach(gap, 1.0, 0.0, config)
+    };
+    let bound = led(bound, gradient.dot(&motion.velocity));
+    Limit { space: HalfSpace { normal, bound: bound / steepness }, cause: Cause::Neighbour(neighbour.id) }
+}
+
+/// `None` for points that are too far away to matter, or not finite.
+fn obstacle_limit(motion: &Motion, at: usize, point: &Vector3<f64>, config: &FilterConfig) -> Option<Limit> {
+    let mut offset = point - motion.position;
+    let above = offset.z.abs() - config.obstacle_half_height_m;
+    offset.z = if above > 0.0 { above.copysign(offset.z) } else { 0.0 };
+    let (a, v) = (config.decel_m_s2, config.max_speed_m_s);
+    let reach = config.obstacle_clearance_m + v * config.latency_s + v * v / (2.0 * a);
+    let squared = offset.norm_squared();
+    if squared.is_nan() || squared > reach * reach {
+        return None;
+    }
+    let distance = squared.sqrt();
+    let normal = offset.try_normalize(1e-6)?;
+    let bound = approach(distance - config.obstacle_clearance_m, 1.0, 0.0, config);
+    let bound = led(bound, normal.dot(&motion.velocity));
+    Some(Limit { space: HalfSpace { normal, bound }, cause: Cause::Obstacle(at) })
+}
+
+/// Height cannot be changed: what the vertical velocity does to a limit is given, and the rest is horizontal.
+fn solve_planar(motion: &Motion, limits: &[Limit], config: &FilterConfig) -> Filtered {
+    let mut flat = Vec::with_capacity(limits.len());
+    for Limit { space, cause } in limits {
+        let level = Vector2::new(space.normal.x, space.normal.y);
+        let share = level.norm();
+        // Something straight above or below is not avoided by moving sideways; the share keeps the bound
+        // finite.
+        if share > 0.05 {
+            let bound = (space.bound - space.normal.z * motion.velocity.z) / share;
+            flat.push((HalfSpace { normal: level / share, bound: bound.max(-config.max_speed_m_s) }, *cause));
+        }
+    }
+    let wanted = Vector2::new(motion.desired.x, motion.desired.y);
+    let (velocity, outcome) = relax(wanted, &flat, config, nearest_2d);
+    Filtered { velocity: Vector3::new(velocity.x, velocity.y, motion.desired.z), outcome }
+}
+
+fn solve(motion: &Motion, limits: &[Limit], config: &FilterConfig) -> Filtered {
+    let limits: Vec<_> = limits
+        .iter()
+        .map(|limit| {
+            let bound = limit.space.bound.max(-config.max_speed_m_s);
+            (HalfSpace { bound, ..limit.space }, limit.cause)
+        })
+        .collect();
+    let (velocity, outcome) = relax(motion.desired, &limits, config, nearest_3d);
+    Filtered { velocity, outcome }
+}
+
+type Vector<const D: usize> = nalgebra::SVector<f64, D>;
+
+/// Solves, and if there is no solution relaxes the neighbours' limits, then all.
+fn relax<const D: usize>(
+    wanted: Vector<D>,
+    limits: &[(HalfSpace<D>, Cause)],
+    config: &FilterConfig,
+    nearest: impl Fn(Vector<D>, f64, &[HalfSpace<D>]) -> Option<Vector<D>>,
+) -> (Vector<D>, Outcome) {
+    let radius = config.max_speed_m_s;
+    let relaxed = |neighbours_by: f64, obstacles_by: f64| {
+        let spaces: Vec<_> = limits
+            .iter()
+            .map(|(space, cause)| {
+                let by = if matches!(cause, Cause::Neighbour(_)) { neighbours_by } else { obstacles_by };
+                HalfSpace { bound: space.bound + by, ..*space }
+            })
+            .collect();
+        nearest(wanted, radius, &spaces)
+    };
+    if let Some(velocity) = relaxed(0.0, 0.0) {
+        let outcome = match worst(limits, &wanted) {
+            Some((excess, cause)) if excess > 1e-9 => Outcome::Limited(cause),
+            _ if wanted.norm() > radius => Outcome::Limited(Cause::Speed),
+            _ => Outcome::Clear,
+        };
+        return (velocity, outcome);
+    }
+    let Some((most, by)) = worst(limits, &Vector::zeros()) else { return (Vector::zeros(), Outcome::Clear) };
+    // Standing still violates no limit by more than `most`, so relaxing by a little more must succeed.
+    let most = most.max(0.0) + 1e-6;
+    let least = |solve: &dyn Fn(f64) -> Option<Vector<D>>| -> Option<(Vector<D>, f64)> {
+        let mut found = (solve(most)?, most);
+        let mut infeasible = 0.0;
+        for _ in 0..24 {
+            let middle = 0.5 * (infeasible + found.1);
+            match solve(middle) {
+                Some(velocity) => found = (velocity, middle),
+                None => infeasible = middle,
+            }
+        }
+        Some(found)
+    };
+    let found = least(&|by| relaxed(by, 0.0)).or_else(|| least(&|by| relaxed(by, by)));
+    let (velocity, excess_m_s) = found.unwrap_or((Vector::zeros(), most));
+    (velocity, Outcome::Infeasible { by, excess_m_s })
+}
+
+/// The limit that `v` violates most, and by how much.
+fn worst<const D: usize>(limits: &[(HalfSpace<D>, Cause)], v: &Vector<D>) -> Option<(f64, Cause)> {
+    limits.iter().map(|(space, cause)| (space.excess(v), *cause)).max_by(|a, b| a.0.total_cmp(&b.0))
+}

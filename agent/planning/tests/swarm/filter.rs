@@ -1,0 +1,111 @@
+//! The safety filter's answers, one velocity at a time.
+
+use nalgebra::Vector3;
+use skein_planning::separation::{FilterConfig, Motion, Neighbour, Outcome, filter};
+
+fn hovering(desired: Vector3<f64>) -> Motion {
+    Motion {
+        position: Vector3::new(0.0, 0.0, 3.0),
+        velocity: Vector3::zeros(),
+        sigma_m: 0.0,
+        desired,
+        planar: true,
+    }
+}
+
+fn neighbour(position: [f64; 3], age_s: f64) -> Neighbour {
+    Neighbour {
+        id: 7,
+        position: Vector3::from(position),
+        velocity: Vector3::zeros(),
+        sigma_m: 0.0,
+        age_s,
+        radius_m: 0.25,
+        cooperative: true,
+    }
+}
+
+#[test]
+fn with_nothing_near_the_velocity_is_untouched() {
+    let desired = Vector3::new(1.5, -1.0, 0.2);
+    let filtered = filter(&hovering(desired), &[], &[], &FilterConfig::default());
+    assert_eq!((filtered.velocity, filtered.outcome), (desired, Outcome::Clear));
+}
+
+#[test]
+fn the_bounds_are_those_of_the_documented_formula() {
+    let config = FilterConfig { max_speed_m_s: 10.0, ..FilterConfig::default() };
+    let (a, t) = (config.decel_m_s2, config.latency_s);
+    let east = hovering(Vector3::new(9.0, 0.0, 0.0));
+    let lag = a * t;
+    let wall = [Vector3::new(2.45, 0.0, 3.0)];
+    let to_wall = filter(&east, &[], &wall, &config).velocity.x;
+    assert!((to_wall - ((lag * lag + 2.0 * a * 2.0).sqrt() - lag)).abs() < 1e-9);
+    let to_neighbour = filter(&east, &[neighbour([3.2, 0.0, 3.0], 0.0)], &[], &config).velocity.x;
+    assert!((to_neighbour - ((lag * lag + a * 2.0).sqrt() - lag)).abs() < 1e-9);
+    let braking = to_neighbour * t + to_neighbour * to_neighbour / (2.0 * a);
+    assert!((braking - 1.0).abs() < 1e-9, "half of the gap of 2 m is enough to stop in");
+}
+
+#[test]
+fn too_near_a_neighbour_the_vehicle_leaves() {
+    let filtered =
+        filter(&hovering(Vector3::x()), &[neighbour([0.9, 0.0, 3.0], 0.0)], &[], &FilterConfig::default());
+    assert!(filtered.velocity.x < -0.2, "{filtered:?}");
+}
+
+#[test]
+fn a_silent_neighbour_is_kept_further_away_the_longer_it_is_silent() {
+    let config = FilterConfig::default();
+    let speed = |age| {
+        filter(&hovering(Vector3::x() * 3.0), &[neighbour([4.0, 0.0, 3.0], age)], &[], &config).velocity.x
+    };
+    assert!(speed(2.0) > speed(4.0));
+    assert!(speed(4.0) > speed(8.0));
+    assert!(speed(8.0) < 0.0, "its ghost has reached us");
+    assert!((speed(20.0) - speed(60.0)).abs() < 1e-12, "it stops growing");
+}
+
+#[test]
+fn less_certain_and_larger_neighbours_are_kept_further_away() {
+    let config = FilterConfig::default();
+    let speed = |neighbour| filter(&hovering(Vector3::x() * 3.0), &[neighbour], &[], &config).velocity.x;
+    let sure = neighbour([3.0, 0.0, 3.0], 0.0);
+    assert!(speed(Neighbour { sigma_m: 0.5, ..sure }) < speed(sure));
+    assert!(speed(Neighbour { radius_m: 0.6, ..sure }) < speed(sure));
+}
+
+#[test]
+fn downwash_makes_vehicles_taller_than_wide() {
+    let config = FilterConfig::default();
+    let climb = Motion { planar: false, ..hovering(Vector3::z() * 2.0) };
+    let up = filter(&climb, &[neighbour([0.0, 0.0, 5.5], 0.0)], &[], &config).velocity.z;
+    let across =
+        filter(&hovering(Vector3::x() * 2.0), &[neighbour([2.5, 0.0, 3.0], 0.0)], &[], &config).velocity.x;
+    assert!(up < across);
+}
+
+#[test]
+fn between_a_wall_and_an_intruder_the_wall_does_not_give_way() {
+    let config = FilterConfig::default();
+    let wall: Vec<_> = (-20..=20).map(|k| Vector3::new(-0.5, f64::from(k) * 0.1, 3.0)).collect();
+    let intruders =
+        [neighbour([0.8, 0.0, 3.0], 0.0), neighbour([0.5, 0.9, 3.0], 0.0), neighbour([0.5, -0.9, 3.0], 0.0)];
+    let filtered = filter(&hovering(-Vector3::x()), &intruders, &wall, &config);
+    assert!(
+        matches!(filtered.outcome, Outcome::Infeasible { excess_m_s, .. } if excess_m_s > 0.0),
+        "{filtered:?}"
+    );
+    assert!(filtered.velocity.x > -0.11, "no faster towards the wall than it allows: {filtered:?}");
+}
+
+#[test]
+fn nonsense_in_is_standstill_out() {
+    let config = FilterConfig::default();
+    let nan = filter(&hovering(Vector3::new(f64::NAN, 0.0, 0.0)), &[], &[], &config);
+    assert_eq!((nan.velocity, nan.outcome), (Vector3::zeros(), Outcome::Unsound));
+    let lost = filter(&hovering(Vector3::x()), &[neighbour([f64::INFINITY, 0.0, 0.0], 0.0)], &[], &config);
+    assert_eq!((lost.velocity, lost.outcome), (Vector3::zeros(), Outcome::Unsound));
+    let odd_point = filter(&hovering(Vector3::x()), &[], &[Vector3::new(f64::NAN, 0.0, 0.0)], &config);
+    assert_eq!(odd_point.outcome, Outcome::Clear, "a lidar ray without return is no obstacle");
+}

@@ -1,0 +1,53 @@
+//! Local-minimum escape: a vehicle that makes no way plans anew around whatever stands there.
+
+use serde::Serialize;
+use skein_bp::{BThread, Bid, Context, Event};
+use skein_wire::vocabulary::{ARRIVED, LAND, PLAN, STUCK};
+
+use crate::{me::Me, precedence};
+
+/// How many escapes one waypoint is worth before the vehicle lands.
+const ATTEMPTS: u8 = 12;
+
+/// Requests `plan` when the vehicle is stuck; the planner then goes around its neighbours too and pulls less
+/// (Wang 2023: re-planning with A* while the attractive gain is reduced).
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct Escape {
+    me: Me,
+    attempts: u8,
+    stuck: bool,
+}
+
+impl Escape {
+    /// The b-thread of vehicle `me`.
+    #[must_use]
+    pub fn new(me: Me) -> Self {
+        Self { me, attempts: 0, stuck: false }
+    }
+}
+
+impl BThread for Escape {
+    fn bid(&self) -> Option<Bid> {
+        let me = &self.me;
+        let bid = Bid::new().priority(precedence::MISSION).wait_for(me.any_of(&[ARRIVED, LAND]));
+        Some(match (self.stuck, self.attempts) {
+            (false, _) => bid.wait_for(me.any(STUCK)),
+            (true, ATTEMPTS..) => bid.request(me.because(LAND, "stuck: no way past what stands around")),
+            (true, _) => bid.request(me.because(PLAN, "stuck")),
+        })
+    }
+
+    fn resume(&mut self, event: &Event, _: &mut Context) {
+        match self.me.verb(event) {
+            Some(STUCK) => self.stuck = true,
+            Some(PLAN) => {
+                self.stuck = false;
+                self.attempts += 1;
+            }
+            _ => {
+                self.stuck = false;
+                self.attempts = 0;
+            }
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Mission: take off when told, fly the waypoints in turn, land.
+
+use serde::Serialize;
+use skein_bp::{BThread, Bid, Context, Event};
+use skein_wire::vocabulary::{
+    AIRBORNE, ARRIVED, COMMAND_FAILED, COMPLETE, FAILED, GOTO, LAND, LANDED, ORDER, RETURN, TAKEOFF,
+};
+
+use crate::{me::Me, precedence};
+
+/// Requests one `goto` after another, then `land`, and says how the mission ended.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct Mission {
+    me: Me,
+    /// The `goto` events of the waypoints, in order.
+    waypoints: Vec<Event>,
+    phase: Phase,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+enum Phase {
+    Grounded,
+    Climbing,
+    Heading { leg: usize },
+    Flying { leg: usize },
+    Arrived,
+    Landing { failure: Option<String> },
+    Down { failure: Option<String> },
+    Over,
+}
+
+impl Mission {
+    /// A mission over `waypoints` in metres ENU, the last being where the vehicle lands.
+    #[must_use]
+    pub fn new(me: Me, waypoints: &[[f64; 3]]) -> Self {
+        let waypoints = (0_i64..)
+            .zip(waypoints)
+            .map(|(leg, &[x, y, z])| me.event(GOTO).with("leg", leg).with("x", x).with("y", y).with("z", z))
+            .collect();
+        Self { me, waypoints, phase: Phase::Grounded }
+    }
+
+    /// The phase that flies to waypoint `leg`, or lands after the last.
+    fn towards(&self, leg: usize) -> Phase {
+        if leg < self.waypoints.len() { Phase::Heading { leg } } else { Phase::Arrived }
+    }
+}
+
+/// Why the vehicle is on its way down, as the event that sent it says.
+fn reason(event: &Event) -> String {
+    event.text("why").unwrap_or("no reason given").to_owned()
+}
+
+impl BThread for Mission {
+    fn bid(&self) -> Option<Bid> {
+        let me = &self.me;
+        let ended_by_others = me.any_of(&[LAND, RETURN, LANDED]);
+        let bid = Bid::new().priority(precedence::MISSION);
+        Some(match &self.phase {
+            Phase::Grounded => bid.wait_for(me.any_of(&[TAKEOFF, ORDER])),
+            Phase::Climbing => bid.wait_for(me.any_of(&[AIRBORNE, LAND, LANDED, COMMAND_FAILED])),
+            Phase::Heading { leg } => {
+                bid.request(self.waypoints.get(*leg)?.clone()).wait_for(ended_by_others)
+            }
+            Phase::Flying { .. } => bid.wait_for(me.any(ARRIVED)).wait_for(ended_by_others),
+            Phase::Arrived => bid.request(me.because(LAND, "mission complete")).wait_for(ended_by_others),
+            Phase::Landing { .. } => bid.wait_for(me.any(LANDED)),
+            Phase::Down { failure: None } => bid.request(me.event(COMPLETE)),
+            Phase::Down { failure: Some(why) } => bid.request(me.because(FAILED, why)),
+            Phase::Over => return None,
+        })
+    }
+
+    fn resume(&mut self, event: &Event, _: &mut Context) {
+        let verb = self.me.verb(event).unwrap_or_default();
+        let flown = matches!(self.phase, Phase::Arrived);
+        self.phase = match (&self.phase, verb) {
+            (Phase::Down { .. }, _) => Phase::Over,
+            (Phase::Landing { failure }, _) => Phase::Down { failure: failure.clone() },
+            (Phase::Grounded, TAKEOFF) => Phase::Climbing,
+            (Phase::Grounded, _) if event.text("what") == Some("resume") => self.towards(0),
+            (Phase::Climbing, AIRBORNE) => self.towards(0),
+            (Phase::Climbing, COMMAND_FAILED) => Phase::Down { failure: Some(reason(event)) },
+            (_, LAND | RETURN) => Phase::Landing { failure: (!flown).then(|| reason(event)) },
+            (_, LANDED) => Phase::Down { failure: Some("the autopilot landed by itself".to_owned()) },
+            (Phase::Heading { leg }, GOTO) => Phase::Flying { leg: *leg },
+            (Phase::Flying { leg }, ARRIVED) if event.int("leg") == i64::try_from(*leg).ok() => self.towards(leg + 1),
+            (phase, _) => phase.clone(),
+        };
+    }
+}

@@ -1,0 +1,60 @@
+//! The b-threads of a vehicle, one file each. They decide *what* may be done; the pipeline decides *how*.
+//!
+//! Adding a b-thread: write its file, name it in [`load`]. No other b-thread changes.
+
+mod battery;
+mod escape;
+mod found_airborne;
+mod geofence;
+mod link_loss;
+mod mission;
+mod navigation;
+mod obstacle_avoidance;
+mod operator;
+mod path_planning;
+mod pilot;
+mod preflight;
+mod return_home;
+mod right_of_way;
+mod separation;
+
+use skein_bp::Program;
+
+pub use battery::Battery;
+pub use escape::Escape;
+pub use found_airborne::FoundAirborne;
+pub use geofence::Geofence;
+pub use link_loss::{LinkLoss, LinkLossPolicy};
+pub use mission::Mission;
+pub use navigation::Navigation;
+pub use obstacle_avoidance::ObstacleAvoidance;
+pub use operator::Operator;
+pub use path_planning::PathPlanning;
+pub use pilot::Pilot;
+pub use preflight::Preflight;
+pub use return_home::{HOME_LEG, ReturnHome};
+pub use right_of_way::RightOfWay;
+pub use separation::Separation;
+
+use crate::{config::AgentConfig, me::Me};
+
+/// Loads a vehicle's b-threads into its program.
+pub fn load(program: &mut Program, config: &AgentConfig) {
+    let me = Me::new(&config.node);
+    let [x, y, _] = config.home;
+    program.add("pilot", Pilot::new(me.clone()));
+    program.add("separation", Separation::new(me.clone()));
+    program.add("obstacle_avoidance", ObstacleAvoidance::new(me.clone()));
+    program.add(right_of_way::NAME, RightOfWay::new(me.clone()));
+    program.add("preflight", Preflight::new(me.clone()));
+    program.add("found_airborne", FoundAirborne::new(me.clone()));
+    program.add("battery", Battery::new(me.clone()));
+    program.add("geofence", Geofence::new(me.clone(), config.fence.min, config.fence.max));
+    program.add("link_loss", LinkLoss::new(me.clone(), &config.ground, config.link_loss));
+    program.add("operator", Operator::new(me.clone()));
+    program.add("return_home", ReturnHome::new(me.clone(), [x, y, config.return_altitude_m]));
+    program.add("escape", Escape::new(me.clone()));
+    program.add("mission", Mission::new(me.clone(), &config.waypoints));
+    program.add("path_planning", PathPlanning::new(me.clone()));
+    program.add("navigation", Navigation::new(me));
+}

@@ -1,0 +1,57 @@
+//! Navigation control: asks leave to move, one navigation cycle at a time.
+//!
+//! Whoever blocks `advance`, here or on another node, holds the vehicle: without fresh leave the pipeline hovers.
+
+use std::time::Duration;
+
+use serde::Serialize;
+use skein_bp::{BThread, Bid, Context, Event};
+use skein_wire::vocabulary::{ADVANCE, ARRIVED, GOTO, LAND, PLANNED};
+
+use crate::{me::Me, precedence};
+
+/// How long a leave to move is asked for: one navigation cycle.
+const CYCLE: Duration = Duration::from_millis(100);
+
+/// Requests `advance` once in each navigation cycle while there is a path to follow.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct Navigation {
+    me: Me,
+    phase: Phase,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+enum Phase {
+    Idle,
+    Asking,
+    Moving { until: Duration },
+}
+
+impl Navigation {
+    /// The b-thread of vehicle `me`.
+    #[must_use]
+    pub fn new(me: Me) -> Self {
+        Self { me, phase: Phase::Idle }
+    }
+}
+
+impl BThread for Navigation {
+    fn bid(&self) -> Option<Bid> {
+        let me = &self.me;
+        let bid = Bid::new().priority(precedence::MISSION);
+        let no_path_left = me.any_of(&[ARRIVED, GOTO, LAND]);
+        Some(match self.phase {
+            Phase::Idle => bid.wait_for(me.any(PLANNED)),
+            Phase::Asking => bid.request(me.event(ADVANCE)).wait_for(no_path_left),
+            Phase::Moving { until } => bid.wait_for(no_path_left).deadline(until),
+        })
+    }
+
+    fn resume(&mut self, event: &Event, cx: &mut Context) {
+        self.phase = match self.me.verb(event) {
+            Some(PLANNED) | None => Phase::Asking,
+            Some(ADVANCE) => Phase::Moving { until: cx.now() + CYCLE },
+            _ => Phase::Idle,
+        };
+    }
+}

@@ -1,0 +1,39 @@
+//! Separation: a vehicle with a neighbour inside the emergency distance does not press on.
+//!
+//! The pipeline's repulsion and safety filter keep the distance; they do not wait for this b-thread.
+
+use serde::Serialize;
+use skein_bp::{BThread, Bid, Context, Event};
+use skein_wire::vocabulary::{ADVANCE, CLEAR, TOO_CLOSE};
+
+use crate::{me::Me, precedence};
+
+/// Blocks `advance` while a neighbour is too close.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct Separation {
+    me: Me,
+    too_close: bool,
+}
+
+impl Separation {
+    /// The b-thread of vehicle `me`.
+    #[must_use]
+    pub fn new(me: Me) -> Self {
+        Self { me, too_close: false }
+    }
+}
+
+impl BThread for Separation {
+    fn bid(&self) -> Option<Bid> {
+        let bid = Bid::new().priority(precedence::COLLISION);
+        Some(if self.too_close {
+            bid.wait_for(self.me.any(CLEAR)).block(self.me.any(ADVANCE))
+        } else {
+            bid.wait_for(self.me.any(TOO_CLOSE))
+        })
+    }
+
+    fn resume(&mut self, event: &Event, _: &mut Context) {
+        self.too_close = self.me.heard(event, TOO_CLOSE);
+    }
+}

@@ -1,0 +1,98 @@
+//! What one vehicle's agent must know.
+
+use std::time::Duration;
+
+use skein_mav::Datum;
+
+use crate::bthreads::LinkLossPolicy;
+
+/// An axis-aligned box, metres ENU.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fence {
+    /// Least coordinates.
+    pub min: [f64; 3],
+    /// Greatest coordinates.
+    pub max: [f64; 3],
+}
+
+/// Which b-threads an agent runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Controller {
+    /// The behavioural program.
+    #[default]
+    Bp,
+    /// No b-thread at all: everything else runs, and nothing flies (Wang 2023, feasibility).
+    None,
+}
+
+/// What the vehicle can do, and the distances it keeps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Envelope {
+    /// Horizontal speed flown when nothing is near, m/s.
+    pub cruise_m_s: f64,
+    /// Greatest vertical speed, m/s.
+    pub climb_m_s: f64,
+    /// Acceleration the vehicle can brake with, m/s².
+    pub brake_m_s2: f64,
+    /// Time from a set-point to the velocity it asks for, s.
+    pub latency_s: f64,
+    /// Radius of the sphere around the vehicle, m.
+    pub hull_m: f64,
+    /// Clearance kept between hull and obstacles when a path is planned, m.
+    pub margin_m: f64,
+    /// Centre-to-centre distance the safety filter keeps between vehicles, m.
+    pub separation_m: f64,
+}
+
+impl Default for Envelope {
+    fn default() -> Self {
+        Self {
+            cruise_m_s: 3.0,
+            climb_m_s: 1.5,
+            brake_m_s2: 2.5,
+            latency_s: 0.3,
+            hull_m: 0.25,
+            margin_m: 0.25,
+            separation_m: 1.4,
+        }
+    }
+}
+
+/// The configuration of one vehicle's agent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AgentConfig {
+    /// The fleet's name, the first part of every key.
+    pub fleet: String,
+    /// The vehicle's node name, such as `uav/3`.
+    pub node: String,
+    /// The ground station's node name.
+    pub ground: String,
+    /// Every node of the mission, this one included.
+    pub roster: Vec<String>,
+    /// A number that grows with every start of this node.
+    pub incarnation: u64,
+    /// MAVLink system id of the autopilot.
+    pub system_id: u8,
+    /// Where the world's origin lies on the earth.
+    pub datum: Datum,
+    /// Where the vehicle takes off, metres ENU.
+    pub home: [f64; 3],
+    /// Waypoints, metres ENU; the vehicle lands at the last.
+    pub waypoints: Vec<[f64; 3]>,
+    /// Height above home to climb to before the mission begins, m.
+    pub takeoff_height_m: f64,
+    /// Height in the world at which this vehicle returns, m; different for every vehicle.
+    pub return_altitude_m: f64,
+    /// The geofence.
+    pub fence: Fence,
+    /// What the vehicle can do.
+    pub envelope: Envelope,
+    /// What to do without the ground station.
+    pub link_loss: LinkLossPolicy,
+    /// Which b-threads to run.
+    pub controller: Controller,
+    /// Lease of the bids this node sends.
+    pub lease: Duration,
+    /// Seed of the program's tie-breaks.
+    pub seed: u64,
+}

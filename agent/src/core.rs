@@ -1,0 +1,446 @@
+//! The agent core: one vehicle's program around its pipeline, without I/O.
+
+use std::time::Duration;
+
+use nalgebra::Vector3;
+use skein_bp::{Event, EventSet, Program, ProgramConfig};
+use skein_dbp::{Happened, Node, NodeConfig, NodeName};
+use skein_mav::{Companion, CompanionConfig, SetPoint};
+use skein_planning::map::MapError;
+use skein_wire::{Fleet, Link, NodeLink, State, vocabulary};
+use skein_wire::vocabulary::{
+    ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, LAND, LANDED, ORDER, PLAN, RETURN,
+};
+
+use crate::{
+    bthreads,
+    config::{AgentConfig, Controller},
+    failsafes::Failsafes,
+    flight::{Flight, FlightPhase},
+    me::Me,
+    precedence,
+    neighbours::{Neighbour, Neighbours},
+    pipeline::{
+        guidance::{Guidance, Motion, Surroundings},
+        perception::{Perception, Pose, Scan},
+        set_point::{KeepAlive, keep_alive, oldest_age},
+    },
+    watches::Watches,
+};
+
+/// Standard deviation of the position that a vehicle tells others, m.
+const POSITION_SIGMA_M: f64 = 0.05;
+/// A navigation cycle and a state message to the others begin this often.
+const CYCLE_PERIOD: Duration = Duration::from_millis(100);
+
+/// Why an agent cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum AgentError {
+    /// A node name in the configuration is none.
+    #[error("agent configuration: `{field}` is {value:?}: {source}")]
+    Name {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// What is wrong with it.
+        source: skein_dbp::NodeNameError,
+    },
+    /// The fleet's name is none.
+    #[error("agent configuration: `fleet` is {value:?}: {source}")]
+    Fleet {
+        /// Its value.
+        value: String,
+        /// What is wrong with it.
+        source: skein_wire::KeyError,
+    },
+    /// The fence is no space to fly in.
+    #[error("agent configuration: `fence`: {0}")]
+    Fence(#[from] MapError),
+}
+
+/// How a vehicle's mission ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// It reached its last waypoint and landed.
+    Complete,
+    /// It did not, and this is why.
+    Failed(String),
+}
+
+/// What set-points were made from: the keep-alive rule, observed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SetPointRecord {
+    /// Set-points of the pipeline.
+    pub commands: u64,
+    /// Zero velocities for want of fresh inputs.
+    pub stops: u64,
+    /// Age of the oldest input that a command was made from.
+    pub oldest_input: Duration,
+}
+
+/// One line about a vehicle, for people.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Status {
+    /// Flight mode as the autopilot tells it.
+    pub mode: String,
+    /// What it is doing.
+    pub task: String,
+    /// What it waits for, and who holds it.
+    pub waiting_for: String,
+    /// Energy left, 0 to 1.
+    pub battery: f64,
+    /// Nearest neighbour and its distance in metres.
+    pub nearest: Option<(NodeName, f64)>,
+}
+
+/// One vehicle's agent. Feed it bytes and scans, tick it every 20 ms, carry its bytes away.
+pub struct AgentCore {
+    config: AgentConfig,
+    me: Me,
+    name: NodeName,
+    companion: Companion,
+    node: NodeLink,
+    neighbours: Neighbours,
+    perception: Perception,
+    watches: Watches,
+    failsafes: Failsafes,
+    flight: Flight,
+    guidance: Guidance,
+    next_cycle: Duration,
+    task: String,
+    outcome: Option<Outcome>,
+    selections: Vec<Happened>,
+    set_points: SetPointRecord,
+    fault: Option<String>,
+}
+
+impl AgentCore {
+    /// An agent for a vehicle that has not been heard of yet.
+    ///
+    /// # Errors
+    /// [`AgentError`] names the field of the configuration at fault.
+    pub fn new(config: AgentConfig) -> Result<Self, AgentError> {
+        let name = |field, value: &str| {
+            NodeName::new(value).map_err(|source| AgentError::Name { field, value: value.to_owned(), source })
+        };
+        let me = Me::new(&config.node);
+        let mut program = Program::new(ProgramConfig {
+            protected: safety_events(&me),
+            ..ProgramConfig::vehicle(config.seed)
+        });
+        if config.controller == Controller::Bp {
+            bthreads::load(&mut program, &config);
+        }
+        let roster = config.roster.iter().map(|node| name("roster", node)).collect::<Result<_, _>>()?;
+        let own_name = name("node", &config.node)?;
+        let node_config = NodeConfig {
+            lease: config.lease,
+            safety: safety_events(&me),
+            // What comes from afar never outranks a vehicle's own b-threads for its safety.
+            remote_priority: precedence::MISSION..=precedence::LINK,
+            ..NodeConfig::new(own_name.clone(), config.incarnation, roster)
+        };
+        let fleet = Fleet::new(&config.fleet)
+            .map_err(|source| AgentError::Fleet { value: config.fleet.clone(), source })?;
+        let home = Vector3::from(config.home);
+        Ok(Self {
+            companion: Companion::new(CompanionConfig {
+                system_id: config.system_id,
+                component_id: 191,
+                datum: config.datum,
+            }),
+            node: NodeLink::new(Node::new(node_config, program), fleet),
+            name: own_name,
+            neighbours: Neighbours::default(),
+            perception: Perception::new(&config.fence, home)?,
+            watches: Watches::new(me.clone()),
+            failsafes: Failsafes::default(),
+            flight: Flight::new(me.clone(), config.takeoff_height_m),
+            guidance: Guidance::new(config.envelope, config.fence),
+            next_cycle: Duration::ZERO,
+            task: "on the ground".to_owned(),
+            outcome: None,
+            selections: Vec::new(),
+            set_points: SetPointRecord::default(),
+            fault: None,
+            me,
+            config,
+        })
+    }
+
+    /// Takes in bytes from the autopilot.
+    pub fn receive_mavlink(&mut self, now: Duration, bytes: &[u8]) {
+        self.companion.receive(now, bytes);
+    }
+
+    /// Bytes for the autopilot.
+    pub fn take_mavlink(&mut self) -> Vec<u8> {
+        self.companion.take_output()
+    }
+
+    /// Takes in a lidar scan.
+    pub fn sense(&mut self, now: Duration, scan: &Scan) {
+        let Some(pose) = self.pose_at(scan.stamp) else { return };
+        let others: Vec<_> = self.neighbours.at(now).map(|neighbour| neighbour.position()).collect();
+        self.perception.take_in(scan, &pose, &others);
+    }
+
+    /// The vehicle's estimated pose at a time near the newest telemetry.
+    fn pose_at(&self, at: Duration) -> Option<Pose> {
+        let telemetry = self.companion.telemetry();
+        let (position, velocity) = (telemetry.position?, telemetry.velocity?);
+        let lead_s = at.as_secs_f64() - position.stamp.as_secs_f64();
+        Some(Pose {
+            position: position.value + velocity.value * lead_s.clamp(-0.2, 0.2),
+            attitude: telemetry.attitude?.value,
+        })
+    }
+
+    /// One tick, every 20 ms: hears, decides, and answers with a set-point.
+    pub fn tick(&mut self, now: Duration, link: &mut dyn Link) {
+        self.companion.tick(now);
+        self.node.receive(now, link);
+        for state in self.node.take_states() {
+            self.neighbours.hear(now, state);
+        }
+        let neighbours: Vec<Neighbour> = self.neighbours.at(now).collect();
+        self.follow_autopilot(now);
+        self.watch(now, &neighbours);
+        if now >= self.next_cycle {
+            self.next_cycle = now + CYCLE_PERIOD;
+            self.begin_cycle(now, link);
+        }
+        self.decide(now, &neighbours);
+        self.steer(now, &neighbours);
+        self.node.send(link);
+    }
+
+    fn follow_autopilot(&mut self, now: Duration) {
+        self.failsafes.ask(&mut self.companion);
+        while let Some(event) = self.companion.poll_event() {
+            self.failsafes.hear(&event);
+            let heard = self.flight.hear(now, &event, &mut self.companion);
+            heard.into_iter().for_each(|event| self.node.node_mut().enqueue(event));
+        }
+        let heard = self.flight.follow(now, &mut self.companion);
+        heard.into_iter().for_each(|event| self.node.node_mut().enqueue(event));
+    }
+
+    fn watch(&mut self, now: Duration, neighbours: &[Neighbour]) {
+        let telemetry = self.companion.telemetry();
+        let mut events = Vec::new();
+        events.extend(self.watches.preflight(now, telemetry, self.failsafes.are_sound()));
+        if let (FlightPhase::Flying, Some(position)) = (self.flight.phase(), telemetry.position) {
+            if let Some(battery) = telemetry.battery {
+                let home = Vector3::from(self.config.home);
+                let seconds_home = (position.value - home).norm() / self.config.envelope.cruise_m_s + 10.0;
+                events.extend(self.watches.battery(now, battery.value, seconds_home));
+            }
+            events.extend(self.watches.fence(position.value, &self.config.fence));
+            events.extend(self.watches.separation(position.value, neighbours));
+        }
+        for event in events {
+            self.node.node_mut().enqueue(event);
+        }
+    }
+
+    /// A navigation cycle: looks along the path, and tells the others where this vehicle is.
+    fn begin_cycle(&mut self, now: Duration, link: &mut dyn Link) {
+        if let (FlightPhase::Flying, Some(motion)) = (self.flight.phase(), self.motion()) {
+            let map = self.perception.map();
+            for report in self.guidance.look_ahead(now, &motion, map) {
+                self.node.node_mut().enqueue(report.into_event(&self.me));
+            }
+        }
+        if let Some(state) = self.state(now) {
+            self.node.put_state(&state, link);
+        }
+    }
+
+    /// Lets the program decide until nothing new comes of it, and carries out what it selected.
+    fn decide(&mut self, now: Duration, neighbours: &[Neighbour]) {
+        // Planning answers a selected event with a new one, which deserves its turn in the same tick.
+        for _ in 0..4 {
+            if let Err(error) = self.node.node_mut().step(now) {
+                // Without fresh leave the vehicle hovers; its b-threads may yet recover.
+                self.fault = Some(error.to_string());
+            }
+            let selections = self.node.node_mut().take_selections();
+            if selections.is_empty() {
+                break;
+            }
+            for selection in &selections {
+                if selection.home == self.name {
+                    self.carry_out(now, &selection.event, neighbours);
+                }
+            }
+            self.selections.extend(selections);
+        }
+    }
+
+    fn carry_out(&mut self, now: Duration, event: &Event, neighbours: &[Neighbour]) {
+        self.flight.carry_out(now, event, &mut self.companion);
+        let why = event.text("why").unwrap_or_default();
+        match self.me.verb(event) {
+            Some(GOTO) => {
+                self.guidance.head_for(event);
+                self.task = match event.int("leg") {
+                    Some(bthreads::HOME_LEG) => "flying home".to_owned(),
+                    leg => format!("leg {} of {}", leg.unwrap_or_default() + 1, self.config.waypoints.len()),
+                };
+            }
+            Some(PLAN) => {
+                if let Some(motion) = self.motion() {
+                    let report = self.guidance.plan(why, &motion, self.perception.map_mut(), neighbours);
+                    self.node.node_mut().enqueue(report.into_event(&self.me));
+                }
+            }
+            Some(ADVANCE) => self.guidance.grant_leave(now),
+            Some(ENTER) => self.guidance.enter_passage(),
+            Some(LAND) => self.task = format!("landing: {why}"),
+            Some(RETURN) => self.task = format!("returning: {why}"),
+            Some(HOLD) => self.task = "holding".to_owned(),
+            Some(LANDED) => self.guidance.forget(),
+            Some(vocabulary::TAKEOFF) => self.task = "taking off".to_owned(),
+            Some(ORDER) if event.text("what") == Some("resume") => self.flight.resume(now),
+            Some(COMPLETE) => self.end(Outcome::Complete, "arrived"),
+            Some(FAILED) => self.end(Outcome::Failed(why.to_owned()), why),
+            _ => {}
+        }
+    }
+
+    fn end(&mut self, outcome: Outcome, task: &str) {
+        self.outcome = Some(outcome);
+        self.task = task.to_owned();
+    }
+
+    /// The control loop: it waits for no b-thread and no network.
+    fn steer(&mut self, now: Duration, neighbours: &[Neighbour]) {
+        if !self.flight.sends_set_points() {
+            self.guidance.rest();
+            return;
+        }
+        let telemetry = self.companion.telemetry();
+        let inputs = [
+            telemetry.position.map(|position| position.stamp),
+            telemetry.attitude.map(|attitude| attitude.stamp),
+            self.perception.last_scan(),
+        ];
+        let Some(motion) = self.motion() else { return };
+        let tracks: Vec<_> =
+            neighbours.iter().filter(|neighbour| neighbour.armed).map(|neighbour| neighbour.track).collect();
+        match keep_alive(now, &inputs) {
+            KeepAlive::Command => {
+                let surroundings = Surroundings {
+                    map: self.perception.map(),
+                    obstacles: self.perception.obstacles(),
+                    neighbours: &tracks,
+                };
+                let set_point = self.guidance.steer(now, &motion, &surroundings);
+                self.set_points.commands += 1;
+                let age = oldest_age(now, &inputs).unwrap_or_default();
+                self.set_points.oldest_input = self.set_points.oldest_input.max(age);
+                self.companion.set_point(now, set_point);
+            }
+            KeepAlive::Stop => {
+                self.set_points.stops += 1;
+                self.guidance.rest();
+                self.companion.set_point(now, SetPoint::Velocity { velocity: Vector3::zeros(), yaw: None });
+            }
+            KeepAlive::Silence => self.guidance.rest(),
+        }
+    }
+
+    fn motion(&self) -> Option<Motion> {
+        let telemetry = self.companion.telemetry();
+        Some(Motion { position: telemetry.position?.value, velocity: telemetry.velocity?.value })
+    }
+
+    /// What this vehicle tells the others, ten times a second.
+    fn state(&self, now: Duration) -> Option<State> {
+        let telemetry = self.companion.telemetry();
+        let motion = self.motion()?;
+        let status = self.status(now);
+        Some(State {
+            incarnation: self.config.incarnation,
+            time: now,
+            position: motion.position,
+            velocity: motion.velocity,
+            position_sigma_m: POSITION_SIGMA_M,
+            radius_m: self.config.envelope.hull_m,
+            mode: status.mode,
+            battery: status.battery,
+            armed: telemetry.armed,
+            task: status.task,
+            waiting_for: status.waiting_for,
+            path: self.guidance.path_ahead().take(State::MAX_PATH).collect(),
+            ..State::new(self.name.clone())
+        })
+    }
+
+    /// One line about this vehicle.
+    #[must_use]
+    pub fn status(&self, now: Duration) -> Status {
+        let telemetry = self.companion.telemetry();
+        let nearest = telemetry.position.and_then(|position| self.neighbours.nearest(now, position.value));
+        Status {
+            mode: telemetry.mode.to_string(),
+            task: self.task.clone(),
+            waiting_for: self.waiting_for(),
+            battery: telemetry.battery.map_or(0.0, |battery| battery.value.fraction),
+            nearest,
+        }
+    }
+
+    /// Who keeps this vehicle from moving on or taking off.
+    fn waiting_for(&self) -> String {
+        if let Some(fault) = &self.fault {
+            return fault.clone();
+        }
+        if let Some(complaint) = self.failsafes.complaint() {
+            return complaint.to_owned();
+        }
+        let question = self.me.any_of(&[ADVANCE, ENTER, vocabulary::TAKEOFF]);
+        let explanation = self.node.node().explain(question).local;
+        if explanation.requested.is_empty() {
+            return String::new();
+        }
+        let blockers: std::collections::BTreeSet<&str> =
+            explanation.blocked.iter().map(|(bthread, _)| &**bthread).collect();
+        blockers.into_iter().collect::<Vec<_>>().join(", ")
+    }
+
+    /// Everything selected here or heard of since the last call, in order.
+    pub fn take_selections(&mut self) -> Vec<Happened> {
+        std::mem::take(&mut self.selections)
+    }
+
+    /// How the mission ended, once it has.
+    #[must_use]
+    pub fn outcome(&self) -> Option<&Outcome> {
+        self.outcome.as_ref()
+    }
+
+    /// What set-points were made from so far.
+    #[must_use]
+    pub fn set_points(&self) -> SetPointRecord {
+        self.set_points
+    }
+
+    /// The path ahead, from the vehicle to its waypoint; empty without one.
+    pub fn path_ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
+        self.guidance.path_ahead()
+    }
+
+    /// The vehicle's node name.
+    #[must_use]
+    pub fn name(&self) -> &NodeName {
+        &self.name
+    }
+}
+
+/// What no remote b-thread can block, and only the operator's gateway can request.
+fn safety_events(me: &Me) -> EventSet {
+    me.any_of(&[HOLD, RETURN, LAND])
+}

@@ -1,0 +1,181 @@
+//! Flight: carries out selected events on the autopilot, and reports what the vehicle then does.
+
+use std::time::Duration;
+
+use skein_bp::Event;
+use skein_mav::{Command, CommandResult, Companion, FlightMode, Landed, MavEvent};
+use skein_wire::vocabulary::{
+    AIRBORNE, COMMAND_FAILED, FOUND_AIRBORNE, HAND_BACK, HOLD, LAND, LANDED, PILOT, TAKEOFF,
+};
+
+use crate::me::Me;
+
+/// Set-points must reach the autopilot for this long before it may be asked for offboard mode.
+const SET_POINTS_BEFORE_OFFBOARD: Duration = Duration::from_millis(300);
+/// Take-off is over this far below the height asked for.
+const TAKEOFF_TOLERANCE_M: f64 = 0.3;
+
+/// Where the vehicle is between two stands on the ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FlightPhase {
+    /// On the ground, or not heard of yet.
+    Grounded,
+    /// The arm command is under way.
+    Arming,
+    /// The autopilot climbs to the take-off height.
+    Climbing,
+    /// Set-points flow; offboard mode is being asked for.
+    Engaging {
+        /// Since when set-points have been flowing.
+        since: Duration,
+        /// Whether offboard mode has been asked for.
+        asked: bool,
+    },
+    /// The agent flies the vehicle.
+    Flying,
+    /// The autopilot lands the vehicle.
+    Landing,
+    /// Somebody else flies the vehicle.
+    Taken,
+    /// In the air when the agent started; the autopilot holds it.
+    Adopted,
+}
+
+/// The vehicle's flight as the agent conducts it.
+#[derive(Debug)]
+pub struct Flight {
+    me: Me,
+    takeoff_height_m: f64,
+    phase: FlightPhase,
+    heard_of: bool,
+    /// Whether the autopilot has shown, since the last command, that it is off the ground.
+    left_ground: bool,
+}
+
+impl Flight {
+    /// A vehicle on the ground that will climb to `takeoff_height_m` above home.
+    #[must_use]
+    pub fn new(me: Me, takeoff_height_m: f64) -> Self {
+        Self { me, takeoff_height_m, phase: FlightPhase::Grounded, heard_of: false, left_ground: false }
+    }
+
+    /// Where the vehicle is between two stands on the ground.
+    #[must_use]
+    pub fn phase(&self) -> FlightPhase {
+        self.phase
+    }
+
+    /// Whether set-points may leave the agent at all.
+    #[must_use]
+    pub fn sends_set_points(&self) -> bool {
+        matches!(self.phase, FlightPhase::Engaging { .. } | FlightPhase::Flying)
+    }
+
+    /// Carries out one selected event.
+    pub fn carry_out(&mut self, now: Duration, event: &Event, companion: &mut Companion) {
+        match (self.me.verb(event), self.phase) {
+            (Some(TAKEOFF), FlightPhase::Grounded) => {
+                self.phase = FlightPhase::Arming;
+                self.left_ground = false;
+                companion.command(now, Command::Arm);
+            }
+            (Some(LAND), phase) if phase != FlightPhase::Grounded => {
+                self.phase = FlightPhase::Landing;
+                companion.command(now, Command::Land);
+            }
+            (Some(HOLD), FlightPhase::Adopted) => companion.command(now, Command::Hold),
+            (Some(HAND_BACK), FlightPhase::Taken) => self.engage(now),
+            _ => {}
+        }
+    }
+
+    /// An operator lets an adopted vehicle fly its mission.
+    pub fn resume(&mut self, now: Duration) {
+        if self.phase == FlightPhase::Adopted {
+            self.engage(now);
+        }
+    }
+
+    fn engage(&mut self, now: Duration) {
+        self.phase = FlightPhase::Engaging { since: now, asked: false };
+    }
+
+    /// Hears what the autopilot reports; returns what the b-threads should hear of it.
+    pub fn hear(&mut self, now: Duration, event: &MavEvent, companion: &mut Companion) -> Option<Event> {
+        match event {
+            MavEvent::CommandAcked { command: Command::Arm, result: CommandResult::Accepted } => {
+                if self.phase == FlightPhase::Arming {
+                    self.phase = FlightPhase::Climbing;
+                    companion.command(now, Command::Takeoff { height_m: self.takeoff_height_m });
+                }
+                None
+            }
+            MavEvent::CommandAcked { result: CommandResult::Accepted, .. } => None,
+            MavEvent::CommandAcked { command, result } => Some(self.command_failed(*command, &result.to_string())),
+            MavEvent::CommandTimedOut { command } => Some(self.command_failed(*command, "no answer")),
+            MavEvent::ModeChanged { to, .. } if self.is_foreign(*to) => {
+                // Control ends with the mode change itself; the b-threads hear of it afterwards.
+                self.phase = FlightPhase::Taken;
+                Some(self.me.event(PILOT).with("mode", to.to_string()))
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether a change to `mode` is none that this agent asked for.
+    fn is_foreign(&self, mode: FlightMode) -> bool {
+        match self.phase {
+            FlightPhase::Flying => mode != FlightMode::Offboard,
+            FlightPhase::Engaging { .. } | FlightPhase::Climbing => {
+                !matches!(mode, FlightMode::Offboard | FlightMode::Takeoff | FlightMode::Hold)
+            }
+            FlightPhase::Landing => !matches!(mode, FlightMode::Land | FlightMode::Offboard | FlightMode::Hold),
+            FlightPhase::Grounded | FlightPhase::Arming | FlightPhase::Taken | FlightPhase::Adopted => false,
+        }
+    }
+
+    fn command_failed(&mut self, command: Command, why: &str) -> Event {
+        if matches!(self.phase, FlightPhase::Arming | FlightPhase::Climbing) && !self.left_ground {
+            self.phase = FlightPhase::Grounded;
+        }
+        self.me.because(COMMAND_FAILED, &format!("{command:?}: {why}"))
+    }
+
+    /// Moves on to the next phase when the telemetry says so; returns what the b-threads should hear of it.
+    pub fn follow(&mut self, now: Duration, companion: &mut Companion) -> Option<Event> {
+        let telemetry = companion.telemetry();
+        let (landed, armed, mode) = (telemetry.landed, telemetry.armed, telemetry.mode);
+        let height_m = telemetry
+            .position
+            .as_ref()
+            .zip(telemetry.home)
+            .map_or(0.0, |(position, home)| position.value.z - home.z);
+        if !self.heard_of && landed != Landed::Unknown {
+            self.heard_of = true;
+            if landed != Landed::OnGround && self.phase == FlightPhase::Grounded {
+                self.phase = FlightPhase::Adopted;
+                return Some(self.me.event(FOUND_AIRBORNE));
+            }
+        }
+        self.left_ground |= landed == Landed::InAir;
+        match self.phase {
+            FlightPhase::Climbing if height_m >= self.takeoff_height_m - TAKEOFF_TOLERANCE_M => self.engage(now),
+            FlightPhase::Engaging { since, asked: false } if now >= since + SET_POINTS_BEFORE_OFFBOARD => {
+                companion.command(now, Command::Offboard);
+                self.phase = FlightPhase::Engaging { since, asked: true };
+            }
+            FlightPhase::Engaging { asked: true, .. } if mode == FlightMode::Offboard => {
+                self.phase = FlightPhase::Flying;
+                return Some(self.me.event(AIRBORNE));
+            }
+            FlightPhase::Landing | FlightPhase::Taken | FlightPhase::Flying | FlightPhase::Adopted
+                if landed == Landed::OnGround && !armed =>
+            {
+                self.phase = FlightPhase::Grounded;
+                return Some(self.me.event(LANDED));
+            }
+            _ => {}
+        }
+        None
+    }
+}

@@ -1,0 +1,479 @@
+//! Guidance: a path to the waypoint, leave to follow it, and the velocity to fly now.
+
+use std::time::Duration;
+
+use nalgebra::Vector3;
+use skein_bp::Event;
+use skein_mav::SetPoint;
+use skein_planning::{
+    Path,
+    global::{
+        Potential, PotentialObstacle,
+        astar::{self, AstarConfig, AstarScratch, Disc, PlanError, Request},
+        simplify,
+    },
+    local::{
+        apf::{self, ApfConfig},
+        braking::{self, BrakingConfig},
+        escape::{EscapeConfig, EscapeDetector, Verdict},
+    },
+    map::ClearanceMap,
+    passage::{Passage, PassageConfig, first_passage},
+    separation::{self, FilterConfig, RepulsionConfig, filter, repulsion},
+};
+use skein_wire::vocabulary::{ARRIVED, LEAVE, PASSAGE, PATH_BLOCKED, PLANNED, STUCK, UNPLANNABLE};
+
+use crate::{
+    config::{Envelope, Fence},
+    me::Me,
+    neighbours::Neighbour,
+};
+
+/// Leave to move lasts for so long after an `advance`: a little more than two navigation cycles.
+const LEAVE_LASTS: Duration = Duration::from_millis(250);
+/// The set-point loop's period.
+const TICK_S: f64 = 0.02;
+/// The last waypoint is reached within this distance, m.
+const ARRIVAL_M: f64 = 0.35;
+/// Other waypoints are reached within this distance, m.
+const PASSING_M: f64 = 0.7;
+/// A path is kept while its clearance is less by no more than this, m.
+const REPLAN_SLACK_M: f64 = 0.15;
+/// How far ahead the path is checked against the map, m.
+const CHECK_AHEAD_M: f64 = 15.0;
+/// A path further away than this is planned anew, m.
+const OFF_PATH_M: f64 = 2.0;
+/// A passage is announced this far ahead, m: far enough to stop well clear of it.
+const PASSAGE_AHEAD_M: f64 = 5.0;
+/// A passage lies behind once the vehicle is this far past it, m.
+const PASSAGE_BEHIND_M: f64 = 2.5;
+/// Neighbours within this distance are gone around when the vehicle is stuck, m.
+const AROUND_NEIGHBOURS_M: f64 = 8.0;
+/// Height differences below this are flown in planar mode, m.
+const PLANAR_BAND_M: f64 = 0.4;
+/// Clearance that the safety filter keeps between hull and obstacles, m: less than paths do, so that it does not fight them.
+const OBSTACLE_MARGIN_M: f64 = 0.1;
+/// Margins between hull and obstacles that are tried in turn when there is no path with the envelope's own, m.
+const TIGHT_MARGINS_M: [f64; 2] = [0.1, 0.03];
+/// How far ahead the way is looked at for the speed cap, m.
+const SENSED_AHEAD_M: f64 = 12.0;
+/// Standard deviation of the vehicle's own position, m.
+const POSITION_SIGMA_M: f64 = 0.05;
+/// A hovering vehicle that others have pushed this far does not come back, m.
+const GIVES_WAY_M: f64 = 1.0;
+/// Speed at which a hovering vehicle goes back to its place, at most, m/s.
+const STATION_KEEPING_M_S: f64 = 0.5;
+
+/// How the vehicle moves. World ENU.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Position, m.
+    pub position: Vector3<f64>,
+    /// Velocity, m/s.
+    pub velocity: Vector3<f64>,
+}
+
+/// What guidance has found out, for the b-threads.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Report {
+    /// A path of this length exists.
+    Planned {
+        /// Leg of the waypoint.
+        leg: i64,
+        /// Length of the path, m.
+        length_m: f64,
+    },
+    /// There is no path, and this is why.
+    Unplannable {
+        /// Leg of the waypoint.
+        leg: i64,
+        /// Why.
+        why: String,
+    },
+    /// The waypoint of this leg is reached.
+    Arrived {
+        /// Leg of the waypoint.
+        leg: i64,
+    },
+    /// The path runs into something.
+    PathBlocked,
+    /// No progress in spite of leave to move.
+    Stuck,
+    /// A narrow passage lies ahead.
+    Passage(Vector3<f64>),
+    /// The passage lies behind, or the path no longer leads through it.
+    PassageLeft,
+}
+
+impl Report {
+    /// The report as an event of vehicle `me`.
+    #[must_use]
+    pub fn into_event(self, me: &Me) -> Event {
+        match self {
+            Self::Planned { leg, length_m } => me.event(PLANNED).with("leg", leg).with("length_m", length_m),
+            Self::Unplannable { leg, why } => me.because(UNPLANNABLE, &why).with("leg", leg),
+            Self::Arrived { leg } => me.event(ARRIVED).with("leg", leg),
+            Self::PathBlocked => me.event(PATH_BLOCKED),
+            Self::Stuck => me.event(STUCK),
+            Self::Passage(at) => me.event(PASSAGE).with("x", at.x).with("y", at.y).with("z", at.z),
+            Self::PassageLeft => me.event(LEAVE),
+        }
+    }
+}
+
+/// The waypoint being flown to.
+#[derive(Clone, Copy, Debug)]
+struct Leg {
+    number: i64,
+    target: Vector3<f64>,
+    arrived: bool,
+}
+
+/// A path and how far along it the vehicle is.
+#[derive(Clone, Debug)]
+struct Following {
+    path: Path,
+    clearance_m: f64,
+    station_m: f64,
+    blocked: bool,
+}
+
+/// A narrow passage that was announced.
+#[derive(Clone, Copy, Debug)]
+struct Announced {
+    passage: Passage,
+    entered: bool,
+}
+
+/// Follows paths with leave, hovers without.
+#[derive(Debug)]
+pub struct Guidance {
+    envelope: Envelope,
+    fence: Fence,
+    leg: Option<Leg>,
+    following: Option<Following>,
+    leave_until: Duration,
+    passage: Option<Announced>,
+    /// Where to hover while there is no leave to move.
+    hover_at: Option<Vector3<f64>>,
+    speed_m_s: f64,
+    braking: BrakingConfig,
+    filter: FilterConfig,
+    escape: EscapeDetector,
+    scratch: AstarScratch,
+}
+
+impl Guidance {
+    /// Guidance for a vehicle of this envelope inside this fence.
+    #[must_use]
+    pub fn new(envelope: Envelope, fence: Fence) -> Self {
+        Self {
+            envelope,
+            fence,
+            leg: None,
+            following: None,
+            leave_until: Duration::ZERO,
+            passage: None,
+            hover_at: None,
+            speed_m_s: 0.0,
+            braking: BrakingConfig {
+                cruise_m_s: envelope.cruise_m_s,
+                decel_m_s2: envelope.brake_m_s2,
+                accel_m_s2: envelope.brake_m_s2,
+                latency_s: envelope.latency_s,
+                ..BrakingConfig::default()
+            },
+            filter: FilterConfig {
+                separation_m: envelope.separation_m,
+                obstacle_clearance_m: envelope.hull_m + OBSTACLE_MARGIN_M,
+                max_speed_m_s: envelope.cruise_m_s,
+                decel_m_s2: envelope.brake_m_s2,
+                latency_s: envelope.latency_s,
+                hull_radius_m: envelope.hull_m,
+                ..FilterConfig::default()
+            },
+            escape: EscapeDetector::new(EscapeConfig::default()),
+            scratch: AstarScratch::default(),
+        }
+    }
+
+    /// Takes a `goto` as the waypoint to plan to.
+    pub fn head_for(&mut self, goto: &Event) {
+        let coordinate = |axis| goto.real(axis);
+        let (Some(number), Some(x), Some(y), Some(z)) =
+            (goto.int("leg"), coordinate("x"), coordinate("y"), coordinate("z"))
+        else {
+            return;
+        };
+        self.leg = Some(Leg { number, target: Vector3::new(x, y, z), arrived: false });
+        self.following = None;
+    }
+
+    /// Gives leave to move for one navigation cycle.
+    pub fn grant_leave(&mut self, now: Duration) {
+        self.leave_until = now + LEAVE_LASTS;
+    }
+
+    /// The right to pass is the vehicle's own.
+    pub fn enter_passage(&mut self) {
+        if let Some(announced) = &mut self.passage {
+            announced.entered = true;
+        }
+    }
+
+    /// Somebody else moves the vehicle, or nobody: whatever place it hovered at is not its place any more.
+    pub fn rest(&mut self) {
+        self.hover_at = None;
+        self.speed_m_s = 0.0;
+    }
+
+    /// The flight is over.
+    pub fn forget(&mut self) {
+        self.rest();
+        self.leg = None;
+        self.following = None;
+        self.passage = None;
+    }
+
+    /// The path ahead, from the vehicle's place on it to its end.
+    pub fn path_ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
+        self.following.iter().flat_map(|following| {
+            let here = following.path.point_at(following.station_m);
+            let mut station_m = 0.0;
+            let points = following.path.points();
+            let ahead = points.iter().enumerate().filter_map(move |(index, point)| {
+                if let Some(before) = index.checked_sub(1).and_then(|before| points.get(before)) {
+                    station_m += (point - before).norm();
+                }
+                (station_m > following.station_m).then_some(*point)
+            });
+            std::iter::once(here).chain(ahead)
+        })
+    }
+
+    /// Plans a path to the waypoint. `why` is `stuck` when the vehicle made no way: neighbours that stand around are then obstacles too.
+    pub fn plan(
+        &mut self,
+        why: &str,
+        motion: &Motion,
+        map: &mut ClearanceMap,
+        neighbours: &[Neighbour],
+    ) -> Report {
+        let Some(leg) = self.leg else {
+            return Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() };
+        };
+        let target = map.voxels().clamp(&leg.target);
+        let standing: Vec<Vector3<f64>> = neighbours
+            .iter()
+            .filter(|neighbour| neighbour.armed && neighbour.track.velocity.norm() < 0.5)
+            .map(Neighbour::position)
+            .filter(|position| (position - motion.position).norm() < AROUND_NEIGHBOURS_M)
+            .collect();
+        let heading = if motion.velocity.norm() > 0.3 { motion.velocity } else { target - motion.position };
+        let repellers: Vec<PotentialObstacle> = standing
+            .iter()
+            .map(|&centre| PotentialObstacle { centre, influence_m: 2.0 * self.envelope.separation_m })
+            .collect();
+        let potential = Potential::gated(&motion.position, &heading, &repellers, 2.0);
+        let radius_m = self.envelope.separation_m;
+        let in_the_way = |disc: &&Vector3<f64>| {
+            why == "stuck"
+                && (*disc - target).xy().norm() > radius_m
+                && (*disc - motion.position).xy().norm() > radius_m
+        };
+        let discs: Vec<Disc> =
+            standing.iter().filter(in_the_way).map(|&centre| Disc { centre, radius_m }).collect();
+        let request = Request { start: motion.position, goal: target, potential: &potential, discs: &discs };
+        let mut found = self.search(map, &request);
+        if found.is_err() && !discs.is_empty() {
+            found = self.search(map, &Request { discs: &[], ..request });
+        }
+        match found {
+            Ok((path, clearance_m)) => {
+                let length_m = path.length_m();
+                self.following = Some(Following { path, clearance_m, station_m: 0.0, blocked: false });
+                self.escape.reset();
+                Report::Planned { leg: leg.number, length_m }
+            }
+            Err(error) => {
+                self.following = None;
+                Report::Unplannable { leg: leg.number, why: error.to_string() }
+            }
+        }
+    }
+
+    /// The path with the widest of the margins that allow one, and the clearance it keeps.
+    fn search(&mut self, map: &mut ClearanceMap, request: &Request<'_>) -> Result<(Path, f64), PlanError> {
+        let margins = std::iter::once(self.envelope.margin_m).chain(TIGHT_MARGINS_M);
+        let mut last = None;
+        for clearance_m in margins.map(|margin_m| self.envelope.hull_m + margin_m) {
+            let config = AstarConfig { clearance_m, ..AstarConfig::default() };
+            match astar::plan(map, request, &config, &mut self.scratch) {
+                Ok(plan) => return Ok((simplify(map, &plan.path, clearance_m), clearance_m)),
+                Err(PlanError::BudgetExhausted { partial, .. }) => return Ok((partial, clearance_m)),
+                Err(error) => last = last.or(Some(error)),
+            }
+        }
+        Err(last.unwrap_or(PlanError::Unreachable { expanded: 0 }))
+    }
+
+    /// Looks along the path; once in each navigation cycle.
+    pub fn look_ahead(&mut self, now: Duration, motion: &Motion, map: &ClearanceMap) -> Vec<Report> {
+        let mut reports = Vec::new();
+        let has_leave = now <= self.leave_until;
+        reports.extend(self.check_arrival(motion));
+        reports.extend(self.check_path(motion, map));
+        reports.extend(self.check_passage(motion, map));
+        reports.extend(self.check_progress(now, has_leave));
+        reports
+    }
+
+    fn check_arrival(&mut self, motion: &Motion) -> Option<Report> {
+        let following = self.following.as_ref()?;
+        let leg = self.leg.as_mut()?;
+        let offset = leg.target - motion.position;
+        let is_last_stretch = following.path.length_m() - following.station_m < 2.0 * PASSING_M;
+        let within_m = if leg.number < 0 || is_last_stretch { ARRIVAL_M } else { PASSING_M };
+        let arrived = offset.xy().norm() < within_m && offset.z.abs() < 0.5;
+        (arrived && !std::mem::replace(&mut leg.arrived, true)).then_some(Report::Arrived { leg: leg.number })
+    }
+
+    fn check_path(&mut self, motion: &Motion, map: &ClearanceMap) -> Option<Report> {
+        let following = self.following.as_mut().filter(|following| !following.blocked)?;
+        // Less than what was planned with, so that a voxel more or less does not make a new plan.
+        let clearance_m = (following.clearance_m - REPLAN_SLACK_M).max(0.0);
+        let here = following.path.point_at(following.station_m);
+        let off_path = (here - motion.position).norm() > OFF_PATH_M;
+        let end_m = (following.station_m + CHECK_AHEAD_M).min(following.path.length_m());
+        let mut from = here;
+        let mut station_m = following.station_m;
+        let mut clear = true;
+        while clear && station_m < end_m {
+            station_m = (station_m + 1.0).min(end_m);
+            let to = following.path.point_at(station_m);
+            // The way out of a tight place counts as clear.
+            clear = map.is_segment_clear(&from, &to, clearance_m.min(map.clearance(&from)));
+            from = to;
+        }
+        following.blocked = !clear || off_path;
+        following.blocked.then_some(Report::PathBlocked)
+    }
+
+    fn check_passage(&mut self, motion: &Motion, map: &ClearanceMap) -> Option<Report> {
+        if let Some(announced) = self.passage {
+            let past_m = (motion.position - announced.passage.centre).dot(&announced.passage.direction);
+            let away_m = (motion.position - announced.passage.centre).norm();
+            if past_m > PASSAGE_BEHIND_M || away_m > PASSAGE_AHEAD_M + PASSAGE_BEHIND_M {
+                self.passage = None;
+                return Some(Report::PassageLeft);
+            }
+            return None;
+        }
+        let following = self.following.as_ref()?;
+        let config = PassageConfig { look_m: PASSAGE_AHEAD_M, ..PassageConfig::default() };
+        let passage = first_passage(map, &following.path, following.station_m, &config)?;
+        self.passage = Some(Announced { passage, entered: false });
+        Some(Report::Passage(passage.centre))
+    }
+
+    fn check_progress(&mut self, now: Duration, has_leave: bool) -> Option<Report> {
+        let waits = self.leg.is_none_or(|leg| leg.arrived);
+        let Some(following) = self.following.as_ref().filter(|_| has_leave && !waits) else {
+            self.escape.reset();
+            return None;
+        };
+        (self.escape.update(now, following.station_m) == Verdict::Stuck).then_some(Report::Stuck)
+    }
+
+    /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles either way.
+    pub fn steer(
+        &mut self,
+        now: Duration,
+        motion: &Motion,
+        surroundings: &Surroundings<'_>,
+    ) -> SetPoint {
+        let wish = self.along_path(now, motion, surroundings.map).unwrap_or_else(|| self.keep_station(motion));
+        let push = repulsion(&motion.position, &wish.velocity, surroundings.neighbours, &RepulsionConfig::default());
+        let is_level = (wish.height_m - motion.position.z).abs() < PLANAR_BAND_M;
+        let mut desired = apf::limited(wish.velocity + push, self.envelope.cruise_m_s);
+        desired.z = if is_level { 0.0 } else { desired.z.clamp(-self.envelope.climb_m_s, self.envelope.climb_m_s) };
+        let request = separation::Motion {
+            position: motion.position,
+            velocity: motion.velocity,
+            sigma_m: POSITION_SIGMA_M,
+            desired,
+            planar: is_level,
+        };
+        let obstacles: Vec<_> =
+            surroundings.obstacles.iter().copied().chain(self.fence_ahead(motion.position)).collect();
+        let safe = filter(&request, surroundings.neighbours, &obstacles, &self.filter).velocity;
+        if is_level {
+            SetPoint::Planar { vx: safe.x, vy: safe.y, z: wish.height_m, yaw: None }
+        } else {
+            SetPoint::Velocity { velocity: safe, yaw: None }
+        }
+    }
+
+    /// Along the path; `None` without path or leave.
+    fn along_path(&mut self, now: Duration, motion: &Motion, map: &ClearanceMap) -> Option<Wish> {
+        let following = self.following.as_mut().filter(|_| now <= self.leave_until)?;
+        self.hover_at = None;
+        let ahead = following.path.direction_at(following.station_m);
+        let sensed_free_m = map.voxels().sensed_free_m(&motion.position, &ahead, SENSED_AHEAD_M);
+        let (cap, _) = braking::speed_cap(&following.path, following.station_m, sensed_free_m, &self.braking);
+        self.speed_m_s = braking::ramp(self.speed_m_s, cap, TICK_S, &self.braking);
+        let attraction = self.escape.attraction();
+        let step = apf::follow(
+            map,
+            &following.path,
+            following.station_m,
+            &motion.position,
+            self.speed_m_s,
+            attraction,
+            &ApfConfig::default(),
+        );
+        following.station_m = step.station_m;
+        Some(Wish { velocity: step.velocity, height_m: step.carrot.z })
+    }
+
+    /// At the place where the vehicle came to a stop, or to where others have pushed it.
+    fn keep_station(&mut self, motion: &Motion) -> Wish {
+        self.speed_m_s = 0.0;
+        let place = self.hover_at.filter(|place| (place - motion.position).norm() < GIVES_WAY_M).unwrap_or_else(|| {
+            let speed = motion.velocity.norm();
+            motion.position + motion.velocity * (speed / (2.0 * self.braking.decel_m_s2)).min(1.0)
+        });
+        self.hover_at = Some(place);
+        let back = apf::limited(place - motion.position, STATION_KEEPING_M_S);
+        Wish { velocity: back, height_m: place.z }
+    }
+
+    /// The nearest points of the fence's walls: the filter keeps clear of them as of obstacles.
+    fn fence_ahead(&self, position: Vector3<f64>) -> impl Iterator<Item = Vector3<f64>> + '_ {
+        [0, 1].into_iter().flat_map(move |axis| {
+            [self.fence.min[axis], self.fence.max[axis]].map(|wall| {
+                let mut point = position;
+                point[axis] = wall;
+                point
+            })
+        })
+    }
+}
+
+/// The velocity wanted before others are considered (ENU, m/s), and the height it leads to (m).
+#[derive(Clone, Copy, Debug)]
+struct Wish {
+    velocity: Vector3<f64>,
+    height_m: f64,
+}
+
+/// What is around the vehicle now.
+#[derive(Clone, Copy, Debug)]
+pub struct Surroundings<'a> {
+    /// The map.
+    pub map: &'a ClearanceMap,
+    /// Obstacle points of the newest scan, metres ENU: more exact than the map.
+    pub obstacles: &'a [Vector3<f64>],
+    /// The other vehicles in the air.
+    pub neighbours: &'a [separation::Neighbour],
+}

@@ -1,0 +1,158 @@
+//! Perception: lidar scans and the vehicle's own pose become a map; neighbours are taken out of the scans first.
+
+use std::time::Duration;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use skein_planning::map::{ClearanceMap, MapError, RayEnd, Sectors, VoxelMapConfig};
+
+use crate::config::Fence;
+
+/// Edge of a voxel, m.
+const RESOLUTION_M: f64 = 0.2;
+/// Rays are followed this far, m: further than any vehicle here needs to stop.
+const MAP_RANGE_M: f64 = 12.0;
+/// Clearance is not told apart beyond this, m.
+const CLEARANCE_RANGE_M: f64 = 2.5;
+/// The window is at most this wide and high, m; larger missions roll it along.
+const WINDOW_M: [f64; 3] = [120.0, 120.0, 30.0];
+/// Returns from lower than this above the take-off place are the ground.
+const GROUND_M: f64 = 0.4;
+/// Obstacle points this near are told to the safety filter, m.
+const NEAR_M: f64 = 6.0;
+/// Returns this near a neighbour are the neighbour, m.
+const NEIGHBOUR_M: f64 = 0.8;
+/// Returns nearer than this are the vehicle's own frame, m.
+const OWN_FRAME_M: f64 = 0.15;
+
+/// One turn of a lidar that scans the body's x-y plane, with the range finders above and below.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scan {
+    /// When it was taken.
+    pub stamp: Duration,
+    /// Angle of the first ray from body x, counter-clockwise, rad.
+    pub angle_min: f64,
+    /// Angle between rays, rad.
+    pub angle_step: f64,
+    /// Range beyond which nothing is seen, m.
+    pub max_range_m: f64,
+    /// Ranges, m; not finite where nothing was seen.
+    pub ranges_m: Vec<f32>,
+    /// Distance to what is above, m.
+    pub up_m: Option<f32>,
+    /// Distance to what is below, m.
+    pub down_m: Option<f32>,
+}
+
+/// Where the vehicle was, and how it lay, when a scan was taken. World ENU, body FLU.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Position, m.
+    pub position: Vector3<f64>,
+    /// Body to world.
+    pub attitude: UnitQuaternion<f64>,
+}
+
+/// The map a vehicle makes of what it senses.
+#[derive(Clone, Debug)]
+pub struct Perception {
+    map: ClearanceMap,
+    last_scan: Option<Duration>,
+    ends: Vec<RayEnd>,
+    near: Vec<Vector3<f64>>,
+    ground_m: f64,
+}
+
+impl Perception {
+    /// An empty map of the fenced space around `home`, metres ENU.
+    ///
+    /// # Errors
+    /// [`MapError`] when the fence is no box in space.
+    pub fn new(fence: &Fence, home: Vector3<f64>) -> Result<Self, MapError> {
+        let size: [f64; 3] = std::array::from_fn(|axis| {
+            (fence.max[axis] - fence.min[axis] + 4.0 * RESOLUTION_M).min(WINDOW_M[axis])
+        });
+        let centre = Vector3::from_fn(|axis, _| {
+            let (min, max, half) = (fence.min[axis], fence.max[axis], size[axis] / 2.0);
+            if max - min + 4.0 * RESOLUTION_M <= WINDOW_M[axis] { (min + max) / 2.0 } else { home[axis].max(min + half) }
+        });
+        let config = VoxelMapConfig {
+            resolution_m: RESOLUTION_M,
+            size_m: size,
+            max_range_m: MAP_RANGE_M,
+            ground_m: home.z + GROUND_M,
+            ..VoxelMapConfig::default()
+        };
+        Ok(Self {
+            map: ClearanceMap::new(config, centre, CLEARANCE_RANGE_M)?,
+            last_scan: None,
+            ends: Vec::new(),
+            near: Vec::new(),
+            ground_m: config.ground_m,
+        })
+    }
+
+    /// The map.
+    #[must_use]
+    pub fn map(&self) -> &ClearanceMap {
+        &self.map
+    }
+
+    /// The map, to let a planner track the layers it searches.
+    pub fn map_mut(&mut self) -> &mut ClearanceMap {
+        &mut self.map
+    }
+
+    /// The nearest obstacle point in each direction, of the newest scan; metres ENU.
+    #[must_use]
+    pub fn obstacles(&self) -> &[Vector3<f64>] {
+        &self.near
+    }
+
+    /// When the newest scan was taken.
+    #[must_use]
+    pub fn last_scan(&self) -> Option<Duration> {
+        self.last_scan
+    }
+
+    /// Takes in a scan that was taken at `pose`, while `neighbours` were at these positions.
+    pub fn take_in(&mut self, scan: &Scan, pose: &Pose, neighbours: &[Vector3<f64>]) {
+        self.last_scan = Some(scan.stamp);
+        self.ends.clear();
+        let mut near = Sectors::new(pose.position);
+        let to_world = pose.attitude.to_rotation_matrix();
+        for (ray, &range) in (0_u32..).zip(&scan.ranges_m) {
+            let range = f64::from(range);
+            let hit = range.is_finite() && range <= scan.max_range_m;
+            if hit && range < OWN_FRAME_M {
+                continue;
+            }
+            let (sin, cos) = (scan.angle_min + f64::from(ray) * scan.angle_step).sin_cos();
+            let reach = if hit { range } else { scan.max_range_m };
+            let point = pose.position + to_world * Vector3::new(reach * cos, reach * sin, 0.0);
+            let is_neighbour = |other: &Vector3<f64>| (point - other).norm_squared() < NEIGHBOUR_M * NEIGHBOUR_M;
+            if hit && neighbours.iter().any(is_neighbour) {
+                // The way to the neighbour is free; what lies behind it is not known.
+                let point = pose.position + (point - pose.position) * (1.0 - (NEIGHBOUR_M / range).min(1.0));
+                self.ends.push(RayEnd { point, hit: false });
+                continue;
+            }
+            if hit && range < NEAR_M && point.z > self.ground_m {
+                near.add(point);
+            }
+            self.ends.push(RayEnd { point, hit });
+        }
+        for (distance, direction) in [(scan.up_m, Vector3::z()), (scan.down_m, -Vector3::z())] {
+            let point = distance.map(|distance| pose.position + to_world * direction * f64::from(distance));
+            let near_neighbour = |point: &Vector3<f64>| {
+                neighbours.iter().any(|other| (point - other).norm_squared() < NEIGHBOUR_M * NEIGHBOUR_M)
+            };
+            // Only what stands near the column matters: what lies far below a cone's edge is no obstacle yet.
+            if let Some(point) = point.filter(|point| !near_neighbour(point)) {
+                self.ends.push(RayEnd { point, hit: true });
+            }
+        }
+        self.near = near.points().collect();
+        self.map.recentre(&pose.position);
+        self.map.integrate(pose.position, &self.ends);
+    }
+}

@@ -1,0 +1,134 @@
+//! Watches: conditions of the vehicle that become events at the moment they change.
+
+use std::time::Duration;
+
+use nalgebra::Vector3;
+use skein_bp::Event;
+use skein_mav::{Battery, Telemetry};
+use skein_wire::vocabulary::{
+    BATTERY_CRITICAL, BATTERY_LOW, CLEAR, FENCE_BREACHED, READY, TOO_CLOSE, UNREADY,
+};
+
+use crate::{config::Fence, me::Me, neighbours::Neighbour};
+
+/// Telemetry older than this is no ground for take-off.
+const TELEMETRY_FRESH_FOR: Duration = Duration::from_millis(500);
+/// Least energy to take off with.
+const BATTERY_TO_START: f64 = 0.3;
+/// Energy kept in reserve over what the way home needs.
+const BATTERY_RESERVE: f64 = 0.15;
+/// Energy at which only landing is left.
+const BATTERY_EMERGENCY: f64 = 0.08;
+/// Centre-to-centre distance at which a neighbour is too close, m; the safety filter keeps more.
+const EMERGENCY_DISTANCE_M: f64 = 1.0;
+/// Distance at which it is clear again, m.
+const CLEAR_DISTANCE_M: f64 = 1.2;
+/// How far outside the fence is a breach and not an estimate's noise, m.
+const FENCE_TOLERANCE_M: f64 = 0.3;
+
+/// A condition that is told once when it begins and once when it ends.
+#[derive(Debug, Default)]
+struct Edge(bool);
+
+impl Edge {
+    fn rises(&mut self, on: bool) -> bool {
+        let rose = on && !self.0;
+        self.0 = on;
+        rose
+    }
+
+    fn turns(&mut self, on: bool) -> Option<bool> {
+        let turned = self.0 != on;
+        self.0 = on;
+        turned.then_some(on)
+    }
+}
+
+/// Everything that is watched on one vehicle.
+#[derive(Debug)]
+pub struct Watches {
+    me: Me,
+    ready: Edge,
+    low: Edge,
+    critical: Edge,
+    outside: Edge,
+    close: Edge,
+    /// Energy used per second, smoothed.
+    drain_per_s: f64,
+    last_battery: Option<(Duration, f64)>,
+}
+
+impl Watches {
+    /// Nothing seen yet.
+    #[must_use]
+    pub fn new(me: Me) -> Self {
+        Self {
+            me,
+            ready: Edge::default(),
+            low: Edge::default(),
+            critical: Edge::default(),
+            outside: Edge::default(),
+            close: Edge::default(),
+            drain_per_s: 0.0,
+            last_battery: None,
+        }
+    }
+
+    /// Preflight: the autopilot is heard, ready to arm, charged, and its failsafes are sound.
+    pub fn preflight(&mut self, now: Duration, telemetry: &Telemetry, failsafes_sound: bool) -> Option<Event> {
+        let charged = telemetry.battery.is_some_and(|battery| battery.value.fraction >= BATTERY_TO_START);
+        let ready = telemetry.connected
+            && telemetry.ready_to_arm
+            && telemetry.home.is_some()
+            && telemetry.is_fresh(now, TELEMETRY_FRESH_FOR)
+            && charged
+            && failsafes_sound;
+        self.ready.turns(ready).map(|ready| self.me.event(if ready { READY } else { UNREADY }))
+    }
+
+    /// Battery: low when what is left is what the way home needs, with reserve.
+    pub fn battery(&mut self, now: Duration, battery: Battery, seconds_home: f64) -> Vec<Event> {
+        if let Some((then, fraction)) = self.last_battery {
+            let seconds = now.saturating_sub(then).as_secs_f64();
+            if seconds >= 1.0 {
+                let drain = (fraction - battery.fraction).max(0.0) / seconds;
+                self.drain_per_s += 0.2 * (drain - self.drain_per_s);
+                self.last_battery = Some((now, battery.fraction));
+            }
+        } else {
+            self.last_battery = Some((now, battery.fraction));
+        }
+        let needed = self.drain_per_s * seconds_home + BATTERY_RESERVE;
+        let mut events = Vec::new();
+        if self.low.rises(battery.fraction <= needed) {
+            events.push(self.me.event(BATTERY_LOW));
+        }
+        if self.critical.rises(battery.fraction <= BATTERY_EMERGENCY) {
+            events.push(self.me.event(BATTERY_CRITICAL));
+        }
+        events
+    }
+
+    /// Geofence: the vehicle is outside.
+    pub fn fence(&mut self, position: Vector3<f64>, fence: &Fence) -> Option<Event> {
+        let outside = (0..3).any(|axis| {
+            position[axis] < fence.min[axis] - FENCE_TOLERANCE_M || position[axis] > fence.max[axis] + FENCE_TOLERANCE_M
+        });
+        self.outside.rises(outside).then(|| self.me.event(FENCE_BREACHED))
+    }
+
+    /// Separation: a neighbour in the air is inside the emergency distance.
+    pub fn separation(&mut self, position: Vector3<f64>, neighbours: &[Neighbour]) -> Option<Event> {
+        let nearest = neighbours
+            .iter()
+            .filter(|neighbour| neighbour.armed)
+            .map(|neighbour| ((neighbour.position() - position).norm(), &neighbour.node))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let limit = if self.close.0 { CLEAR_DISTANCE_M } else { EMERGENCY_DISTANCE_M };
+        let too_close = nearest.filter(|(distance, _)| *distance < limit);
+        self.close.turns(too_close.is_some()).map(|_| match too_close {
+            Some((_, node)) => self.me.event(TOO_CLOSE).with("other", node.as_str()),
+            None => self.me.event(CLEAR),
+        })
+    }
+}

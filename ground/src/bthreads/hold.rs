@@ -1,0 +1,60 @@
+//! Hold: no vehicle moves on while its `advance` is blocked from here.
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+use skein_bp::{BThread, Bid, Context, Event, EventSet};
+use skein_dbp::NodeName;
+use skein_wire::vocabulary::{ADVANCE, of, of_every_vehicle};
+
+use crate::order::{Who, ordered};
+
+/// Blocks `advance` of the vehicles that are to hold, from an order to hold until another order.
+///
+/// The block has a lease: a ground station that falls silent does not hold the swarm for ever. Once it is sure
+/// everywhere, the station's fact `confirmed` names this b-thread.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct Hold {
+    ground: NodeName,
+    vehicles: Vec<NodeName>,
+    held: BTreeSet<NodeName>,
+}
+
+impl Hold {
+    /// The b-thread of the ground station `ground` for its `vehicles`.
+    #[must_use]
+    pub fn new(ground: NodeName, vehicles: Vec<NodeName>) -> Self {
+        Self { ground, vehicles, held: BTreeSet::new() }
+    }
+
+    fn block(&self) -> EventSet {
+        if self.held.len() == self.vehicles.len() {
+            of_every_vehicle(ADVANCE)
+        } else {
+            EventSet::any_of(self.held.iter().map(|vehicle| of(vehicle, ADVANCE)))
+        }
+    }
+}
+
+impl BThread for Hold {
+    fn bid(&self) -> Option<Bid> {
+        let orders = ["hold", "resume", "land", "return"].map(|what| ordered(&self.ground, what));
+        let bid = Bid::new().wait_for(EventSet::any_of(orders));
+        Some(if self.held.is_empty() { bid } else { bid.block(self.block()) })
+    }
+
+    fn resume(&mut self, event: &Event, _: &mut Context) {
+        let who = Who::of(event);
+        let concerned = |vehicle: &&NodeName| match &who {
+            Some(Who::All) => true,
+            Some(Who::Vehicle(name)) => name == *vehicle,
+            None => false,
+        };
+        if event.text("what") == Some("hold") {
+            self.held.extend(self.vehicles.iter().filter(concerned).cloned());
+        } else {
+            // Whoever is ordered home or down must be free to move, like who is to go on.
+            self.held.retain(|vehicle| !concerned(&vehicle));
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Watches until the mission is over.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use skein_bp::{BThread, Bid, Context, Event, EventSet};
+use skein_dbp::{NodeName, first_two_chunks};
+use skein_wire::vocabulary::{COMPLETE, FAILED, LANDED, TAKEOFF, of_every_vehicle};
+
+/// What each vehicle still owes: the outcome of its mission and, if it has flown, its landing.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct Watch {
+    ground: NodeName,
+    vehicles: BTreeMap<String, Progress>,
+    told: bool,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+struct Progress {
+    flying: bool,
+    /// Done, or the reason why not.
+    mission: Option<Result<(), String>>,
+}
+
+/// How a mission went.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MissionOutcome {
+    /// The vehicles that did not do what they were sent for, and why.
+    pub failed: BTreeMap<String, String>,
+}
+
+impl MissionOutcome {
+    /// Whether every vehicle did what it was sent for.
+    #[must_use]
+    pub fn succeeded(&self) -> bool {
+        self.failed.is_empty()
+    }
+}
+
+impl Watch {
+    /// The name that this b-thread runs under: the core asks it by name.
+    pub const NAME: &'static str = "watch";
+
+    /// Watches these vehicles.
+    #[must_use]
+    pub fn new(ground: NodeName, vehicles: impl IntoIterator<Item = NodeName>) -> Self {
+        let vehicles =
+            vehicles.into_iter().map(|vehicle| (vehicle.to_string(), Progress::default())).collect();
+        Self { ground, vehicles, told: false }
+    }
+
+    /// How the mission went, once every vehicle is on the ground and knows.
+    #[must_use]
+    pub fn outcome(&self) -> Option<MissionOutcome> {
+        let mut failed = BTreeMap::new();
+        for (vehicle, progress) in &self.vehicles {
+            match &progress.mission {
+                _ if progress.flying => return None,
+                None => return None,
+                Some(Ok(())) => {}
+                Some(Err(reason)) => drop(failed.insert(vehicle.clone(), reason.clone())),
+            }
+        }
+        Some(MissionOutcome { failed })
+    }
+}
+
+impl BThread for Watch {
+    fn bid(&self) -> Option<Bid> {
+        Some(match self.outcome() {
+            None => {
+                let news = [TAKEOFF, LANDED, COMPLETE, FAILED];
+                Bid::new().wait_for(EventSet::any_of(news.map(of_every_vehicle)))
+            }
+            Some(outcome) if !self.told => Bid::new().request(
+                Event::new(self.ground.event_name("mission_over")).with("succeeded", outcome.succeeded()),
+            ),
+            Some(_) => Bid::new(),
+        })
+    }
+
+    fn resume(&mut self, event: &Event, _: &mut Context) {
+        let home = first_two_chunks(event.name()).unwrap_or_default();
+        let Some(progress) = self.vehicles.get_mut(home) else {
+            self.told |= event.kind() == "mission_over";
+            return;
+        };
+        match event.kind() {
+            TAKEOFF => progress.flying = true,
+            LANDED => progress.flying = false,
+            COMPLETE => progress.mission = Some(Ok(())),
+            _ => progress.mission = Some(Err(event.text("why").unwrap_or("no reason given").into())),
+        }
+    }
+}

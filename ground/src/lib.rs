@@ -1,0 +1,30 @@
+//! The ground station: it launches the swarm, carries the operator's orders to it, and records what happens.
+//!
+//! [`GroundCore`] is the station without I/O: a behavioural program ([`bthreads`]) joined to those of the vehicles. An
+//! [`Order`] becomes an event of the station; the b-threads do the rest, by blocking (`hold`) and by requesting at each
+//! vehicle's gateway (`land`, `return`). The [`recorder`] writes a mission as an MCAP file.
+//!
+//! ```
+//! use std::time::Duration;
+//! use skein_ground::{GroundConfig, GroundCore, Order, Who};
+//! use skein_wire::{Fleet, Network, NetworkConfig, NodeName};
+//!
+//! let (ground, vehicle) = (NodeName::new("ground/main")?, NodeName::new("uav/1")?);
+//! let network = Network::new(NetworkConfig::default(), 0);
+//! let mut link = network.join(&ground);
+//! let mut station = GroundCore::new(GroundConfig::new(Fleet::new("demo")?, ground, vec![vehicle]));
+//! station.order(&Order::Hold(Who::All));
+//! station.tick(Duration::ZERO, &mut link)?;
+//! assert_eq!(station.take_selections()[0].event.name(), "ground/main/ordered");
+//! assert!(station.finished().is_none());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod bthreads;
+mod core;
+mod order;
+pub mod recorder;
+
+pub use crate::core::{GroundConfig, GroundCore};
+pub use bthreads::MissionOutcome;
+pub use order::{Order, Who, ordered, ordered_for};

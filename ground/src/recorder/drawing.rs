@@ -1,0 +1,139 @@
+//! Skein's world in Foxglove's terms.
+
+use foxglove::messages::{
+    Color, CubePrimitive, CylinderPrimitive, LinePrimitive, Point3, Pose, Quaternion, SceneEntity,
+    SpherePrimitive, TextPrimitive, Timestamp, Vector3 as Vector, line_primitive,
+};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+
+use super::WORLD;
+
+const OBSTACLE: Color = Color { r: 0.45, g: 0.36, b: 0.27, a: 1.0 };
+const TEXT: Color = Color { r: 1.0, g: 1.0, b: 1.0, a: 1.0 };
+const PATH_THICKNESS_M: f64 = 0.05;
+const TEXT_HEIGHT_M: f64 = 0.4;
+
+/// A body that stands in the world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solid {
+    /// Its form, centred on its origin.
+    pub form: Form,
+    /// Own frame to world ENU, metres.
+    pub pose: Isometry3<f64>,
+}
+
+/// The form of a body, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Form {
+    /// A cuboid of this whole size.
+    Box(Vector3<f64>),
+    /// A cylinder about z.
+    Cylinder {
+        /// Radius of the round section.
+        radius: f64,
+        /// Whole length along z.
+        height: f64,
+    },
+    /// A ball.
+    Sphere {
+        /// Radius.
+        radius: f64,
+    },
+}
+
+/// All obstacles as one entity.
+pub fn obstacles(timestamp: Timestamp, solids: &[Solid]) -> SceneEntity {
+    let mut entity = entity(timestamp, WORLD, "obstacles");
+    for solid in solids {
+        let (pose, color) = (Some(pose(&solid.pose)), Some(OBSTACLE));
+        match solid.form {
+            Form::Box(size) => entity.cubes.push(CubePrimitive { pose, size: Some(vector(&size)), color }),
+            Form::Cylinder { radius, height } => {
+                let size = Some(Vector { x: 2.0 * radius, y: 2.0 * radius, z: height });
+                entity.cylinders.push(CylinderPrimitive {
+                    pose,
+                    size,
+                    bottom_scale: 1.0,
+                    top_scale: 1.0,
+                    color,
+                });
+            }
+            Form::Sphere { radius } => entity.spheres.push(ball(&solid.pose, radius, OBSTACLE)),
+        }
+    }
+    entity
+}
+
+/// A vehicle's hull, fixed to its frame, with its name over it.
+pub fn hull(timestamp: Timestamp, vehicle: &str, radius_m: f64, index: usize) -> SceneEntity {
+    let mut entity = entity(timestamp, vehicle, &format!("hull of {vehicle}"));
+    entity.frame_locked = true;
+    entity.spheres.push(ball(&Isometry3::identity(), radius_m, hue(index)));
+    entity.texts.push(TextPrimitive {
+        pose: Some(pose(&Isometry3::translation(0.0, 0.0, radius_m + TEXT_HEIGHT_M))),
+        billboard: true,
+        font_size: TEXT_HEIGHT_M,
+        scale_invariant: false,
+        color: Some(TEXT),
+        text: vehicle.to_owned(),
+    });
+    entity
+}
+
+/// A planned path as a line in the world.
+pub fn path(timestamp: Timestamp, vehicle: &str, points: &[Vector3<f64>]) -> SceneEntity {
+    let number = vehicle.rsplit('/').next().and_then(|n| n.parse::<usize>().ok()).unwrap_or(1);
+    let mut entity = entity(timestamp, WORLD, &format!("path of {vehicle}"));
+    entity.lines.push(LinePrimitive {
+        r#type: line_primitive::Type::LineStrip.into(),
+        pose: Some(pose(&Isometry3::identity())),
+        thickness: PATH_THICKNESS_M,
+        scale_invariant: false,
+        points: points.iter().map(|p| Point3 { x: p.x, y: p.y, z: p.z }).collect(),
+        color: Some(hue(number.saturating_sub(1))),
+        colors: Vec::new(),
+        indices: Vec::new(),
+    });
+    entity
+}
+
+/// A position and orientation.
+pub fn pose(pose: &Isometry3<f64>) -> Pose {
+    Pose { position: Some(vector(&pose.translation.vector)), orientation: Some(quaternion(&pose.rotation)) }
+}
+
+/// A vector.
+pub fn vector(v: &Vector3<f64>) -> Vector {
+    Vector { x: v.x, y: v.y, z: v.z }
+}
+
+/// An orientation.
+pub fn quaternion(rotation: &UnitQuaternion<f64>) -> Quaternion {
+    Quaternion { x: rotation.i, y: rotation.j, z: rotation.k, w: rotation.w }
+}
+
+fn entity(timestamp: Timestamp, frame: &str, id: &str) -> SceneEntity {
+    SceneEntity {
+        timestamp: Some(timestamp),
+        frame_id: frame.to_owned(),
+        id: id.to_owned(),
+        ..SceneEntity::default()
+    }
+}
+
+fn ball(at: &Isometry3<f64>, radius: f64, color: Color) -> SpherePrimitive {
+    let diameter = 2.0 * radius;
+    let size = Some(Vector { x: diameter, y: diameter, z: diameter });
+    SpherePrimitive { pose: Some(pose(at)), size, color: Some(color) }
+}
+
+/// A colour for each vehicle: steps of the golden angle keep neighbours in number far apart in hue.
+fn hue(index: usize) -> Color {
+    const GOLDEN_TURN: f64 = 0.618_033_988_749_895;
+    let turn = (index as f64 * GOLDEN_TURN).fract() * 6.0;
+    let channel = |offset: f64| {
+        let t = (turn + offset) % 6.0;
+        (2.0 - (t - 3.0).abs()).clamp(0.0, 1.0)
+    };
+    Color { r: channel(3.0), g: channel(1.0), b: channel(5.0), a: 1.0 }
+}

@@ -1,0 +1,184 @@
+//! Bids: what a b-thread says at a synchronisation point.
+
+use std::fmt;
+use std::time::Duration;
+
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::event::Event;
+use crate::event_set::EventSet;
+use crate::notation::Many;
+
+/// A b-thread's statement at a synchronisation point.
+///
+/// Every method may be used more than once; sets and requests add up.
+///
+/// ```
+/// use skein_bp::{Bid, Event};
+/// let bid = Bid::new().request("uav/3/takeoff").wait_for("uav/3/abort").block("uav/3/land").priority(5);
+/// assert_eq!(bid.requests(), [Event::new("uav/3/takeoff")]);
+/// assert!(bid.blocks().contains(&Event::new("uav/3/land").with("why", "battery")));
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Bid(Box<Statement>); // Boxed, since a bid is moved more often than made.
+
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Statement {
+    #[serde(rename = "request", deserialize_with = "many_events", skip_serializing_if = "Vec::is_empty")]
+    requests: Vec<Event>,
+    #[serde(rename = "wait", skip_serializing_if = "EventSet::is_none")]
+    waits: EventSet,
+    #[serde(rename = "block", skip_serializing_if = "EventSet::is_none")]
+    blocks: EventSet,
+    #[serde(rename = "interrupt", skip_serializing_if = "EventSet::is_none")]
+    interrupts: EventSet,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    hot: bool,
+    #[serde(rename = "prio", skip_serializing_if = "Option::is_none")]
+    priority: Option<i32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    deadline: Option<Duration>,
+}
+
+impl Bid {
+    /// A bid for nothing: a b-thread that states it waits for ever.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Asks that `event` happen. One of several requested events resumes the b-thread; their order matters only under
+    /// [`Strategy::Ordered`](crate::Strategy::Ordered).
+    #[must_use]
+    pub fn request(mut self, event: impl Into<Event>) -> Self {
+        if self.0.requests.is_empty() {
+            // Most bids request one event and need room for no more.
+            self.0.requests.reserve_exact(1);
+        }
+        self.0.requests.push(event.into());
+        self
+    }
+
+    /// Resumes the b-thread when an event of `set` happens at someone else's request.
+    #[must_use]
+    pub fn wait_for(mut self, set: impl Into<EventSet>) -> Self {
+        add(&mut self.0.waits, set);
+        self
+    }
+
+    /// Forbids the events of `set`, the b-thread's own requests included.
+    #[must_use]
+    pub fn block(mut self, set: impl Into<EventSet>) -> Self {
+        add(&mut self.0.blocks, set);
+        self
+    }
+
+    /// Ends the b-thread when an event of `set` happens.
+    #[must_use]
+    pub fn interrupt(mut self, set: impl Into<EventSet>) -> Self {
+        add(&mut self.0.interrupts, set);
+        self
+    }
+
+    /// Says that the b-thread must not stay here for ever: a liveness requirement for the verifier.
+    #[must_use]
+    pub fn hot(mut self) -> Self {
+        self.0.hot = true;
+        self
+    }
+
+    /// Priority of the requests under [`Strategy::SyncPriority`](crate::Strategy::SyncPriority): greater wins, none is
+    /// lowest.
+    #[must_use]
+    pub fn priority(mut self, priority: i32) -> Self {
+        self.0.priority = Some(priority);
+        self
+    }
+
+    /// Resumes the b-thread with [`Event::timeout`] once the time since the run began reaches `at`; the earliest of
+    /// several counts.
+    #[must_use]
+    pub fn deadline(mut self, at: Duration) -> Self {
+        self.0.deadline = Some(self.0.deadline.map_or(at, |earlier| earlier.min(at)));
+        self
+    }
+
+    /// The requested events, in the order they were asked for.
+    pub fn requests(&self) -> &[Event] {
+        &self.0.requests
+    }
+
+    /// The events waited for.
+    pub fn waits(&self) -> &EventSet {
+        &self.0.waits
+    }
+
+    /// The blocked events.
+    pub fn blocks(&self) -> &EventSet {
+        &self.0.blocks
+    }
+
+    /// The events that end the b-thread.
+    pub fn interrupts(&self) -> &EventSet {
+        &self.0.interrupts
+    }
+
+    /// Whether the b-thread must not stay here for ever.
+    pub fn is_hot(&self) -> bool {
+        self.0.hot
+    }
+
+    /// The priority, if one was given.
+    pub fn given_priority(&self) -> Option<i32> {
+        self.0.priority
+    }
+
+    /// When the b-thread resumes by itself, as time since the run began.
+    pub fn given_deadline(&self) -> Option<Duration> {
+        self.0.deadline
+    }
+
+    /// The part that counts when a channel states the bid for a b-thread elsewhere, which sees to its own waits.
+    pub(crate) fn for_proxy(&self) -> Self {
+        let Statement { requests, blocks, priority, .. } = &*self.0;
+        let (requests, blocks) = (requests.clone(), blocks.clone());
+        Self(Box::new(Statement { requests, blocks, priority: *priority, ..Statement::default() }))
+    }
+}
+
+fn add(set: &mut EventSet, more: impl Into<EventSet>) {
+    *set = std::mem::take(set).or(more);
+}
+
+fn many_events<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Event>, D::Error> {
+    Many::deserialize(deserializer).map(|events| events.0)
+}
+
+impl fmt::Display for Bid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut parts = Vec::new();
+        if !self.0.requests.is_empty() {
+            let requests: Vec<String> = self.0.requests.iter().map(Event::to_string).collect();
+            parts.push(format!("request {}", requests.join(", ")));
+        }
+        for (verb, set) in
+            [("wait for", &self.0.waits), ("block", &self.0.blocks), ("interrupt on", &self.0.interrupts)]
+        {
+            if !set.is_none() {
+                parts.push(format!("{verb} {set}"));
+            }
+        }
+        if self.0.hot {
+            parts.push("hot".to_owned());
+        }
+        if let Some(priority) = self.0.priority {
+            parts.push(format!("priority {priority}"));
+        }
+        if let Some(deadline) = self.0.deadline {
+            parts.push(format!("deadline {:.3} s", deadline.as_secs_f64()));
+        }
+        f.write_str(if parts.is_empty() { "nothing" } else { "" })?;
+        f.write_str(&parts.join("; "))
+    }
+}

@@ -1,0 +1,303 @@
+//! The board: every bid on the table, and the questions a program asks of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Duration;
+
+use crate::bid::Bid;
+use crate::bthread::{AnyBThread, DEFAULT_BTHREAD_PRIORITY};
+use crate::event::Event;
+use crate::event_set::EventSet;
+use crate::index::{Index, Place};
+use crate::strategy::Strategy;
+
+/// Who states a bid.
+#[derive(Clone, Debug)]
+pub(crate) enum Owner {
+    /// A b-thread that runs here.
+    BThread(Box<dyn AnyBThread>),
+    /// A channel, on behalf of a b-thread that runs elsewhere.
+    Proxy,
+}
+
+/// One bid and its owner.
+#[derive(Clone, Debug)]
+pub(crate) struct Entry {
+    pub(crate) name: Arc<str>,
+    pub(crate) owner: Owner,
+    pub(crate) bid: Bid,
+    /// Synchronisation points reached so far.
+    pub(crate) sync: u64,
+    /// Priority of its requests under the program's strategy; none is lowest.
+    rank: Option<i32>,
+}
+
+impl Entry {
+    pub(crate) fn is_proxy(&self) -> bool {
+        matches!(self.owner, Owner::Proxy)
+    }
+}
+
+/// Bids in the order their owners came, with indexes kept up to date, so that idle b-threads cost nothing.
+#[derive(Clone, Debug)]
+pub(crate) struct Board {
+    strategy: Strategy,
+    /// Events that proxies cannot block.
+    protected: EventSet,
+    /// Events that may be selected here.
+    pub(crate) home: EventSet,
+    entries: Vec<Option<Entry>>,
+    vacant: usize,
+    bthreads: BTreeMap<Arc<str>, Place>,
+    proxies: BTreeMap<Arc<str>, Place>,
+    indexes: Indexes,
+}
+
+impl Board {
+    pub(crate) fn new(strategy: Strategy, protected: EventSet) -> Self {
+        Self {
+            strategy,
+            protected,
+            home: EventSet::All,
+            entries: Vec::new(),
+            vacant: 0,
+            bthreads: BTreeMap::new(),
+            proxies: BTreeMap::new(),
+            indexes: Indexes::default(),
+        }
+    }
+
+    /// Adds an owner with an empty bid. `sync` is how many synchronisation points its name has seen before.
+    pub(crate) fn add(&mut self, name: Arc<str>, owner: Owner, sync: u64) -> Place {
+        let place = self.entries.len() as Place;
+        let names = if matches!(owner, Owner::Proxy) { &mut self.proxies } else { &mut self.bthreads };
+        names.insert(name.clone(), place);
+        self.entries.push(Some(Entry { name, owner, bid: Bid::new(), sync, rank: None }));
+        place
+    }
+
+    pub(crate) fn remove(&mut self, place: Place) -> Option<Entry> {
+        let entry = self.entries.get_mut(place as usize)?.take()?;
+        self.indexes.refile(place, &entry.bid, &Bid::new());
+        let names = if entry.is_proxy() { &mut self.proxies } else { &mut self.bthreads };
+        names.remove(&entry.name);
+        self.vacant += 1;
+        Some(entry)
+    }
+
+    /// Replaces the bid at `place` and gives back the old one.
+    pub(crate) fn restate(&mut self, place: Place, bid: Bid) -> Option<Bid> {
+        let entry = self.entries.get_mut(place as usize)?.as_mut()?;
+        entry.rank = rank(self.strategy, &entry.owner, &bid);
+        entry.sync += 1;
+        let old = std::mem::replace(&mut entry.bid, bid);
+        self.indexes.refile(place, &old, &entry.bid);
+        Some(old)
+    }
+
+    pub(crate) fn get(&self, place: Place) -> Option<&Entry> {
+        self.entries.get(place as usize)?.as_ref()
+    }
+
+    pub(crate) fn get_mut(&mut self, place: Place) -> Option<&mut Entry> {
+        self.entries.get_mut(place as usize)?.as_mut()
+    }
+
+    pub(crate) fn bthread(&self, name: &str) -> Option<Place> {
+        self.bthreads.get(name).copied()
+    }
+
+    pub(crate) fn proxy(&self, name: &str) -> Option<Place> {
+        self.proxies.get(name).copied()
+    }
+
+    /// B-threads by name, with their states.
+    pub(crate) fn bthreads(&self) -> impl Iterator<Item = (&Entry, &dyn AnyBThread)> {
+        self.bthreads.values().filter_map(|place| self.get(*place)).filter_map(|entry| match &entry.owner {
+            Owner::BThread(bthread) => Some((entry, &**bthread)),
+            Owner::Proxy => None,
+        })
+    }
+
+    /// Proxies by name.
+    pub(crate) fn proxies(&self) -> impl Iterator<Item = &Entry> {
+        self.proxies.values().filter_map(|place| self.get(*place))
+    }
+
+    /// B-threads and proxies in the order they came.
+    pub(crate) fn entries(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().flatten()
+    }
+
+    pub(crate) fn has_bthreads(&self) -> bool {
+        !self.bthreads.is_empty()
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.bthreads.is_empty() && self.proxies.is_empty()
+    }
+
+    /// Requests for events whose home is here.
+    pub(crate) fn requests(&self) -> impl Iterator<Item = (&Entry, &Event)> {
+        let entries = self.indexes.requesters.iter().filter_map(|place| self.get(*place));
+        entries
+            .flat_map(|entry| entry.bid.requests().iter().map(move |event| (entry, event)))
+            .filter(|(_, e)| self.is_home(e))
+    }
+
+    /// Whether somebody requests `event`.
+    pub(crate) fn is_requested(&self, event: &Event) -> bool {
+        self.any_candidate(&self.indexes.wakes, event, |entry| entry.bid.requests().contains(event))
+    }
+
+    /// Whether `event` may be selected here.
+    pub(crate) fn is_home(&self, event: &Event) -> bool {
+        self.home.contains(event)
+    }
+
+    pub(crate) fn is_blocked(&self, event: &Event) -> bool {
+        self.any_candidate(&self.indexes.blockers, event, |entry| self.blocks(entry, event))
+    }
+
+    /// Whether a b-thread that runs here blocks `event`.
+    pub(crate) fn is_blocked_by_bthread(&self, event: &Event) -> bool {
+        self.any_candidate(&self.indexes.blockers, event, |entry| {
+            !entry.is_proxy() && self.blocks(entry, event)
+        })
+    }
+
+    fn any_candidate(&self, index: &Index, event: &Event, is_it: impl Fn(&Entry) -> bool) -> bool {
+        let is_it = |place: &Place| self.get(*place).is_some_and(&is_it);
+        index.candidates(event).any(|places| places.iter().any(is_it))
+    }
+
+    /// Whether this bid counts as a block of `event`.
+    pub(crate) fn blocks(&self, entry: &Entry, event: &Event) -> bool {
+        entry.bid.blocks().contains(event) && !(entry.is_proxy() && self.protected.contains(event))
+    }
+
+    /// Fills `offers` with the distinct events that may be selected under the strategy, in a fixed order.
+    pub(crate) fn offers(&self, offers: &mut Vec<Event>) {
+        offers.clear();
+        let mut best = None;
+        for entry in self.indexes.requesters.iter().filter_map(|place| self.get(*place)) {
+            if entry.rank < best {
+                continue;
+            }
+            for event in entry.bid.requests() {
+                if !self.is_home(event) || self.is_blocked(event) {
+                    continue;
+                }
+                if entry.rank > best {
+                    best = entry.rank;
+                    offers.clear();
+                }
+                offers.push(event.clone());
+                if self.strategy == Strategy::Ordered {
+                    break;
+                }
+            }
+        }
+        if offers.len() > 1 {
+            offers.sort_unstable_by(Event::cmp_by_key);
+            offers.dedup();
+        }
+    }
+
+    /// Fills `places` with those whom `event` may concern, in the order they came.
+    pub(crate) fn listeners(&self, event: &Event, places: &mut Vec<Place>) {
+        places.clear();
+        self.indexes.wakes.candidates(event).for_each(|list| places.extend_from_slice(list));
+        if places.len() > 1 {
+            places.sort_unstable();
+            places.dedup();
+        }
+    }
+
+    pub(crate) fn next_deadline(&self) -> Option<Duration> {
+        self.indexes.deadlines.first().map(|(at, _)| *at)
+    }
+
+    /// Those whose deadline has passed, earliest first.
+    pub(crate) fn overdue(&self, now: Duration) -> Vec<Place> {
+        self.indexes.deadlines.iter().take_while(|(at, _)| *at <= now).map(|(_, place)| *place).collect()
+    }
+
+    /// Closes the gaps that ended b-threads left, once they are many and most. Every place changes.
+    pub(crate) fn compact(&mut self) {
+        if self.vacant < 64 || self.vacant * 2 < self.entries.len() {
+            return;
+        }
+        let entries = std::mem::take(&mut self.entries);
+        let mut fresh = Self::new(self.strategy, std::mem::take(&mut self.protected));
+        fresh.home = std::mem::take(&mut self.home);
+        for entry in entries.into_iter().flatten() {
+            let Entry { name, owner, bid, sync, rank } = entry;
+            let place = fresh.add(name, owner, sync);
+            fresh.indexes.refile(place, &Bid::new(), &bid);
+            if let Some(entry) = fresh.get_mut(place) {
+                entry.bid = bid;
+                entry.rank = rank;
+            }
+        }
+        *self = fresh;
+    }
+}
+
+/// Where to find the bids that a question is about.
+#[derive(Clone, Debug, Default)]
+struct Indexes {
+    /// Who requests, waits for or is interrupted by an event.
+    wakes: Index,
+    /// Who blocks an event.
+    blockers: Index,
+    /// Places of bids with requests, sorted.
+    requesters: Vec<Place>,
+    deadlines: BTreeSet<(Duration, Place)>,
+}
+
+impl Indexes {
+    /// Moves `place` from where `old` put it to where `new` does.
+    fn refile(&mut self, place: Place, old: &Bid, new: &Bid) {
+        if old.requests() != new.requests() {
+            old.requests().iter().for_each(|event| self.wakes.unfile_event(event, place));
+            new.requests().iter().for_each(|event| self.wakes.file_event(event, place));
+            self.refile_requester(place, !old.requests().is_empty(), !new.requests().is_empty());
+        }
+        swap(&mut self.wakes, place, old.waits(), new.waits());
+        swap(&mut self.wakes, place, old.interrupts(), new.interrupts());
+        swap(&mut self.blockers, place, old.blocks(), new.blocks());
+        if old.given_deadline() != new.given_deadline() {
+            old.given_deadline().map(|at| self.deadlines.remove(&(at, place)));
+            new.given_deadline().map(|at| self.deadlines.insert((at, place)));
+        }
+    }
+
+    fn refile_requester(&mut self, place: Place, before: bool, after: bool) {
+        match (before, after, self.requesters.binary_search(&place)) {
+            (false, true, Err(at)) => self.requesters.insert(at, place),
+            (true, false, Ok(at)) => {
+                self.requesters.remove(at);
+            }
+            _ => {}
+        }
+    }
+}
+
+fn swap(index: &mut Index, place: Place, old: &EventSet, new: &EventSet) {
+    if old != new {
+        index.unfile(old, place);
+        index.file(new, place);
+    }
+}
+
+fn rank(strategy: Strategy, owner: &Owner, bid: &Bid) -> Option<i32> {
+    match (strategy, owner) {
+        (Strategy::Simple | Strategy::Ordered, _) => None,
+        (Strategy::SyncPriority, _) => bid.given_priority(),
+        (Strategy::BThreadPriority, Owner::BThread(bthread)) => Some(bthread.priority()),
+        (Strategy::BThreadPriority, Owner::Proxy) => {
+            Some(bid.given_priority().unwrap_or(DEFAULT_BTHREAD_PRIORITY))
+        }
+    }
+}

@@ -1,0 +1,315 @@
+//! Sets of events, as data.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+
+use crate::event::Event;
+use crate::pattern::Pattern;
+use crate::scope::{Level, Scope};
+use crate::value::{Real, Value};
+
+/// A set of events. It is data, never a closure, because it is indexed, sent to other nodes and shown to people.
+///
+/// A text becomes a name pattern with any data; an [`Event`] becomes the set of exactly that event.
+///
+/// ```
+/// use skein_bp::{Event, EventSet};
+/// let low = EventSet::from("uav/*/goto").and(EventSet::field_range("z", f64::NEG_INFINITY, 2.0));
+/// assert!(low.contains(&Event::new("uav/3/goto").with("z", 1.5)));
+/// assert!(!low.contains(&Event::new("uav/3/goto").with("z", 9.0)));
+/// assert!(low.could_match_home("uav/3"));
+/// assert!(!low.could_match_home("ground/main"));
+/// ```
+#[derive(Clone, PartialEq, Eq, Hash, Default)]
+pub enum EventSet {
+    /// No event.
+    #[default]
+    None,
+    /// Every event.
+    All,
+    /// One event, name and data.
+    Exactly(Event),
+    /// Events with a fitting name and any data.
+    Named(Pattern),
+    /// Events whose name starts with this text.
+    Prefix(Arc<str>),
+    /// Events with a number under `key` in `min..=max`; a whole number counts.
+    FieldRange {
+        /// The key of the datum.
+        key: Arc<str>,
+        /// The least number, in the unit the key names.
+        min: Real,
+        /// The greatest number.
+        max: Real,
+    },
+    /// Events whose data has all of these.
+    FieldIs(BTreeMap<Arc<str>, Value>),
+    /// Events whose fields `x`, `y`, `z` (metres, ENU) lie in a box, borders included; a missing `z` fits, a missing `x`
+    /// or `y` does not.
+    Region {
+        /// The least corner.
+        min: [Real; 3],
+        /// The greatest corner.
+        max: [Real; 3],
+    },
+    /// Events that are not in the set.
+    Not(Box<EventSet>),
+    /// Events in each of the sets; of no sets: every event.
+    And(Vec<EventSet>),
+    /// Events in one of the sets; of no sets: no event.
+    Or(Vec<EventSet>),
+}
+
+impl EventSet {
+    /// Events with exactly this name, and any data.
+    pub fn named(name: impl Into<Arc<str>>) -> Self {
+        Self::Named(Pattern::literal(name))
+    }
+
+    /// Events whose name starts with `prefix`.
+    pub fn prefix(prefix: impl Into<Arc<str>>) -> Self {
+        Self::Prefix(prefix.into())
+    }
+
+    /// Events with `value` under `key`.
+    pub fn field_is(key: impl Into<Arc<str>>, value: impl Into<Value>) -> Self {
+        Self::FieldIs(BTreeMap::from([(key.into(), value.into())]))
+    }
+
+    /// Events with a number under `key` in `min..=max`.
+    pub fn field_range(key: impl Into<Arc<str>>, min: f64, max: f64) -> Self {
+        Self::FieldRange { key: key.into(), min: min.into(), max: max.into() }
+    }
+
+    /// Events whose fields `x`, `y`, `z` (metres, ENU) lie between two corners.
+    pub fn region(min: [f64; 3], max: [f64; 3]) -> Self {
+        Self::Region { min: min.map(Real::from), max: max.map(Real::from) }
+    }
+
+    /// Events in one of the sets.
+    pub fn any_of<S: Into<EventSet>>(sets: impl IntoIterator<Item = S>) -> Self {
+        sets.into_iter().fold(Self::None, |union, set| union.or(set))
+    }
+
+    /// Events in both sets.
+    #[must_use]
+    pub fn and(self, other: impl Into<EventSet>) -> Self {
+        match (self, other.into()) {
+            (Self::All, set) | (set, Self::All) => set,
+            (Self::None, _) | (_, Self::None) => Self::None,
+            (Self::And(mut sets), set) => {
+                sets.push(set);
+                Self::And(sets)
+            }
+            (a, b) => Self::And(vec![a, b]),
+        }
+    }
+
+    /// Events in either set.
+    #[must_use]
+    pub fn or(self, other: impl Into<EventSet>) -> Self {
+        match (self, other.into()) {
+            (Self::None, set) | (set, Self::None) => set,
+            (Self::All, _) | (_, Self::All) => Self::All,
+            (Self::Or(mut sets), set) => {
+                sets.push(set);
+                Self::Or(sets)
+            }
+            (a, b) => Self::Or(vec![a, b]),
+        }
+    }
+
+    /// Events outside the set; `!set` is the same.
+    #[must_use]
+    #[allow(clippy::should_implement_trait)] // It does; the method reads better at the end of a chain.
+    pub fn not(self) -> Self {
+        match self {
+            Self::None => Self::All,
+            Self::All => Self::None,
+            Self::Not(set) => *set,
+            set => Self::Not(Box::new(set)),
+        }
+    }
+
+    /// Whether `event` is in the set.
+    pub fn contains(&self, event: &Event) -> bool {
+        match self {
+            Self::None => false,
+            Self::All => true,
+            Self::Exactly(only) => only == event,
+            Self::Named(pattern) => pattern.matches_event(event),
+            Self::Prefix(prefix) => event.name().starts_with(&**prefix),
+            Self::FieldRange { key, min, max } => event.real(key).is_some_and(|x| in_range(x, *min, *max)),
+            Self::FieldIs(fields) => fields.iter().all(|(key, value)| event.get(key) == Some(value)),
+            Self::Region { min, max } => in_region(event, min, max),
+            Self::Not(set) => !set.contains(event),
+            Self::And(sets) => sets.iter().all(|set| set.contains(event)),
+            Self::Or(sets) => sets.iter().any(|set| set.contains(event)),
+        }
+    }
+
+    /// Whether the set surely holds nothing.
+    pub fn is_none(&self) -> bool {
+        match self {
+            Self::None => true,
+            Self::Or(sets) => sets.iter().all(Self::is_none),
+            Self::And(sets) => sets.iter().any(Self::is_none),
+            _ => false,
+        }
+    }
+
+    /// Whether the set may hold an event whose first two chunks are `home`. Errs towards yes.
+    pub fn could_match_home(&self, home: &str) -> bool {
+        self.may_reach(&Scope::new(Level::Home, home))
+    }
+
+    /// Whether the two sets may share an event, judged by names alone. Errs towards yes.
+    pub fn may_overlap(&self, other: &EventSet) -> bool {
+        let mut overlap = false;
+        other.visit_scopes(&mut |scope| overlap |= self.may_reach(&scope));
+        overlap
+    }
+
+    fn may_reach(&self, scope: &Scope<'_>) -> bool {
+        let mut reach = false;
+        self.visit_scopes(&mut |own| reach |= own.overlaps(scope));
+        reach
+    }
+
+    /// Calls `visit` with scopes that together hold every event of the set.
+    pub(crate) fn visit_scopes<'a>(&'a self, visit: &mut dyn FnMut(Scope<'a>)) {
+        match self {
+            Self::None => {}
+            Self::Exactly(event) => visit(Scope::name(event.name(), event.keys())),
+            Self::Named(pattern) => visit(pattern.scope()),
+            Self::Prefix(prefix) => visit(Scope::starting_with(prefix)),
+            Self::Or(sets) => sets.iter().for_each(|set| set.visit_scopes(visit)),
+            // Any member bounds the whole, so the narrowest one does best.
+            Self::And(sets) => match sets.iter().max_by_key(|set| set.narrowness()) {
+                Some(set) => set.visit_scopes(visit),
+                None => visit(Scope::ANY),
+            },
+            Self::All | Self::Not(_) | Self::FieldRange { .. } | Self::FieldIs(_) | Self::Region { .. } => {
+                visit(Scope::ANY)
+            }
+        }
+    }
+
+    /// The widest level among the set's scopes; a set without scopes, which is empty, counts as the narrowest.
+    fn narrowness(&self) -> Level {
+        let mut level = Level::Name;
+        self.visit_scopes(&mut |scope| level = level.min(scope.level));
+        level
+    }
+}
+
+fn in_range(x: f64, min: Real, max: Real) -> bool {
+    min.get() <= x && x <= max.get()
+}
+
+fn in_region(event: &Event, min: &[Real; 3], max: &[Real; 3]) -> bool {
+    let axes = ["x", "y", "z"].into_iter().zip(min).zip(max);
+    axes.into_iter().all(|((axis, min), max)| match event.get(axis).map(Value::as_number) {
+        Some(number) => number.is_some_and(|x| in_range(x, *min, *max)),
+        None => axis == "z",
+    })
+}
+
+impl std::ops::Not for EventSet {
+    type Output = Self;
+
+    fn not(self) -> Self {
+        EventSet::not(self)
+    }
+}
+
+impl From<&str> for EventSet {
+    fn from(pattern: &str) -> Self {
+        Self::Named(pattern.into())
+    }
+}
+
+impl From<String> for EventSet {
+    fn from(pattern: String) -> Self {
+        Self::Named(Pattern::new(pattern))
+    }
+}
+
+impl From<Pattern> for EventSet {
+    fn from(pattern: Pattern) -> Self {
+        Self::Named(pattern)
+    }
+}
+
+impl From<Event> for EventSet {
+    fn from(event: Event) -> Self {
+        Self::Exactly(event)
+    }
+}
+
+impl From<&Event> for EventSet {
+    fn from(event: &Event) -> Self {
+        Self::Exactly(event.clone())
+    }
+}
+
+impl From<&EventSet> for EventSet {
+    fn from(set: &EventSet) -> Self {
+        set.clone()
+    }
+}
+
+impl<S: Into<EventSet>, const N: usize> From<[S; N]> for EventSet {
+    fn from(sets: [S; N]) -> Self {
+        Self::any_of(sets)
+    }
+}
+
+impl<S: Into<EventSet>> From<Vec<S>> for EventSet {
+    fn from(sets: Vec<S>) -> Self {
+        Self::any_of(sets)
+    }
+}
+
+impl fmt::Display for EventSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::None => f.write_str("none"),
+            Self::All => f.write_str("all"),
+            Self::Exactly(event) => write!(f, "={event}"),
+            Self::Named(pattern) => pattern.fmt(f),
+            Self::Prefix(prefix) => write!(f, "{prefix}.."),
+            Self::FieldRange { key, min, max } => write!(f, "{key} in {min}..={max}"),
+            Self::FieldIs(fields) => {
+                join(f, fields.iter().map(|(key, value)| format!("{key} = {value}")), " & ")
+            }
+            Self::Region { min, max } => {
+                write!(f, "at [{}, {}, {}]", min[0], min[1], min[2])?;
+                write!(f, "..=[{}, {}, {}]", max[0], max[1], max[2])
+            }
+            Self::Not(set) => write!(f, "!{set}"),
+            Self::And(sets) => join(f, sets.iter(), " & "),
+            Self::Or(sets) => join(f, sets.iter(), " | "),
+        }
+    }
+}
+
+/// Writes `(a | b | c)`.
+fn join(
+    f: &mut fmt::Formatter<'_>,
+    parts: impl Iterator<Item = impl fmt::Display>,
+    separator: &str,
+) -> fmt::Result {
+    f.write_str("(")?;
+    for (at, part) in parts.enumerate() {
+        write!(f, "{}{part}", if at == 0 { "" } else { separator })?;
+    }
+    f.write_str(")")
+}
+
+impl fmt::Debug for EventSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}

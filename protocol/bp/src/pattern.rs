@@ -1,0 +1,165 @@
+//! Patterns over event names.
+
+use std::fmt;
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
+use crate::event::Event;
+use crate::scope::{Level, NameKeys, Scope};
+
+/// A pattern over the chunks of a name: `*` stands for one chunk, `**` for any number of them, none included.
+///
+/// ```
+/// use skein_bp::Pattern;
+/// assert!(Pattern::new("uav/*/takeoff").matches("uav/3/takeoff"));
+/// assert!(Pattern::new("uav/3/**").matches("uav/3/battery/low"));
+/// assert!(!Pattern::new("uav/*").matches("uav/3/takeoff"));
+/// ```
+#[derive(Clone)]
+pub struct Pattern(Arc<Parsed>);
+
+struct Parsed {
+    text: Arc<str>,
+    wild: bool,
+    keys: NameKeys,
+}
+
+impl Pattern {
+    /// Reads a pattern; every text is one.
+    pub fn new(text: impl Into<Arc<str>>) -> Self {
+        let text = text.into();
+        let wild = text.split('/').any(|chunk| chunk == "*" || chunk == "**");
+        Self::parsed(text, wild)
+    }
+
+    /// The pattern of exactly this name, even if the name has a chunk `*`.
+    pub fn literal(name: impl Into<Arc<str>>) -> Self {
+        Self::parsed(name.into(), false)
+    }
+
+    fn parsed(text: Arc<str>, wild: bool) -> Self {
+        let keys = NameKeys::of(&text);
+        Self(Arc::new(Parsed { text, wild, keys }))
+    }
+
+    /// The pattern as written.
+    pub fn as_str(&self) -> &str {
+        &self.0.text
+    }
+
+    /// Whether the pattern stands for one name only.
+    pub fn is_literal(&self) -> bool {
+        !self.0.wild
+    }
+
+    /// Whether `name` fits the pattern.
+    pub fn matches(&self, name: &str) -> bool {
+        if !self.0.wild {
+            return *self.0.text == *name;
+        }
+        chunks_match(Some(&self.0.text), Some(name))
+    }
+
+    pub(crate) fn matches_event(&self, event: &Event) -> bool {
+        if self.0.wild {
+            self.matches(event.name())
+        } else {
+            self.0.keys.name == event.keys().name && self.matches(event.name())
+        }
+    }
+
+    /// The narrowest scope that holds every name that fits.
+    pub(crate) fn scope(&self) -> Scope<'_> {
+        if !self.0.wild {
+            return Scope::name(&self.0.text, &self.0.keys);
+        }
+        let fixed = self.0.text.split('/').take_while(|chunk| *chunk != "*" && *chunk != "**").count();
+        match fixed {
+            0 => Scope::ANY,
+            1 => Scope::new(Level::Root, crate::scope::leading_chunks(&self.0.text, 1)),
+            _ => Scope::new(Level::Home, crate::scope::leading_chunks(&self.0.text, 2)),
+        }
+    }
+}
+
+/// Both sides lose chunks from the left; `None` is a side that has none left.
+fn chunks_match(pattern: Option<&str>, name: Option<&str>) -> bool {
+    let Some(pattern) = pattern else { return name.is_none() };
+    let (chunk, pattern_rest) = split_chunk(pattern);
+    if chunk == "**" {
+        let mut rest = name;
+        loop {
+            if chunks_match(pattern_rest, rest) {
+                return true;
+            }
+            let Some(name) = rest else { return false };
+            rest = split_chunk(name).1;
+        }
+    }
+    let Some(name) = name else { return false };
+    let (name_chunk, name_rest) = split_chunk(name);
+    (chunk == "*" || chunk == name_chunk) && chunks_match(pattern_rest, name_rest)
+}
+
+fn split_chunk(text: &str) -> (&str, Option<&str>) {
+    text.split_once('/').map_or((text, None), |(chunk, rest)| (chunk, Some(rest)))
+}
+
+impl From<&str> for Pattern {
+    fn from(text: &str) -> Self {
+        Self::new(text)
+    }
+}
+
+impl PartialEq for Pattern {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0) || (self.0.wild == other.0.wild && self.0.text == other.0.text)
+    }
+}
+
+impl Eq for Pattern {}
+
+impl Hash for Pattern {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.0.text.hash(state);
+        self.0.wild.hash(state);
+    }
+}
+
+impl fmt::Display for Pattern {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.text)
+    }
+}
+
+impl fmt::Debug for Pattern {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Pattern;
+
+    #[test]
+    fn stars_stand_for_whole_chunks() {
+        let fits = |pattern: &str, name: &str| Pattern::new(pattern).matches(name);
+        assert!(fits("a/b", "a/b"));
+        assert!(!fits("a/b", "a/b/c"));
+        assert!(fits("*/b", "a/b"));
+        assert!(!fits("a*", "ab"));
+        assert!(fits("**", "a/b/c"));
+        assert!(fits("a/**", "a"));
+        assert!(fits("a/**/z", "a/b/c/z"));
+        assert!(fits("a/**/z", "a/z"));
+        assert!(!fits("a/**/z", "a/b/y"));
+        assert!(!fits("*", "a/b"));
+    }
+
+    #[test]
+    fn a_literal_pattern_takes_stars_as_they_are() {
+        assert!(Pattern::literal("a/*").matches("a/*"));
+        assert!(!Pattern::literal("a/*").matches("a/b"));
+    }
+}

@@ -1,0 +1,635 @@
+//! Programs: b-threads that run together.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+use std::time::Duration;
+
+use rustc_hash::FxHasher;
+
+use crate::bid::Bid;
+use crate::board::{Board, Entry, Owner};
+use crate::bthread::{AnyBThread, BThread, Context, Effects};
+use crate::event::Event;
+use crate::event_set::EventSet;
+use crate::explain::Explanation;
+use crate::index::Place;
+use crate::selection::{Origin, Selection};
+use crate::strategy::Strategy;
+use crate::tie::TieBreak;
+
+/// How often an event may lose a tie before it goes first, unless configured.
+pub const PASSED_OVER_LIMIT: u32 = 16;
+
+/// How many b-threads one selection may spawn, and how often one step may fire deadlines, before that counts as endless.
+const RUNAWAY_LIMIT: usize = 1000;
+
+/// How a program selects. The default is the literature's: simple strategy, external events only when nothing internal is
+/// selectable, no limits but fairness in ties.
+#[derive(Clone, Debug)]
+pub struct ProgramConfig {
+    /// Which requested events may be selected.
+    pub strategy: Strategy,
+    /// Seed of the draws that break ties. The same program, inputs and seed give the same run.
+    pub seed: u64,
+    /// After this many internal selections an external event that waits gets its turn; `None`: only when nothing
+    /// internal is selectable.
+    pub externals_after: Option<u32>,
+    /// How many selections a superstep may take; `None`: any number.
+    pub settle_limit: Option<u32>,
+    /// An event that lost so many ties is taken next; `None`: ties are drawn and nothing else.
+    pub passed_over_limit: Option<u32>,
+    /// Events that proxies cannot block.
+    pub protected: EventSet,
+}
+
+impl Default for ProgramConfig {
+    fn default() -> Self {
+        Self {
+            strategy: Strategy::Simple,
+            seed: 0,
+            externals_after: None,
+            settle_limit: None,
+            passed_over_limit: Some(PASSED_OVER_LIMIT),
+            protected: EventSet::None,
+        }
+    }
+}
+
+impl ProgramConfig {
+    /// What vehicles fly: priorities of bids, external events after at most 16 internal ones, at most 1000 selections in a
+    /// superstep.
+    pub fn vehicle(seed: u64) -> Self {
+        Self {
+            strategy: Strategy::SyncPriority,
+            seed,
+            externals_after: Some(16),
+            settle_limit: Some(1000),
+            ..Self::default()
+        }
+    }
+}
+
+/// Why a program cannot go on.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProgramError {
+    /// A superstep did not come to rest.
+    #[error("the superstep did not settle within {limit} selections; look at the b-threads that kept requesting: {}", .bthreads.join(", "))]
+    Unsettled {
+        /// The limit, from [`ProgramConfig::settle_limit`].
+        limit: u32,
+        /// Who requested the events of the superstep's second half.
+        bthreads: Vec<Arc<str>>,
+        /// What did happen.
+        selections: Vec<Selection>,
+    },
+    /// A b-thread's assertion failed; the program selects nothing more.
+    #[error("b-thread `{bthread}` failed: {message}")]
+    Failed {
+        /// The b-thread.
+        bthread: Arc<str>,
+        /// What it said.
+        message: String,
+    },
+    /// [`Program::choose`] was asked for an event that may not be selected.
+    #[error("`{event}` is not selectable now; selectable are {selectable:?}")]
+    NotSelectable {
+        /// The event asked for.
+        event: Event,
+        /// What may be selected.
+        selectable: Vec<Event>,
+    },
+}
+
+/// A behavioural program: b-threads, the events that wait to happen, and the rules by which they do.
+///
+/// It has no clock: time comes in with each call, as time since the run began, and must not go backwards. Two programs are
+/// equal when their b-threads, proxies and queues are; how ties will be drawn does not count.
+#[derive(Clone, Debug)]
+pub struct Program {
+    config: ProgramConfig,
+    board: Board,
+    ties: TieBreak,
+    /// B-threads that have not reached their first synchronisation point.
+    unstarted: VecDeque<Place>,
+    /// B-threads spawned in this round; they are named when it is over, and the names of those that ended are free.
+    spawned: Vec<(Arc<str>, Box<dyn AnyBThread>)>,
+    externals: VecDeque<Event>,
+    occurrences: VecDeque<Event>,
+    /// Internal selections since an external event last had its turn.
+    internal_in_a_row: u32,
+    /// Synchronisation points that the names of ended b-threads saw.
+    ended: BTreeMap<Arc<str>, u64>,
+    failure: Option<(Arc<str>, String)>,
+    daemon: bool,
+    revision: u64,
+    /// Kept between steps to save allocations.
+    offers: Vec<Event>,
+    listeners: Vec<Place>,
+}
+
+/// Building and feeding a program.
+impl Program {
+    /// A program without b-threads.
+    pub fn new(config: ProgramConfig) -> Self {
+        Self {
+            board: Board::new(config.strategy, config.protected.clone()),
+            ties: TieBreak::new(config.seed, config.passed_over_limit),
+            config,
+            unstarted: VecDeque::new(),
+            spawned: Vec::new(),
+            externals: VecDeque::new(),
+            occurrences: VecDeque::new(),
+            internal_in_a_row: 0,
+            ended: BTreeMap::new(),
+            failure: None,
+            daemon: false,
+            revision: 0,
+            offers: Vec::new(),
+            listeners: Vec::new(),
+        }
+    }
+
+    /// Adds a b-thread, which runs to its first synchronisation point before the next selection. Gives back its name:
+    /// `name`, or `name~2` and so on when that is taken by one that still runs.
+    pub fn add(&mut self, name: impl Into<Arc<str>>, bthread: impl BThread) -> Arc<str> {
+        self.add_boxed(name.into(), Box::new(bthread))
+    }
+
+    /// Puts `event` at the end of the external queue. One whose home is elsewhere stays there.
+    pub fn enqueue(&mut self, event: impl Into<Event>) {
+        self.externals.push_back(event.into());
+    }
+
+    /// Delivers an event that was selected elsewhere. It happens before anything else and cannot be blocked.
+    pub fn occurred(&mut self, event: impl Into<Event>) {
+        self.occurrences.push_back(event.into());
+    }
+
+    /// Limits what may be selected here to `home`; requests for other events stay open until they occur. All events unless
+    /// set.
+    pub fn set_home(&mut self, home: impl Into<EventSet>) {
+        self.board.home = home.into();
+    }
+
+    /// States the bid of a b-thread that runs elsewhere: its requests, blocks and priority count as if it ran here. When
+    /// one of its requests is selected the bid becomes empty until it is put again.
+    pub fn put_proxy(&mut self, name: impl Into<Arc<str>>, bid: &Bid) {
+        let name = name.into();
+        let place = match self.board.proxy(&name) {
+            Some(place) => place,
+            None => self.board.add(name, Owner::Proxy, 0),
+        };
+        self.restate(place, bid.for_proxy());
+    }
+
+    /// Withdraws a proxy's bid; `false` when there was none.
+    pub fn remove_proxy(&mut self, name: &str) -> bool {
+        let removed = self.board.proxy(name).and_then(|place| self.board.remove(place));
+        if let Some(entry) = &removed {
+            self.forget_ties(&entry.bid);
+        }
+        self.compact();
+        removed.is_some()
+    }
+
+    /// Says whether the program stays when it has nothing to do; see [`Program::is_daemon`].
+    pub fn set_daemon(&mut self, daemon: bool) {
+        self.daemon = daemon;
+    }
+}
+
+/// Running a program.
+impl Program {
+    /// Brings every b-thread to a synchronisation point: starts new ones, and resumes those whose deadline has passed.
+    /// [`Program::step`] does this first, so only questions about a program that has not run yet need it.
+    ///
+    /// # Errors
+    /// [`ProgramError::Failed`] when an assertion has failed, now or before.
+    pub fn synchronise(&mut self, now: Duration) -> Result<(), ProgramError> {
+        self.start_added(now);
+        if self.occurrences.is_empty() {
+            self.fire_deadlines(now);
+        }
+        match &self.failure {
+            None => Ok(()),
+            Some((bthread, message)) => {
+                Err(ProgramError::Failed { bthread: bthread.clone(), message: message.clone() })
+            }
+        }
+    }
+
+    /// Selects one event and resumes those it concerns; `None` when nothing can be selected. An assertion that fails on the
+    /// way stops the program at the next call; see [`Program::failed`].
+    ///
+    /// # Errors
+    /// [`ProgramError::Failed`] when an assertion had failed before the selection.
+    pub fn step(&mut self, now: Duration) -> Result<Option<Selection>, ProgramError> {
+        self.synchronise(now)?;
+        if let Some(event) = self.occurrences.pop_front() {
+            return Ok(Some(self.deliver(event, Origin::Occurred, 0, now)));
+        }
+        if self.external_has_turn()
+            && let Some(event) = self.take_external()
+        {
+            return Ok(Some(self.deliver(event, Origin::External, 0, now)));
+        }
+        if let Some((event, tied_with)) = self.draw_internal() {
+            return Ok(Some(self.deliver(event, Origin::Internal, tied_with, now)));
+        }
+        Ok(self.take_external().map(|event| self.deliver(event, Origin::External, 0, now)))
+    }
+
+    /// Steps until nothing can be selected or an assertion fails.
+    ///
+    /// # Errors
+    /// [`ProgramError::Unsettled`] past the configured limit; [`ProgramError::Failed`] when an assertion had failed before
+    /// anything was selected.
+    pub fn superstep(&mut self, now: Duration) -> Result<Vec<Selection>, ProgramError> {
+        let mut selections = Vec::new();
+        loop {
+            match self.step(now) {
+                Ok(Some(selection)) => selections.push(selection),
+                Ok(None) => return Ok(selections),
+                // What happened must not be lost; the next call reports the failure.
+                Err(_) if !selections.is_empty() => return Ok(selections),
+                Err(error) => return Err(error),
+            }
+            if let Some(limit) = self.config.settle_limit
+                && selections.len() > limit as usize
+            {
+                return Err(ProgramError::Unsettled {
+                    limit,
+                    bthreads: busy_bthreads(&selections),
+                    selections,
+                });
+            }
+        }
+    }
+
+    /// Selects a given event among [`Program::selectable`]: a step for one who explores all runs.
+    ///
+    /// # Errors
+    /// [`ProgramError::NotSelectable`]; [`ProgramError::Failed`] when an assertion had failed before.
+    pub fn choose(&mut self, event: &Event, now: Duration) -> Result<Selection, ProgramError> {
+        self.synchronise(now)?;
+        let selectable = self.selectable();
+        if !selectable.contains(event) {
+            return Err(ProgramError::NotSelectable { event: event.clone(), selectable });
+        }
+        let internal = self.board.requests().any(|(_, requested)| requested == event);
+        if !internal && let Some(at) = self.externals.iter().position(|queued| queued == event) {
+            self.externals.remove(at);
+            return Ok(self.deliver(event.clone(), Origin::External, 0, now));
+        }
+        Ok(self.deliver(event.clone(), Origin::Internal, selectable.len() - 1, now))
+    }
+
+    /// Whether external events have waited long enough.
+    fn external_has_turn(&self) -> bool {
+        self.config.externals_after.is_some_and(|limit| self.internal_in_a_row >= limit)
+    }
+
+    fn next_external(&self) -> Option<usize> {
+        if self.board.is_empty() {
+            return None;
+        }
+        self.externals.iter().position(|event| self.board.is_home(event) && !self.board.is_blocked(event))
+    }
+
+    fn take_external(&mut self) -> Option<Event> {
+        let event = self.externals.remove(self.next_external()?)?;
+        self.internal_in_a_row = 0;
+        Some(event)
+    }
+
+    /// The internal event to select, and how many others tied with it.
+    fn draw_internal(&mut self) -> Option<(Event, usize)> {
+        self.board.offers(&mut self.offers);
+        let winner = self.ties.choose(&self.offers);
+        let event = self.offers.get(winner)?.clone();
+        if !self.externals.is_empty() {
+            self.internal_in_a_row += 1;
+        }
+        Some((event, self.offers.len() - 1))
+    }
+
+    /// Ends those whom `event` interrupts, then resumes those who requested it or wait for it.
+    fn deliver(&mut self, event: Event, origin: Origin, tied_with: usize, now: Duration) -> Selection {
+        let mut resuming = std::mem::take(&mut self.listeners);
+        self.board.listeners(&event, &mut resuming);
+        let mut requested_by = Vec::with_capacity(resuming.len());
+        let mut ending = Vec::new();
+        resuming.retain(|place| {
+            let Some(Entry { name, bid, .. }) = self.board.get(*place) else { return false };
+            let requested = bid.requests().contains(&event);
+            if requested {
+                requested_by.push(name.clone());
+            }
+            let interrupted = bid.interrupts().contains(&event);
+            if interrupted {
+                ending.push(*place);
+            }
+            !interrupted && (requested || bid.waits().contains(&event))
+        });
+
+        let mut interrupted = Vec::with_capacity(ending.len());
+        for place in ending {
+            interrupted.extend(self.interrupt(place, &event, now));
+        }
+        let mut resumed = Vec::with_capacity(resuming.len());
+        for place in resuming.drain(..) {
+            resumed.extend(self.resume(place, &event, now));
+        }
+        self.listeners = resuming;
+        self.start_added(now);
+        self.compact();
+        Selection { event, origin, requested_by, resumed, interrupted, tied_with }
+    }
+
+    fn interrupt(&mut self, place: Place, event: &Event, now: Duration) -> Option<Arc<str>> {
+        let mut cx = Context::at(now);
+        if let Owner::BThread(bthread) = &mut self.board.get_mut(place)?.owner {
+            bthread.interrupted(event, &mut cx);
+        }
+        let name = self.end(place);
+        self.absorb(cx, name.as_ref());
+        name
+    }
+
+    /// Runs one b-thread to its next synchronisation point and gives back its name; a proxy is served instead.
+    fn resume(&mut self, place: Place, event: &Event, now: Duration) -> Option<Arc<str>> {
+        let entry = self.board.get_mut(place)?;
+        let Owner::BThread(bthread) = &mut entry.owner else {
+            self.restate(place, Bid::new());
+            return None;
+        };
+        let name = entry.name.clone();
+        let mut cx = Context::at(now);
+        bthread.resume(event, &mut cx);
+        let bid = bthread.bid();
+        self.arrive(place, bid, cx, &name);
+        Some(name)
+    }
+
+    /// Runs new b-threads to their first synchronisation point, and those that they spawn.
+    fn start_added(&mut self, now: Duration) {
+        let mut spawners = 0;
+        while let Some(place) = self.next_unstarted() {
+            let Some(entry) = self.board.get_mut(place) else { continue };
+            let Owner::BThread(bthread) = &mut entry.owner else { continue };
+            let name = entry.name.clone();
+            let mut cx = Context::at(now);
+            bthread.start(&mut cx);
+            let bid = bthread.bid();
+            spawners += usize::from(cx.has_spawned());
+            if spawners > RUNAWAY_LIMIT {
+                cx = Context::at(now);
+                cx.fail("spawned b-threads that spawn b-threads without end");
+            }
+            self.arrive(place, bid, cx, &name);
+        }
+    }
+
+    fn next_unstarted(&mut self) -> Option<Place> {
+        if !self.spawned.is_empty() {
+            for (name, bthread) in std::mem::take(&mut self.spawned) {
+                self.add_boxed(name, bthread);
+            }
+        }
+        self.unstarted.pop_front()
+    }
+
+    fn fire_deadlines(&mut self, now: Duration) {
+        for _ in 0..RUNAWAY_LIMIT {
+            let overdue = self.board.next_deadline().is_some_and(|at| at <= now);
+            if !overdue || self.failure.is_some() {
+                return;
+            }
+            for place in self.board.overdue(now) {
+                self.resume(place, &Event::timeout(), now);
+            }
+            self.start_added(now);
+            self.compact();
+        }
+        if let Some(entry) = self.board.overdue(now).first().and_then(|place| self.board.get(*place)) {
+            self.failure = Some((entry.name.clone(), "keeps setting deadlines that have passed".to_owned()));
+        }
+    }
+
+    /// Takes note of a b-thread that has reached a synchronisation point or its end.
+    fn arrive(&mut self, place: Place, bid: Option<Bid>, cx: Context, name: &Arc<str>) {
+        match bid {
+            Some(bid) => {
+                self.restate(place, bid);
+                self.revision += 1;
+            }
+            None => {
+                self.end(place);
+            }
+        }
+        self.absorb(cx, Some(name));
+    }
+
+    fn restate(&mut self, place: Place, bid: Bid) {
+        if let Some(old) = self.board.restate(place, bid) {
+            self.forget_ties(&old);
+        }
+    }
+
+    fn end(&mut self, place: Place) -> Option<Arc<str>> {
+        let entry = self.board.remove(place)?;
+        self.forget_ties(&entry.bid);
+        self.ended.insert(entry.name.clone(), entry.sync);
+        self.revision += 1;
+        Some(entry.name)
+    }
+
+    /// Drops the record of lost ties for events that a replaced bid requested and nobody requests any more.
+    fn forget_ties(&mut self, old: &Bid) {
+        for event in old.requests() {
+            if self.ties.is_owed(event) && !self.board.is_requested(event) {
+                self.ties.forget(event);
+            }
+        }
+    }
+
+    /// Carries out what a b-thread asked of its context.
+    fn absorb(&mut self, cx: Context, name: Option<&Arc<str>>) {
+        let Some(effects) = cx.effects else { return };
+        let Effects { enqueued, spawned, failure, daemon } = *effects;
+        self.externals.extend(enqueued);
+        self.spawned.extend(spawned);
+        if let (Some(message), Some(name), None) = (failure, name, &self.failure) {
+            self.failure = Some((name.clone(), message));
+        }
+        self.daemon = daemon.unwrap_or(self.daemon);
+    }
+
+    fn add_boxed(&mut self, name: Arc<str>, bthread: Box<dyn AnyBThread>) -> Arc<str> {
+        let name = self.free_name(name);
+        let sync = self.ended.remove(&name).unwrap_or(0);
+        let place = self.board.add(name.clone(), Owner::BThread(bthread), sync);
+        self.unstarted.push_back(place);
+        name
+    }
+
+    fn free_name(&self, name: Arc<str>) -> Arc<str> {
+        if self.board.bthread(&name).is_none() {
+            return name;
+        }
+        let mut numbered = (2_u64..).map(|n| format!("{name}~{n}"));
+        numbered.find(|candidate| self.board.bthread(candidate).is_none()).map_or(name, Arc::from)
+    }
+
+    fn compact(&mut self) {
+        if self.unstarted.is_empty() {
+            self.board.compact();
+        }
+    }
+}
+
+/// Asking a program.
+impl Program {
+    /// The b-threads that run, by name, with their bids and how many synchronisation points each has reached, the present
+    /// one included. A name that is used again goes on counting.
+    pub fn bids(&self) -> impl Iterator<Item = (&str, &Bid, u64)> {
+        self.board.bthreads().map(|(entry, _)| (&*entry.name, &entry.bid, entry.sync))
+    }
+
+    /// The bid of one b-thread that runs.
+    pub fn bid(&self, name: &str) -> Option<&Bid> {
+        self.board.get(self.board.bthread(name)?).map(|entry| &entry.bid)
+    }
+
+    /// The proxies by name, with what is left of their bids.
+    pub fn proxies(&self) -> impl Iterator<Item = (&str, &Bid)> {
+        self.board.proxies().map(|entry| (&*entry.name, &entry.bid))
+    }
+
+    /// A number that changes whenever a b-thread states a bid or ends.
+    pub fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    /// When the next deadline passes.
+    pub fn next_deadline(&self) -> Option<Duration> {
+        self.board.next_deadline()
+    }
+
+    /// What may be selected: the internal events that tie, or else the external event whose turn it is.
+    pub fn selectable(&self) -> Vec<Event> {
+        let mut offers = Vec::new();
+        if !self.external_has_turn() || self.next_external().is_none() {
+            self.board.offers(&mut offers);
+        }
+        if offers.is_empty() {
+            offers.extend(self.next_external().and_then(|at| self.externals.get(at)).cloned());
+        }
+        offers
+    }
+
+    /// Whether a b-thread requests something here and the b-threads among themselves allow nothing at all. Time and other
+    /// nodes still help: while a deadline is open, or where only a proxy blocks, the program is stalled, not deadlocked.
+    pub fn is_deadlocked(&self) -> bool {
+        let stuck = |event: &Event| self.board.is_blocked_by_bthread(event);
+        self.occurrences.is_empty()
+            && self.board.next_deadline().is_none()
+            && self.board.requests().any(|(entry, _)| !entry.is_proxy())
+            && self.board.requests().all(|(_, event)| stuck(event))
+            && self.externals.iter().filter(|event| self.board.is_home(event)).all(stuck)
+    }
+
+    /// The b-thread whose assertion failed first, and what it said.
+    pub fn failed(&self) -> Option<(&str, &str)> {
+        self.failure.as_ref().map(|(bthread, message)| (&**bthread, &**message))
+    }
+
+    /// Whether the program has b-threads.
+    pub fn has_bthreads(&self) -> bool {
+        self.board.has_bthreads()
+    }
+
+    /// Whether the program, when it has nothing to do, waits for external events. A driver that runs a program to its end
+    /// heeds it; the program itself does not.
+    pub fn is_daemon(&self) -> bool {
+        self.daemon
+    }
+
+    /// Events that wait for their turn, next one first.
+    pub fn external_queue(&self) -> impl ExactSizeIterator<Item = &Event> {
+        self.externals.iter()
+    }
+
+    /// Who requests, blocks and waits for the events of a set: `program.explain("uav/3/takeoff")`.
+    pub fn explain(&self, question: impl Into<EventSet>) -> Explanation {
+        Explanation::of(question.into(), &self.board, self.externals.iter(), self.selectable())
+    }
+
+    /// The state of one b-thread, if it runs and is a `T`.
+    pub fn state_of<T: BThread>(&self, name: &str) -> Option<&T> {
+        match &self.board.get(self.board.bthread(name)?)?.owner {
+            Owner::BThread(bthread) => bthread.as_any().downcast_ref(),
+            Owner::Proxy => None,
+        }
+    }
+
+    /// The states of all b-threads, by name, to be shown or recorded.
+    ///
+    /// # Errors
+    /// When a state has no JSON form, such as a map whose keys are not texts.
+    pub fn states_json(&self) -> Result<serde_json::Value, serde_json::Error> {
+        let states =
+            self.board.bthreads().map(|(entry, bthread)| Ok((entry.name.to_string(), bthread.to_json()?)));
+        states.collect::<Result<serde_json::Map<_, _>, _>>().map(serde_json::Value::Object)
+    }
+
+    /// A hash of all that equality compares. The same in every run of the same build.
+    pub fn state_digest(&self) -> u64 {
+        let mut hasher = FxHasher::default();
+        self.hash(&mut hasher);
+        hasher.finish()
+    }
+}
+
+impl PartialEq for Program {
+    fn eq(&self, other: &Self) -> bool {
+        let same_bthread =
+            |((a, state), (b, other)): ((&Entry, &dyn AnyBThread), (&Entry, &dyn AnyBThread))| {
+                a.name == b.name && state.equals(other)
+            };
+        self.externals == other.externals
+            && self.occurrences == other.occurrences
+            && self.failure == other.failure
+            && self.board.bthreads().count() == other.board.bthreads().count()
+            && self.board.bthreads().zip(other.board.bthreads()).all(same_bthread)
+            && self.proxies().eq(other.proxies())
+    }
+}
+
+impl Eq for Program {}
+
+impl Hash for Program {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.externals.hash(state);
+        self.occurrences.hash(state);
+        for (entry, bthread) in self.board.bthreads() {
+            entry.name.hash(state);
+            bthread.hash_into(state);
+        }
+        for proxy in self.proxies() {
+            proxy.hash(state);
+        }
+    }
+}
+
+/// Who requested the events in the second half of a superstep: those that keep it going.
+fn busy_bthreads(selections: &[Selection]) -> Vec<Arc<str>> {
+    let recent = selections.get(selections.len() / 2..).unwrap_or_default();
+    let mut bthreads: Vec<Arc<str>> =
+        recent.iter().flat_map(|selection| selection.requested_by.iter().cloned()).collect();
+    bthreads.sort();
+    bthreads.dedup();
+    bthreads
+}

@@ -1,0 +1,247 @@
+//! The ops of scripts and how they are written.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::de::{Error, MapAccess, Visitor};
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::bid::Bid;
+use crate::event::Event;
+use crate::notation::Many;
+
+/// One op of a script; the [module](super) lists their JSON forms.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Op {
+    /// A synchronisation point.
+    Sync(Bid),
+    /// Runs the body again and again.
+    Repeat {
+        /// How often.
+        times: Times,
+        /// What.
+        body: Vec<Op>,
+    },
+    /// Runs the ops filed under the name of the event that ended the last sync, if there are any.
+    On(BTreeMap<String, Vec<Op>>),
+    /// Fails an assertion and ends.
+    AssertFail(String),
+    /// Puts events in the external queue.
+    Enqueue(Vec<Event>),
+    /// Adds a b-thread.
+    Spawn(Spawn),
+    /// Says whether the program waits for external events when it has nothing to do.
+    Daemon(bool),
+    /// Says what to enqueue when interrupted, from here on.
+    OnInterruptEnqueue(Vec<Reply>),
+    /// Ends.
+    Stop,
+}
+
+impl Op {
+    /// Runs `body` `times` times.
+    pub fn repeat(times: u32, body: impl Into<Vec<Op>>) -> Self {
+        Self::Repeat { times: Times::Count(times), body: body.into() }
+    }
+
+    /// Runs `body` for ever.
+    pub fn forever(body: impl Into<Vec<Op>>) -> Self {
+        Self::Repeat { times: Times::Forever, body: body.into() }
+    }
+
+    /// Whether the op may wait or end, so that a loop around it may come to rest.
+    pub(super) fn may_pause(&self) -> bool {
+        match self {
+            Self::Sync(_) | Self::Stop | Self::AssertFail(_) => true,
+            Self::Repeat { body, .. } => body.iter().any(Self::may_pause),
+            Self::On(arms) => arms.values().flatten().any(Self::may_pause),
+            Self::Enqueue(_) | Self::Spawn(_) | Self::Daemon(_) | Self::OnInterruptEnqueue(_) => false,
+        }
+    }
+}
+
+/// How often a loop runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Times {
+    /// This often.
+    Count(u32),
+    /// Until the script ends from within.
+    Forever,
+}
+
+/// What `spawn` adds.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Spawn {
+    /// A script of the library, under its own name.
+    Template(String),
+    /// A script spelled out in place.
+    Inline(ScriptSource),
+}
+
+/// A named script as written.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScriptSource {
+    /// Name of the b-thread.
+    pub name: String,
+    /// What it does.
+    pub body: Vec<Op>,
+    /// Priority under [`Strategy::BThreadPriority`](crate::Strategy::BThreadPriority).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub priority: Option<i32>,
+}
+
+/// One event that an interrupted script enqueues.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Reply {
+    /// The event that interrupted it, written `$event`.
+    Interrupting,
+    /// A given event.
+    Event(Event),
+}
+
+const INTERRUPTING: &str = "$event";
+
+impl Serialize for Reply {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Interrupting => serializer.serialize_str(INTERRUPTING),
+            Self::Event(event) => event.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Reply {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let event = Event::deserialize(deserializer)?;
+        Ok(if event.name() == INTERRUPTING { Self::Interrupting } else { Self::Event(event) })
+    }
+}
+
+impl Serialize for Times {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Count(count) => serializer.serialize_u32(*count),
+            Self::Forever => serializer.serialize_str("forever"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Times {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct TimesVisitor;
+
+        impl Visitor<'_> for TimesVisitor {
+            type Value = Times;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number of rounds or \"forever\"")
+            }
+
+            fn visit_u64<E: Error>(self, count: u64) -> Result<Times, E> {
+                u32::try_from(count).map(Times::Count).map_err(|_| E::custom("more than 4294967295 rounds"))
+            }
+
+            fn visit_str<E: Error>(self, text: &str) -> Result<Times, E> {
+                if text == "forever" {
+                    Ok(Times::Forever)
+                } else {
+                    Err(E::invalid_value(serde::de::Unexpected::Str(text), &self))
+                }
+            }
+        }
+
+        deserializer.deserialize_any(TimesVisitor)
+    }
+}
+
+impl Serialize for Op {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        match self {
+            Self::Sync(bid) => map.serialize_entry("sync", bid)?,
+            Self::Repeat { times, body } => {
+                map.serialize_entry("repeat", times)?;
+                map.serialize_entry("do", body)?;
+            }
+            Self::On(arms) => map.serialize_entry("on", arms)?,
+            Self::AssertFail(message) => map.serialize_entry("assert_fail", message)?,
+            Self::Enqueue(events) => map.serialize_entry("enqueue", events)?,
+            Self::Spawn(spawn) => map.serialize_entry("spawn", spawn)?,
+            Self::Daemon(daemon) => map.serialize_entry("daemon", daemon)?,
+            Self::OnInterruptEnqueue(replies) => map.serialize_entry("on_interrupt_enqueue", replies)?,
+            Self::Stop => map.serialize_entry("stop", &true)?,
+        }
+        map.end()
+    }
+}
+
+impl<'de> Deserialize<'de> for Op {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(OpVisitor)
+    }
+}
+
+const OPS: &[&str] = &[
+    "sync",
+    "repeat",
+    "do",
+    "on",
+    "assert_fail",
+    "enqueue",
+    "spawn",
+    "daemon",
+    "on_interrupt_enqueue",
+    "stop",
+];
+
+struct OpVisitor;
+
+impl<'de> Visitor<'de> for OpVisitor {
+    type Value = Op;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "an op: an object with one of the keys {OPS:?}")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Op, A::Error> {
+        let (mut times, mut body, mut op) = (None, None, None);
+        while let Some(key) = map.next_key::<String>()? {
+            let other = match &*key {
+                "repeat" => {
+                    times = Some(map.next_value()?);
+                    continue;
+                }
+                "do" => {
+                    body = Some(map.next_value()?);
+                    continue;
+                }
+                "sync" => Op::Sync(map.next_value()?),
+                "on" => Op::On(map.next_value()?),
+                "assert_fail" => Op::AssertFail(map.next_value()?),
+                "enqueue" => Op::Enqueue(map.next_value::<Many<Event>>()?.0),
+                "spawn" => Op::Spawn(map.next_value()?),
+                "daemon" => Op::Daemon(map.next_value()?),
+                "on_interrupt_enqueue" => Op::OnInterruptEnqueue(map.next_value::<Many<Reply>>()?.0),
+                "stop" => {
+                    map.next_value::<bool>()?;
+                    Op::Stop
+                }
+                unknown => return Err(Error::unknown_field(unknown, OPS)),
+            };
+            if op.replace(other).is_some() {
+                return Err(Error::custom(format_args!("one op per object; `{key}` is the second")));
+            }
+        }
+        match (op, times, body) {
+            (Some(op), None, None) => Ok(op),
+            (None, Some(times), Some(body)) => Ok(Op::Repeat { times, body }),
+            (None, Some(_), None) => Err(Error::missing_field("do")),
+            (None, None, Some(_)) => Err(Error::missing_field("repeat")),
+            (None, None, None) => Err(Error::custom(format_args!("an op needs one of the keys {OPS:?}"))),
+            (Some(_), _, _) => Err(Error::custom("`repeat` and `do` go with no other op")),
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! Selections: what happened at one synchronisation point, and why.
+
+use std::fmt;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::event::Event;
+
+/// Where a selected event came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Origin {
+    /// Requested by a b-thread or a proxy.
+    Internal,
+    /// Taken from the external queue.
+    External,
+    /// Selected elsewhere and delivered here as a fact.
+    Occurred,
+}
+
+impl fmt::Display for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Internal => "internal",
+            Self::External => "external",
+            Self::Occurred => "occurred",
+        })
+    }
+}
+
+/// One event that happened and the b-threads it moved, each list in the order in which the b-threads were added.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Selection {
+    /// What happened.
+    pub event: Event,
+    /// Where it came from.
+    pub origin: Origin,
+    /// B-threads and proxies that requested it. The proxies among them are served: their bids are now empty.
+    pub requested_by: Vec<Arc<str>>,
+    /// B-threads that resumed.
+    pub resumed: Vec<Arc<str>>,
+    /// B-threads that it ended.
+    pub interrupted: Vec<Arc<str>>,
+    /// How many other events could have been selected in its place.
+    pub tied_with: usize,
+}

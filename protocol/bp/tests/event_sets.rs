@@ -1,0 +1,192 @@
+//! Event sets: what they hold, and how they are written.
+
+#![allow(clippy::unwrap_used)] // A test fails by panicking.
+
+use std::collections::BTreeMap;
+
+use proptest::prelude::*;
+use serde_json::json;
+use skein_bp::{Event, EventSet, Pattern, Value};
+
+fn goto(x: f64, y: f64) -> Event {
+    Event::new("uav/3/goto").with("x", x).with("y", y)
+}
+
+#[test]
+fn each_form_holds_what_it_says() {
+    let holds = |set: &EventSet, event: &Event| set.contains(event);
+    let event = goto(1.0, 2.0).with("n", 3).with("who", "pilot");
+    assert!(holds(&EventSet::All, &event) && !holds(&EventSet::None, &event));
+    assert!(holds(&event.clone().into(), &event) && !holds(&EventSet::Exactly("uav/3/goto".into()), &event));
+    assert!(
+        holds(&"uav/3/goto".into(), &event)
+            && holds(&"uav/*/goto".into(), &event)
+            && !holds(&"uav/4/**".into(), &event)
+    );
+    assert!(holds(&EventSet::prefix("uav/3/go"), &event) && !holds(&EventSet::prefix("uav/3/x"), &event));
+    assert!(holds(&EventSet::field_range("n", 3.0, 4.0), &event), "a whole number counts, borders included");
+    assert!(
+        !holds(&EventSet::field_range("n", 3.1, 4.0), &event)
+            && !holds(&EventSet::field_range("who", 0.0, 9.0), &event)
+    );
+    assert!(
+        holds(&EventSet::field_is("who", "pilot"), &event) && !holds(&EventSet::field_is("n", 3.0), &event)
+    );
+    assert!(holds(&EventSet::from(["nothing", "uav/3/goto"]), &event));
+    assert!(!holds(&(!EventSet::from("uav/**")), &event));
+}
+
+#[test]
+fn a_region_needs_x_and_y_and_takes_a_missing_z() {
+    let region = EventSet::region([0.0, 0.0, 1.0], [2.0, 2.0, 3.0]);
+    assert!(region.contains(&goto(2.0, 0.0)));
+    assert!(region.contains(&goto(1.0, 1.0).with("z", 3)));
+    assert!(!region.contains(&goto(1.0, 1.0).with("z", 0.5)));
+    assert!(!region.contains(&goto(1.0, 2.5)));
+    assert!(!region.contains(&Event::new("uav/3/goto").with("x", 1.0)));
+    assert!(!region.contains(&goto(f64::NAN, 1.0)));
+}
+
+#[test]
+fn homes_are_matched_with_care() {
+    let may = |set: EventSet| set.could_match_home("uav/3");
+    assert!(may("uav/3/go".into()) && may("uav/*/go".into()) && may("**".into()) && may("*/3/go".into()));
+    assert!(!may("uav/4/go".into()) && !may("ground/**".into()) && !may("uav/31/go".into()));
+    assert!(may(EventSet::prefix("uav/3")) && may(EventSet::prefix("u")) && !may(EventSet::prefix("uav/4/")));
+    assert!(may(EventSet::All) && !may(EventSet::None) && may(EventSet::All.and("uav/3/x")));
+    assert!(
+        !may(EventSet::field_is("k", 1).and("uav/4/x")),
+        "one member of an intersection is enough to tell"
+    );
+    assert!(may(EventSet::from("uav/4/x").or("uav/3/x")));
+    assert!(may(EventSet::from("uav/3/x").not()));
+}
+
+#[test]
+fn the_written_forms_are_those_of_the_notation() {
+    let forms = [
+        (json!("e"), EventSet::Exactly("e".into())),
+        (json!({"name": "e", "data": {"k": 1}}), EventSet::Exactly(Event::new("e").with("k", 1))),
+        (json!({"all": true}), EventSet::All),
+        (json!({"all": false}), EventSet::None),
+        (json!({"any_data": "e"}), EventSet::named("e")),
+        (json!({"named": "a/*"}), "a/*".into()),
+        (json!({"prefix": "a"}), EventSet::prefix("a")),
+        (json!({"data_has": {"k": true}}), EventSet::field_is("k", true)),
+        (
+            json!({"field_range": {"key": "z", "min": 1.0, "max": null}}),
+            EventSet::field_range("z", 1.0, f64::INFINITY),
+        ),
+        (
+            json!({"region": {"min": [0.0, 0.0, null], "max": [1.0, 1.0, null]}}),
+            EventSet::region([0.0, 0.0, f64::NEG_INFINITY], [1.0, 1.0, f64::INFINITY]),
+        ),
+        (json!({"not": "e"}), EventSet::Exactly("e".into()).not()),
+        (json!({"and": ["e", {"prefix": "a"}]}), EventSet::Exactly("e".into()).and(EventSet::prefix("a"))),
+        (json!(["e", "f"]), EventSet::Exactly("e".into()).or(Event::new("f"))),
+    ];
+    for (written, set) in forms {
+        assert_eq!(serde_json::from_value::<EventSet>(written.clone()).unwrap(), set, "{written}");
+        assert_eq!(serde_json::to_value(&set).unwrap(), written);
+    }
+}
+
+#[test]
+fn several_keys_mean_all_of_them() {
+    let set: EventSet = serde_json::from_value(json!({"any_data": "e", "data_has": {"k": 1}})).unwrap();
+    assert!(set.contains(&Event::new("e").with("k", 1)) && !set.contains(&Event::new("e")));
+    let set: EventSet = serde_json::from_value(json!({"or": ["e", "f"]})).unwrap();
+    assert!(set.contains(&"f".into()));
+}
+
+#[test]
+fn event_data_is_sorted_and_replaced() {
+    let event = Event::new("e").with("b", 1).with("a", 2.5).with("b", "x");
+    assert_eq!(event.to_string(), r#"e{a: 2.5, b: "x"}"#);
+    assert_eq!(
+        (event.real("a"), event.text("b"), event.int("a"), event.bool("c")),
+        (Some(2.5), Some("x"), None, None)
+    );
+    assert_eq!(Event::new("e").with("n", 2).real("n"), Some(2.0));
+    assert_ne!(Event::new("e").with("x", 0.0), Event::new("e").with("x", -0.0));
+}
+
+fn name() -> impl Strategy<Value = String> {
+    prop::collection::vec(prop_oneof!["a", "b", "c", "1", "12"], 1..4).prop_map(|chunks| chunks.join("/"))
+}
+
+fn value() -> impl Strategy<Value = Value> {
+    prop_oneof![
+        any::<bool>().prop_map(Value::from),
+        (0..3_i64).prop_map(Value::from),
+        (-1.0..1.0).prop_map(|x: f64| x.into()),
+        "[xy]".prop_map(Value::from)
+    ]
+}
+
+fn event() -> impl Strategy<Value = Event> {
+    let data = prop::collection::btree_map("[xyzk]", value(), 0..3);
+    (name(), data).prop_map(|(name, data)| {
+        data.into_iter().fold(Event::new(name), |event, (key, value)| event.with(key, value))
+    })
+}
+
+fn event_set() -> impl Strategy<Value = EventSet> {
+    let pattern = prop::collection::vec(prop_oneof!["a", "b", "1", "\\*", "\\*\\*"], 1..4)
+        .prop_map(|chunks| chunks.join("/"));
+    let leaf = prop_oneof![
+        Just(EventSet::None),
+        Just(EventSet::All),
+        event().prop_map(EventSet::Exactly),
+        pattern.prop_map(EventSet::from),
+        name().prop_map(EventSet::named),
+        "[ab]/?[1a]?/?".prop_map(EventSet::prefix),
+        (-1.0..1.0, -1.0..1.0).prop_map(|(a, b)| EventSet::field_range("x", a, b)),
+        ("[xyk]", value()).prop_map(|(key, value)| EventSet::FieldIs(BTreeMap::from([(key.into(), value)]))),
+        (-1.0..1.0, -1.0..1.0).prop_map(|(a, b)| EventSet::region([a, b, 0.0], [b, a, 1.0])),
+    ];
+    leaf.prop_recursive(3, 12, 3, |set| {
+        prop_oneof![
+            set.clone().prop_map(|set| EventSet::Not(Box::new(set))),
+            prop::collection::vec(set.clone(), 0..3).prop_map(EventSet::And),
+            prop::collection::vec(set, 0..3).prop_map(EventSet::Or),
+        ]
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn sets_are_an_algebra(a in event_set(), b in event_set(), e in event()) {
+        let (in_a, in_b) = (a.contains(&e), b.contains(&e));
+        prop_assert_eq!(a.clone().and(b.clone()).contains(&e), in_a && in_b);
+        prop_assert_eq!(a.clone().or(b.clone()).contains(&e), in_a || in_b);
+        prop_assert_eq!(a.clone().not().contains(&e), !in_a);
+        prop_assert!(!(a.is_none() && in_a));
+        prop_assert!(!(in_a && in_b) || a.may_overlap(&b), "they share {}", e);
+        prop_assert!(!in_a || a.could_match_home(e.home()));
+    }
+
+    #[test]
+    fn what_is_written_is_read_the_same(set in event_set(), event in event()) {
+        let text = serde_json::to_string(&set).unwrap();
+        prop_assert_eq!(serde_json::from_str::<EventSet>(&text).unwrap(), set, "{}", text);
+        let text = serde_json::to_string(&event).unwrap();
+        prop_assert_eq!(serde_json::from_str::<Event>(&text).unwrap(), event, "{}", text);
+    }
+
+    #[test]
+    fn a_pattern_fits_what_a_regular_expression_of_chunks_would(name in name(), pattern in "(a|b|1|\\*|\\*\\*)(/(a|b|1|\\*|\\*\\*)){0,3}") {
+        fn fits(pattern: &[&str], name: &[&str]) -> bool {
+            match (pattern.split_first(), name.split_first()) {
+                (None, _) => name.is_empty(),
+                (Some((&"**", rest)), _) => (0..=name.len()).any(|skip| fits(rest, &name[skip..])),
+                (Some((chunk, rest)), Some((first, others))) => (*chunk == "*" || chunk == first) && fits(rest, others),
+                (Some(_), None) => false,
+            }
+        }
+        let (chunks, names): (Vec<_>, Vec<_>) = (pattern.split('/').collect(), name.split('/').collect());
+        prop_assert_eq!(Pattern::new(pattern.as_str()).matches(&name), fits(&chunks, &names));
+    }
+}

@@ -1,0 +1,60 @@
+//! What a node is told about itself and the fleet.
+
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
+use skein_bp::EventSet;
+
+use crate::NodeName;
+
+/// What a [`Node`](crate::Node) is told when it is made.
+#[derive(Clone, Debug)]
+pub struct NodeConfig {
+    /// Its own name.
+    pub name: NodeName,
+    /// Its incarnation: a durable counter that grows with each start.
+    pub incarnation: u64,
+    /// Every member of the fleet; its own name may be among them or not. Others are not listened to.
+    pub roster: Vec<NodeName>,
+    /// How long this node's bids hold, and it counts as alive, without renewal; 1 s unless set, at least 10 ms.
+    pub lease: Duration,
+    /// The longest lease granted to others. As long, a restarted home keeps its `guarded` events back.
+    pub longest_lease: Duration,
+    /// Events that no remote bid can block or, outside `gateway`, request (G6).
+    pub safety: EventSet,
+    /// Events that others may request and nobody from afar can block: `<name>/order` unless set.
+    pub gateway: EventSet,
+    /// Events that this home selects, after a start, only once it knows every member's blocks: from their records,
+    /// or because the longest lease has passed.
+    pub guarded: EventSet,
+    /// Where `swarm/...` events have their home.
+    pub coordinator: Option<NodeName>,
+    /// The band that priorities of remote bids are brought into.
+    pub remote_priority: RangeInclusive<i32>,
+    /// How many occurrences are kept for those who missed them; at least 1.
+    pub history: usize,
+    /// Selections in one step after which the program counts as unsettled.
+    pub settle_limit: usize,
+}
+
+impl NodeConfig {
+    /// The usual settings for a node in a fleet.
+    #[must_use]
+    pub fn new(name: NodeName, incarnation: u64, roster: Vec<NodeName>) -> Self {
+        let gateway = EventSet::named(name.event_name("order"));
+        Self {
+            name,
+            incarnation,
+            roster,
+            lease: Duration::from_secs(1),
+            longest_lease: Duration::from_secs(10),
+            safety: EventSet::None,
+            gateway,
+            guarded: EventSet::None,
+            coordinator: None,
+            remote_priority: i32::MIN..=i32::MAX,
+            history: 1024,
+            settle_limit: 1000,
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! A home's own occurrences: numbered, and kept for a while for those who missed them.
+
+use std::collections::VecDeque;
+
+use crate::Occurrence;
+
+/// The latest occurrences of a home, in order.
+#[derive(Clone, Debug)]
+pub(crate) struct History {
+    kept: VecDeque<Occurrence>,
+    capacity: usize,
+    latest_seq: u64,
+}
+
+impl History {
+    pub(crate) fn new(capacity: usize) -> Self {
+        Self { kept: VecDeque::new(), capacity: capacity.max(1), latest_seq: 0 }
+    }
+
+    /// The number of the latest occurrence, 0 before the first.
+    pub(crate) fn latest_seq(&self) -> u64 {
+        self.latest_seq
+    }
+
+    /// The number of the oldest one kept; of the next one if none is.
+    pub(crate) fn oldest_seq(&self) -> u64 {
+        self.kept.front().map_or(self.latest_seq + 1, |occurrence| occurrence.seq)
+    }
+
+    /// The number that the next occurrence gets.
+    pub(crate) fn next_seq(&self) -> u64 {
+        self.latest_seq + 1
+    }
+
+    pub(crate) fn push(&mut self, occurrence: Occurrence) {
+        self.latest_seq = occurrence.seq;
+        if self.kept.len() == self.capacity {
+            self.kept.pop_front();
+        }
+        self.kept.push_back(occurrence);
+    }
+
+    /// All occurrences after number `seq`; none if some of them are no longer kept.
+    pub(crate) fn after(&self, seq: u64) -> Option<impl Iterator<Item = &Occurrence>> {
+        (seq + 1 >= self.oldest_seq())
+            .then(|| self.kept.iter().filter(move |occurrence| occurrence.seq > seq))
+    }
+
+    /// Those kept of the numbers `from..=to`.
+    pub(crate) fn range(&self, from: u64, to: u64) -> impl Iterator<Item = &Occurrence> {
+        self.kept.iter().filter(move |occurrence| (from..=to).contains(&occurrence.seq))
+    }
+}

@@ -1,0 +1,235 @@
+//! What nodes say to one another.
+//!
+//! Bids travel as *state*: a lost, repeated or overtaken record does no harm, because the newest one says all.
+//! Occurrences travel as a numbered *stream* with a history behind it.
+
+use std::time::Duration;
+
+use skein_bp::{Event, EventSet};
+
+use crate::NodeName;
+
+/// Whom a message is for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Recipient {
+    /// One node.
+    Node(NodeName),
+    /// Every node of the fleet.
+    All,
+}
+
+/// Any message between nodes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Message {
+    /// What a node's b-threads bid for events of one home; to that home.
+    Bid(BidRecord),
+    /// A home has taken in a record; to its sender.
+    Ack(BidAck),
+    /// An event has occurred at its home; to all, or to the one that asked for a repair.
+    Occurrence(Occurrence),
+    /// A node misses occurrences of a home; to that home.
+    Repair(Repair),
+    /// A node lives, and its stream has come this far; to all.
+    Presence(Presence),
+}
+
+impl Message {
+    /// The node that speaks.
+    #[must_use]
+    pub fn sender(&self) -> &NodeName {
+        match self {
+            Self::Bid(bid) => &bid.node,
+            Self::Ack(ack) => &ack.home,
+            Self::Occurrence(occurrence) => &occurrence.home,
+            Self::Repair(repair) => &repair.requester,
+            Self::Presence(presence) => &presence.node,
+        }
+    }
+}
+
+/// The newest bids of one node's b-threads for the events of one home.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BidRecord {
+    /// The bidder.
+    pub node: NodeName,
+    /// The bidder's incarnation: a durable counter that grows with each of its starts.
+    pub incarnation: u64,
+    /// Whom the record is for.
+    pub home: NodeName,
+    /// The incarnation of the home that the requests are meant for; none while it is not known.
+    ///
+    /// A home serves requests only if they are meant for its present life (G4); blocks hold in any.
+    pub home_incarnation: Option<u64>,
+    /// Number of this content, growing; a renewal repeats it.
+    pub epoch: u64,
+    /// When this copy was sent, on the bidder's clock; the acknowledgement returns it.
+    pub sent_at: Duration,
+    /// Highest number of the home's occurrences that the bidder had applied when this copy was sent.
+    pub applied: u64,
+    /// How long the bids hold without renewal, in milliseconds.
+    pub lease_ms: u64,
+    /// One bid for each b-thread that requests or blocks something there.
+    pub bids: Vec<RemoteBid>,
+}
+
+/// One b-thread's bid for the events of another node.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RemoteBid {
+    /// The b-thread.
+    pub bthread: String,
+    /// Its synchronisation point: grows each time the b-thread moves on, in one incarnation of its node.
+    pub sync: u64,
+    /// The events it requests, all of this home.
+    pub requests: Vec<Event>,
+    /// What it blocks; only the home's own events count.
+    pub block: EventSet,
+    /// Its priority under the `sync_priority` strategy.
+    pub priority: Option<i32>,
+    /// What becomes of the block when the bidder is lost.
+    pub on_loss: OnLoss,
+}
+
+/// What becomes of a block when its holder is lost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OnLoss {
+    /// It lapses with the lease.
+    #[default]
+    Release,
+    /// It stays until an authority lifts it; a home without durable store refuses it.
+    Hold,
+}
+
+/// A home's answer to a record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BidAck {
+    /// The home that answers.
+    pub home: NodeName,
+    /// Its incarnation.
+    pub home_incarnation: u64,
+    /// The bidder.
+    pub node: NodeName,
+    /// The bidder's incarnation.
+    pub incarnation: u64,
+    /// The content that was taken in.
+    pub epoch: u64,
+    /// `sent_at` of the copy that was taken in.
+    pub sent_at: Duration,
+    /// The number of the home's latest occurrence.
+    pub latest_seq: u64,
+    /// The bids, or parts of bids, that the home does not honour.
+    pub refused: Vec<Refusal>,
+}
+
+/// A bid, or a part of one, that a home does not honour.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// The b-thread whose bid it is.
+    pub bthread: String,
+    /// Its synchronisation point.
+    pub sync: u64,
+    /// Why.
+    pub reason: RefusalReason,
+}
+
+/// Why a home does not honour a bid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum RefusalReason {
+    /// For a reason that this version has no word for.
+    Unspecified,
+    /// It requests a safety event from afar, past the gateway (G6).
+    Safety,
+    /// It requests an event that has its home elsewhere.
+    NotHome,
+    /// It asks to be held after its owner's loss, and this home has no durable store to keep it in.
+    HoldUnsupported,
+    /// Its lease is longer than this home grants.
+    LeaseTooLong,
+    /// It requests an event by which this home tells facts about itself, see [`facts`](crate::facts).
+    Reserved,
+    /// It exceeds the number of bids or requests that one node may have here.
+    Quota,
+}
+
+impl RefusalReason {
+    /// Whether a bid refused for this reason blocks nothing.
+    #[must_use]
+    pub fn voids_block(self) -> bool {
+        matches!(self, Self::Unspecified | Self::HoldUnsupported | Self::LeaseTooLong | Self::Quota)
+    }
+
+    /// The reason as one word.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Unspecified => "unspecified",
+            Self::Safety => "safety",
+            Self::NotHome => "not_home",
+            Self::HoldUnsupported => "hold_unsupported",
+            Self::LeaseTooLong => "lease_too_long",
+            Self::Reserved => "reserved",
+            Self::Quota => "quota",
+        }
+    }
+}
+
+/// One request that an occurrence has served: at most once for each of these (G4).
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ServedRequest {
+    /// The node that requested.
+    pub node: NodeName,
+    /// Its incarnation.
+    pub incarnation: u64,
+    /// The b-thread that requested.
+    pub bthread: String,
+    /// At which of its synchronisation points.
+    pub sync: u64,
+}
+
+/// An event that has occurred at its home. It cannot be taken back, nor blocked by who hears of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Occurrence {
+    /// Where.
+    pub home: NodeName,
+    /// In which life of the home.
+    pub incarnation: u64,
+    /// Its number there: 1, 2, 3, ... without holes.
+    pub seq: u64,
+    /// What.
+    pub event: Event,
+    /// The remote requests it served.
+    pub requests_served: Vec<ServedRequest>,
+    /// When, on the home's clock; for display only.
+    pub at: Duration,
+}
+
+/// A wish to hear some occurrences again.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Repair {
+    /// Whose occurrences.
+    pub home: NodeName,
+    /// Of which of its lives.
+    pub incarnation: u64,
+    /// First number missed.
+    pub from_seq: u64,
+    /// Last number missed.
+    pub to_seq: u64,
+    /// Who asks.
+    pub requester: NodeName,
+}
+
+/// A sign of life, from which others see also the loss of a stream's tail.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Presence {
+    /// Who lives.
+    pub node: NodeName,
+    /// In which incarnation.
+    pub incarnation: u64,
+    /// How long it has been up. Who was there before it wants its stream from the start.
+    pub up: Duration,
+    /// The number of its latest occurrence, 0 before the first.
+    pub latest_seq: u64,
+    /// The number of the oldest occurrence that it can still repeat.
+    pub oldest_seq: u64,
+    /// Without a word for so long, it counts as lost; in milliseconds.
+    pub lease_ms: u64,
+}

@@ -1,0 +1,108 @@
+//! Who of the roster lives, as far as this node can tell (G5).
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use crate::NodeName;
+
+/// What this node knows of another one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Peer {
+    /// Its incarnation, once it has been heard.
+    pub incarnation: Option<u64>,
+    /// When it was last heard, on this node's clock.
+    pub last_word: Option<Duration>,
+    /// How long it counts as alive without a word.
+    pub lease: Duration,
+    /// Whether it counts as alive.
+    pub alive: bool,
+}
+
+/// What a word from a peer means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Word {
+    /// It comes from a life that is over, or from a stranger: it counts for nothing.
+    Fenced,
+    /// The peer is alive, as it was before.
+    Alive,
+    /// The peer is back, in the same life.
+    Back,
+    /// The peer begins a life; another one may have ended unnoticed.
+    Born {
+        /// Whether the life before was taken to go on.
+        was_alive: bool,
+    },
+}
+
+/// Every other member of the roster.
+#[derive(Clone, Debug)]
+pub(crate) struct Peers(BTreeMap<NodeName, Peer>);
+
+impl Peers {
+    /// Nobody has been heard yet; `lease` counts until a peer has told its own.
+    pub(crate) fn new(roster: impl IntoIterator<Item = NodeName>, lease: Duration) -> Self {
+        let silent = Peer { incarnation: None, last_word: None, lease, alive: false };
+        Self(roster.into_iter().map(|name| (name, silent.clone())).collect())
+    }
+
+    pub(crate) fn names(&self) -> impl Iterator<Item = &NodeName> {
+        self.0.keys()
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (&NodeName, &Peer)> {
+        self.0.iter()
+    }
+
+    /// Notes a word from `node` in its life `incarnation`.
+    pub(crate) fn hear(&mut self, now: Duration, node: &NodeName, incarnation: u64) -> Word {
+        let Some(peer) = self.0.get_mut(node) else { return Word::Fenced };
+        if peer.incarnation.is_some_and(|known| incarnation < known) {
+            return Word::Fenced;
+        }
+        let was_alive = std::mem::replace(&mut peer.alive, true);
+        peer.last_word = Some(now);
+        if peer.incarnation.replace(incarnation) != Some(incarnation) {
+            Word::Born { was_alive }
+        } else if was_alive {
+            Word::Alive
+        } else {
+            Word::Back
+        }
+    }
+
+    /// Takes over the lease that a peer has announced.
+    pub(crate) fn set_lease(&mut self, node: &NodeName, lease: Duration) {
+        if let Some(peer) = self.0.get_mut(node) {
+            peer.lease = lease;
+        }
+    }
+
+    /// Those who count as lost from now on.
+    pub(crate) fn take_lost(&mut self, now: Duration) -> Vec<NodeName> {
+        let mut lost = Vec::new();
+        for (name, peer) in &mut self.0 {
+            if peer.alive && peer.silent_at().is_some_and(|at| now >= at) {
+                peer.alive = false;
+                lost.push(name.clone());
+            }
+        }
+        lost
+    }
+
+    /// When the next one counts as lost if it stays silent.
+    pub(crate) fn next_deadline(&self) -> Option<Duration> {
+        self.0.values().filter(|peer| peer.alive).filter_map(Peer::silent_at).min()
+    }
+}
+
+impl Peer {
+    /// How long ago it was last heard.
+    #[must_use]
+    pub fn age(&self, now: Duration) -> Option<Duration> {
+        self.last_word.map(|at| now.saturating_sub(at))
+    }
+
+    fn silent_at(&self) -> Option<Duration> {
+        self.last_word.map(|at| at + self.lease)
+    }
+}

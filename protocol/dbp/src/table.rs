@@ -1,0 +1,341 @@
+//! A home's table of remote bids, each of which stands in the program as a proxy b-thread.
+
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+use std::sync::Arc;
+use std::time::Duration;
+
+use skein_bp::{Bid, Event, EventSet};
+
+use crate::history::History;
+use crate::{BidRecord, NodeName, OnLoss, Refusal, RefusalReason, RemoteBid, ServedRequest};
+
+/// How many bids one node may have here.
+const MOST_BIDS: usize = 256;
+/// How many events one bid may request.
+const MOST_REQUESTS: usize = 64;
+
+/// What of a remote bid this home honours.
+#[derive(Clone, Debug)]
+pub(crate) struct Rights {
+    /// The events that have their home here.
+    pub(crate) home: EventSet,
+    /// The home's own facts: nobody requests or blocks them from afar.
+    pub(crate) facts: EventSet,
+    /// Events that nobody requests or blocks from afar ...
+    pub(crate) safety: EventSet,
+    /// ... but for these, which may be requested.
+    pub(crate) gateway: EventSet,
+    /// What may be blocked from afar: the home's events without all of these.
+    pub(crate) blockable: EventSet,
+    /// The band of priorities.
+    pub(crate) priority: RangeInclusive<i32>,
+    /// The longest lease granted.
+    pub(crate) longest_lease: Duration,
+}
+
+/// The change of a proxy: its new bid, or none if it goes.
+pub(crate) type ProxyChange = (Arc<str>, Option<Bid>);
+
+/// What became of a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum TakenIn {
+    /// It counts, and is acknowledged.
+    Yes,
+    /// It is older than what is known, or its sender has to catch up first: no answer.
+    No,
+}
+
+/// All remote bids.
+#[derive(Clone, Debug)]
+pub(crate) struct BidTable {
+    incarnation: u64,
+    rights: Rights,
+    bidders: BTreeMap<NodeName, Bidder>,
+}
+
+/// One node's bids in one of its lives.
+#[derive(Clone, Debug, Default)]
+struct Bidder {
+    incarnation: u64,
+    epoch: u64,
+    sent_at: Duration,
+    /// When the newest copy arrived, on this home's clock.
+    heard_at: Duration,
+    lease: Duration,
+    /// Whether the lease runs.
+    live: bool,
+    /// Whether one of its records was made for this home's present life.
+    knows_this_life: bool,
+    bids: BTreeMap<String, TakenBid>,
+    /// Highest synchronisation point of each b-thread at which a request was served (G4).
+    served: BTreeMap<String, u64>,
+    refused: Vec<Refusal>,
+}
+
+/// One bid, as far as it is honoured.
+#[derive(Clone, Debug, PartialEq)]
+struct TakenBid {
+    sync: u64,
+    requests: Vec<Event>,
+    block: EventSet,
+    priority: Option<i32>,
+    /// Whether the requests may still be served.
+    open: bool,
+}
+
+/// A remote b-thread that stands behind a proxy.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RemoteParty {
+    /// Its node.
+    pub node: NodeName,
+    /// The b-thread.
+    pub bthread: String,
+    /// How long ago its bid was renewed, on this home's clock.
+    pub lease_age: Duration,
+    /// After what age it lapses.
+    pub lease: Duration,
+}
+
+impl BidTable {
+    pub(crate) fn new(incarnation: u64, rights: Rights) -> Self {
+        Self { incarnation, rights, bidders: BTreeMap::new() }
+    }
+
+    /// Takes in a record of a roster member in its present life, and says how the proxies change.
+    pub(crate) fn take_in(
+        &mut self,
+        now: Duration,
+        record: &BidRecord,
+        history: &History,
+    ) -> (TakenIn, Vec<ProxyChange>) {
+        let for_this_life = record.home_incarnation == Some(self.incarnation);
+        let mut since = Vec::new();
+        if for_this_life {
+            match history.after(record.applied) {
+                Some(occurrences) => since.extend(occurrences.map(|occurrence| &occurrence.event)),
+                None => return (TakenIn::No, Vec::new()),
+            }
+        }
+        let bidder = self.bidders.entry(record.node.clone()).or_default();
+        if record.incarnation != bidder.incarnation {
+            *bidder = Bidder { incarnation: record.incarnation, ..Bidder::default() };
+        }
+        match (record.epoch, record.sent_at).cmp(&(bidder.epoch, bidder.sent_at)) {
+            Ordering::Less => return (TakenIn::No, Vec::new()),
+            // A repeated copy does not renew the lease.
+            Ordering::Equal => return (if bidder.live { TakenIn::Yes } else { TakenIn::No }, Vec::new()),
+            Ordering::Greater => {}
+        }
+        bidder.heard_at = now;
+        bidder.live = true;
+        bidder.knows_this_life |= for_this_life;
+        bidder.epoch = record.epoch;
+        bidder.sent_at = record.sent_at;
+        bidder.lease = Duration::from_millis(record.lease_ms);
+        bidder.refused.clear();
+        let mut taken = BTreeMap::new();
+        for (index, bid) in record.bids.iter().enumerate() {
+            match self.rights.judge(bid, index, bidder.lease) {
+                (Some(mut honoured), reasons) => {
+                    let unserved = bidder.served.get(&bid.bthread).is_none_or(|served| bid.sync > *served);
+                    let resumed = since.iter().any(|event| bid.requests.contains(event));
+                    honoured.open = for_this_life && unserved && !resumed && !honoured.requests.is_empty();
+                    taken.insert(bid.bthread.clone(), honoured);
+                    bidder.refuse(bid, reasons);
+                }
+                (None, reasons) => bidder.refuse(bid, reasons),
+            }
+        }
+        bidder.served.retain(|bthread, _| taken.contains_key(bthread));
+        let before = std::mem::replace(&mut bidder.bids, taken);
+        (TakenIn::Yes, changes(&record.node, &before, &bidder.bids))
+    }
+
+    /// What the last record of `node` asked for in vain.
+    pub(crate) fn refused(&self, node: &NodeName) -> &[Refusal] {
+        self.bidders.get(node).map_or(&[], |bidder| &bidder.refused)
+    }
+
+    /// Whether all that `node` blocks here is known: a record that it made for this home's present life has come.
+    pub(crate) fn knows(&self, node: &NodeName) -> bool {
+        self.bidders.get(node).is_some_and(|bidder| bidder.knows_this_life)
+    }
+
+    /// `node` begins a new life: what it bid before is void.
+    pub(crate) fn drop_life(&mut self, node: &NodeName) -> Vec<ProxyChange> {
+        self.bidders
+            .remove(node)
+            .map_or_else(Vec::new, |bidder| changes(node, &bidder.bids, &BTreeMap::new()))
+    }
+
+    /// Lets go of the bids whose lease has run out (G5).
+    pub(crate) fn expire(&mut self, now: Duration) -> Vec<ProxyChange> {
+        let mut gone = Vec::new();
+        for (node, bidder) in &mut self.bidders {
+            if bidder.live && now >= bidder.heard_at + bidder.lease {
+                bidder.live = false;
+                gone.extend(changes(node, &std::mem::take(&mut bidder.bids), &BTreeMap::new()));
+            }
+        }
+        gone
+    }
+
+    /// When the next lease runs out.
+    pub(crate) fn next_deadline(&self) -> Option<Duration> {
+        self.bidders
+            .values()
+            .filter(|bidder| bidder.live && !bidder.bids.is_empty())
+            .map(|bidder| bidder.heard_at + bidder.lease)
+            .min()
+    }
+
+    /// An event was selected at the request of these b-threads: the remote ones among them are served, and only
+    /// their blocks stay until the next record.
+    pub(crate) fn serve(&mut self, requested_by: &[Arc<str>]) -> (Vec<ServedRequest>, Vec<ProxyChange>) {
+        let (mut served, mut proxies) = (Vec::new(), Vec::new());
+        for name in requested_by {
+            let Some((node, bthread)) = name.split_once('#') else { continue };
+            let Ok(node) = NodeName::new(node) else { continue };
+            let Some(bidder) = self.bidders.get_mut(&node) else { continue };
+            let Some(bid) = bidder.bids.get_mut(bthread) else { continue };
+            bid.open = false;
+            bidder.served.insert(bthread.into(), bid.sync);
+            proxies.push((name.clone(), Some(bid.to_bid())));
+            served.push(ServedRequest {
+                node,
+                incarnation: bidder.incarnation,
+                bthread: bthread.into(),
+                sync: bid.sync,
+            });
+        }
+        (served, proxies)
+    }
+
+    /// All requests from afar that may still be served.
+    pub(crate) fn open_requests(&self) -> impl Iterator<Item = &Event> {
+        let bids = self.bidders.values().flat_map(|bidder| bidder.bids.values());
+        bids.filter(|bid| bid.open).flat_map(|bid| &bid.requests)
+    }
+
+    /// Whether anything is blocked from afar.
+    pub(crate) fn has_blocks(&self) -> bool {
+        self.bidders.values().flat_map(|bidder| bidder.bids.values()).any(|bid| !bid.block.is_none())
+    }
+
+    /// The proxies that block `event`.
+    pub(crate) fn blockers_of(&self, event: &Event) -> impl Iterator<Item = String> {
+        self.bidders.iter().flat_map(move |(node, bidder)| {
+            let blockers = bidder.bids.iter().filter(move |(_, bid)| bid.block.contains(event));
+            blockers.map(move |(bthread, _)| format!("{node}#{bthread}"))
+        })
+    }
+
+    /// Who stands behind a proxy.
+    pub(crate) fn party(&self, proxy: &str, now: Duration) -> Option<RemoteParty> {
+        let (node, bthread) = proxy.split_once('#')?;
+        let (node, bidder) = self.bidders.get_key_value(node)?;
+        bidder.bids.contains_key(bthread).then(|| RemoteParty {
+            node: node.clone(),
+            bthread: bthread.into(),
+            lease_age: now.saturating_sub(bidder.heard_at),
+            lease: bidder.lease,
+        })
+    }
+}
+
+impl Bidder {
+    fn refuse(&mut self, bid: &RemoteBid, reasons: Vec<RefusalReason>) {
+        let refusals = reasons.into_iter().map(|reason| Refusal {
+            bthread: bid.bthread.clone(),
+            sync: bid.sync,
+            reason,
+        });
+        self.refused.extend(refusals);
+    }
+}
+
+impl Rights {
+    /// What of the `index`-th bid of a record is honoured, and why not the rest.
+    fn judge(
+        &self,
+        bid: &RemoteBid,
+        index: usize,
+        lease: Duration,
+    ) -> (Option<TakenBid>, Vec<RefusalReason>) {
+        if index >= MOST_BIDS || bid.requests.len() > MOST_REQUESTS {
+            return (None, vec![RefusalReason::Quota]);
+        }
+        if lease > self.longest_lease {
+            return (None, vec![RefusalReason::LeaseTooLong]);
+        }
+        let mut reasons: Vec<_> = bid.requests.iter().filter_map(|event| self.denial(event)).collect();
+        if bid.on_loss == OnLoss::Hold {
+            reasons.push(RefusalReason::HoldUnsupported);
+        }
+        reasons.sort_unstable();
+        reasons.dedup();
+        let requests = bid.requests.iter().filter(|event| self.denial(event).is_none()).cloned().collect();
+        let priority =
+            bid.priority.map(|priority| priority.clamp(*self.priority.start(), *self.priority.end()));
+        (
+            Some(TakenBid {
+                sync: bid.sync,
+                requests,
+                block: self.honoured_block(bid),
+                priority,
+                open: false,
+            }),
+            reasons,
+        )
+    }
+
+    /// Why `event` may not be requested from afar, if so.
+    fn denial(&self, event: &Event) -> Option<RefusalReason> {
+        if !self.home.contains(event) {
+            Some(RefusalReason::NotHome)
+        } else if self.facts.contains(event) {
+            Some(RefusalReason::Reserved)
+        } else if self.safety.contains(event) && !self.gateway.contains(event) {
+            Some(RefusalReason::Safety)
+        } else {
+            None
+        }
+    }
+
+    /// The block without what may not be blocked from afar.
+    fn honoured_block(&self, bid: &RemoteBid) -> EventSet {
+        if bid.block.is_none() || bid.on_loss == OnLoss::Hold {
+            return EventSet::None;
+        }
+        bid.block.clone().and(self.blockable.clone())
+    }
+}
+
+impl TakenBid {
+    /// The bid of the proxy.
+    fn to_bid(&self) -> Bid {
+        let mut bid = Bid::new().block(self.block.clone());
+        if self.open {
+            bid = self.requests.iter().fold(bid, |bid, event| bid.request(event));
+        }
+        match self.priority {
+            Some(priority) => bid.priority(priority),
+            None => bid,
+        }
+    }
+}
+
+/// How the proxies of `node` change from one set of bids to the next.
+fn changes(
+    node: &NodeName,
+    before: &BTreeMap<String, TakenBid>,
+    after: &BTreeMap<String, TakenBid>,
+) -> Vec<ProxyChange> {
+    let proxy = |bthread: &String| -> Arc<str> { format!("{node}#{bthread}").into() };
+    let gone =
+        before.keys().filter(|bthread| !after.contains_key(*bthread)).map(|bthread| (proxy(bthread), None));
+    let put = after.iter().filter(|(bthread, bid)| before.get(*bthread) != Some(bid));
+    gone.chain(put.map(|(bthread, bid)| (proxy(bthread), Some(bid.to_bid())))).collect()
+}

@@ -1,0 +1,107 @@
+//! Subscriptions: the messages the companion lives on, asked for until they come and asked for again when
+//! they stop (an autopilot that restarted has forgotten; ArduPilot sends nothing unasked).
+
+use std::time::Duration;
+
+use mavlink::MessageData;
+use mavlink::dialects::common::{
+    ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, COMMAND_LONG_DATA, EXTENDED_SYS_STATE_DATA,
+    GPS_GLOBAL_ORIGIN_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, MavCmd, SYS_STATUS_DATA,
+};
+
+/// A message that is missing is asked for this often at most.
+const ASK_AGAIN: Duration = Duration::from_secs(1);
+
+/// How a message is wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Wish {
+    /// As a stream with this interval.
+    Every(Duration),
+    /// Once; the autopilot repeats it by itself when it changes.
+    Once,
+}
+
+#[derive(Debug, Clone)]
+struct Subscription {
+    message_id: u32,
+    wish: Wish,
+    seen_at: Option<Duration>,
+    asked_at: Option<Duration>,
+}
+
+/// All the messages wanted.
+#[derive(Debug, Clone)]
+pub(super) struct Subscriptions {
+    list: Vec<Subscription>,
+}
+
+impl Default for Subscriptions {
+    fn default() -> Self {
+        let every = |message_id, interval_ms| (message_id, Wish::Every(Duration::from_millis(interval_ms)));
+        let wishes = [
+            every(LOCAL_POSITION_NED_DATA::ID, 20),
+            every(ATTITUDE_QUATERNION_DATA::ID, 20),
+            (GPS_GLOBAL_ORIGIN_DATA::ID, Wish::Once),
+            (HOME_POSITION_DATA::ID, Wish::Once),
+            every(EXTENDED_SYS_STATE_DATA::ID, 200),
+            every(SYS_STATUS_DATA::ID, 500),
+            every(BATTERY_STATUS_DATA::ID, 1000),
+        ];
+        let list =
+            wishes.map(|(message_id, wish)| Subscription { message_id, wish, seen_at: None, asked_at: None });
+        Self { list: list.into() }
+    }
+}
+
+impl Subscriptions {
+    /// A message of this kind arrived.
+    pub(super) fn seen(&mut self, now: Duration, message_id: u32) {
+        if let Some(known) = self.list.iter_mut().find(|known| known.message_id == message_id) {
+            known.seen_at = Some(now);
+        }
+    }
+
+    /// Everything is to be asked for anew.
+    pub(super) fn forget(&mut self) {
+        for known in &mut self.list {
+            known.seen_at = None;
+            known.asked_at = None;
+        }
+    }
+
+    /// The command that asks for an overdue message: of several, the one not asked for the longest, so that
+    /// each gets its turn even if an autopilot never answers about one of them. Streams are all asked for
+    /// once, because the autopilot may already send them at another rate.
+    pub(super) fn next_request(&mut self, now: Duration) -> Option<COMMAND_LONG_DATA> {
+        let overdue =
+            self.list.iter_mut().filter(|known| known.is_overdue(now)).min_by_key(|known| known.asked_at)?;
+        overdue.asked_at = Some(now);
+        // Message ids are below 2^24 and intervals below 2^24 us, so both are exact as floats.
+        let param1 = overdue.message_id as f32;
+        Some(match overdue.wish {
+            Wish::Every(interval) => COMMAND_LONG_DATA {
+                command: MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL,
+                param1,
+                param2: interval.as_micros() as f32,
+                ..Default::default()
+            },
+            Wish::Once => {
+                COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_REQUEST_MESSAGE, param1, ..Default::default() }
+            }
+        })
+    }
+}
+
+impl Subscription {
+    fn is_overdue(&self, now: Duration) -> bool {
+        let since = |at: Option<Duration>| at.map(|at| now.saturating_sub(at));
+        if since(self.asked_at).is_some_and(|age| age < ASK_AGAIN) {
+            return false;
+        }
+        match (self.wish, since(self.seen_at)) {
+            (_, None) => true,
+            (Wish::Once, Some(_)) => false,
+            (Wish::Every(interval), Some(age)) => self.asked_at.is_none() || age > ASK_AGAIN + 3 * interval,
+        }
+    }
+}

@@ -1,0 +1,530 @@
+//! The autopilot's end of the link.
+
+mod calls;
+mod missions;
+mod parameter_table;
+mod report;
+mod streams;
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use mavlink::dialects::common::{
+    AUTOPILOT_VERSION_DATA, COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA,
+    MANUAL_CONTROL_DATA, MESSAGE_INTERVAL_DATA, MISSION_CURRENT_DATA, MISSION_ITEM_REACHED_DATA, MavCmd,
+    MavMessage, MavModeFlag, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
+    PROTOCOL_VERSION_DATA, SET_MODE_DATA, STATUSTEXT_DATA,
+};
+use mavlink::types::CharArray;
+use mavlink::{Message, MessageData};
+use nalgebra::Vector3;
+
+use crate::command::CommandResult;
+use crate::frame::{Address, Frame, FrameReader, FrameWriter};
+use crate::geodesy::{Datum, LocalFrame};
+use crate::mission::MissionItem;
+use crate::mode::{AutopilotKind, FlightMode};
+use crate::parameter::{ParameterValue, name_from_wire, wire_name};
+use crate::set_point::SetPoint;
+use crate::telemetry::{Landed, Severity};
+use calls::{Call, Novelty, Remembered};
+use missions::Missions;
+pub use parameter_table::{Parameter, ParameterError, ParameterTable};
+use report::Report;
+pub use report::VehicleState;
+use streams::{Rate, Streams};
+
+/// How many parameters of a list are sent at each report, so that a list does not crowd out telemetry.
+const LISTED_PER_REPORT: usize = 2;
+/// Unread requests kept; a flood beyond them is dropped, and its commands are not acknowledged.
+const MAX_REQUESTS: usize = 64;
+
+/// Who the autopilot is, and where.
+#[derive(Debug, Clone)]
+pub struct EndpointConfig {
+    /// System id of the vehicle; the component is 1, the autopilot.
+    pub system_id: u8,
+    /// Datum of the world, which is also the origin of the autopilot's local frame.
+    pub datum: Datum,
+    /// The autopilot's parameters.
+    pub parameters: ParameterTable,
+    /// Which mission items it can fly. An upload with another one is refused whole.
+    pub accepts_item: fn(&MissionItem) -> bool,
+}
+
+/// A command to the vehicle. Positions and heights are in the world's ENU frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum AutopilotCommand {
+    /// Let the motors turn.
+    Arm {
+        /// Without the checks.
+        force: bool,
+    },
+    /// Stop the motors.
+    Disarm {
+        /// Even in the air.
+        force: bool,
+    },
+    /// Climb straight up.
+    Takeoff {
+        /// World height to climb to, m; `None` for the autopilot's own.
+        z_m: Option<f64>,
+    },
+    /// Change the flight mode.
+    SetMode(FlightMode),
+    /// Fly to a place and stay there.
+    GoTo {
+        /// Where, m.
+        position: Vector3<f64>,
+    },
+    /// Fly this fast in the modes in which the autopilot chooses the speed itself.
+    SetSpeed {
+        /// Ground speed, m/s.
+        speed_m_s: f64,
+    },
+    /// Move home.
+    SetHome {
+        /// Where to, m; `None` for here.
+        position: Option<Vector3<f64>>,
+    },
+    /// Continue the mission with this item, counted from 0.
+    SetMissionItem(u16),
+}
+
+/// The right and duty to answer one command.
+#[derive(Debug, PartialEq)]
+pub struct Ticket {
+    from: Address,
+    command: MavCmd,
+    /// Some messages of old ask for something and expect no acknowledgement.
+    acknowledged: bool,
+}
+
+/// Something a station asks of the autopilot.
+#[derive(Debug, PartialEq)]
+pub enum Request {
+    /// A command, to be answered through [`Endpoint::answer`].
+    Command {
+        /// To answer with.
+        ticket: Ticket,
+        /// What is asked.
+        command: AutopilotCommand,
+        /// Who asks.
+        from: Address,
+    },
+    /// A set-point.
+    SetPoint {
+        /// The wish.
+        set_point: SetPoint,
+        /// Who sends it.
+        from: Address,
+    },
+    /// A pilot's sticks, each -1..1.
+    Sticks {
+        /// Forward.
+        forward: f64,
+        /// To the left.
+        left: f64,
+        /// Up.
+        up: f64,
+        /// Counter-clockwise from above.
+        turn_left: f64,
+    },
+    /// A station set a parameter; the table has its value.
+    ParameterChanged {
+        /// Its name.
+        name: &'static str,
+    },
+    /// The mission was replaced or cleared.
+    MissionChanged,
+}
+
+/// The autopilot's end of the link: several stations (a companion, a ground-control program) may talk to it
+/// at once, and all of them hear all it says. It speaks PX4's dialect.
+///
+/// Protocols that do not concern flying (streams, parameters, mission transfer, versions) are dealt with in
+/// here; the rest comes out of [`Endpoint::next_request`] as typed wishes.
+#[derive(Debug)]
+pub struct Endpoint {
+    config: EndpointConfig,
+    local: LocalFrame,
+    reader: FrameReader,
+    writer: FrameWriter,
+    streams: Streams,
+    missions: Missions,
+    remembered: Remembered,
+    requests: VecDeque<Request>,
+    /// Index of the next parameter of a list under way.
+    listing: Option<usize>,
+    /// Messages asked for once, sent with the next report.
+    asked_once: Vec<u32>,
+    reported: Option<Reported>,
+}
+
+/// What was last reported of the things whose change is told at once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Reported {
+    mode: FlightMode,
+    armed: bool,
+    failsafe: bool,
+    landed: Landed,
+    home: Option<Vector3<f64>>,
+    mission_item: u16,
+}
+
+impl Reported {
+    fn of(state: &VehicleState) -> Self {
+        Self {
+            mode: state.mode,
+            armed: state.armed,
+            failsafe: state.failsafe,
+            landed: state.landed,
+            home: state.home,
+            mission_item: state.mission_item,
+        }
+    }
+}
+
+impl Endpoint {
+    /// An autopilot's end that has heard nothing yet.
+    pub fn new(config: EndpointConfig) -> Self {
+        Self {
+            local: LocalFrame::new(&config.datum, &config.datum.place()),
+            reader: FrameReader::default(),
+            writer: FrameWriter::new(Address::autopilot(config.system_id)),
+            streams: Streams::default(),
+            missions: Missions::new(config.accepts_item),
+            remembered: Remembered::default(),
+            requests: VecDeque::new(),
+            listing: None,
+            asked_once: Vec::new(),
+            reported: None,
+            config,
+        }
+    }
+
+    /// Takes in bytes from any of the stations. Garbage is skipped, and counted in [`Endpoint::bad_bytes`].
+    pub fn receive(&mut self, now: Duration, bytes: &[u8]) {
+        self.reader.push(bytes);
+        while let Some(frame) = self.reader.next_frame() {
+            let message = &frame.message;
+            let for_me = message.target_system_id().is_some_and(|system| {
+                let component = message.target_component_id().unwrap_or(0);
+                self.writer.sender().is_target(system, component)
+            });
+            // MANUAL_CONTROL names its target differently.
+            if for_me || matches!(message, MavMessage::MANUAL_CONTROL(_)) {
+                self.handle(now, &frame);
+            }
+        }
+    }
+
+    /// The next thing a station asks for, oldest first.
+    pub fn next_request(&mut self) -> Option<Request> {
+        self.requests.pop_front()
+    }
+
+    /// Answers a command.
+    pub fn answer(&mut self, ticket: Ticket, result: CommandResult) {
+        self.remembered.settle(ticket.from, ticket.command, result);
+        if ticket.acknowledged {
+            self.acknowledge(ticket.from, ticket.command, result);
+        }
+    }
+
+    /// To be called at each step of the autopilot: sends the telemetry that is due, and at once what has
+    /// changed in mode, arming, landed state, home and mission item.
+    pub fn report(&mut self, now: Duration, state: &VehicleState) {
+        self.hurry_changes(state);
+        self.missions.tick(now, &mut self.writer);
+        self.list_parameters();
+        let report = Report {
+            now,
+            state,
+            datum: &self.config.datum,
+            local: &self.local,
+            mission_len: self.missions.items().len(),
+        };
+        for message_id in self.asked_once.drain(..) {
+            report.write(message_id, &mut self.writer);
+        }
+        self.streams.for_each_due(now, |message_id| report.write(message_id, &mut self.writer));
+    }
+
+    /// Tells all stations a line, cut at 50 bytes.
+    pub fn text(&mut self, severity: Severity, text: &str) {
+        let mut end = text.len().min(50);
+        while !text.is_char_boundary(end) {
+            end -= 1;
+        }
+        self.writer.write(&STATUSTEXT_DATA {
+            severity: severity.into(),
+            text: CharArray::from(text.get(..end).unwrap_or_default()),
+            ..Default::default()
+        });
+    }
+
+    /// Tells all stations that a mission item has been reached.
+    pub fn item_reached(&mut self, seq: u16) {
+        self.writer.write(&MISSION_ITEM_REACHED_DATA { seq });
+    }
+
+    /// The parameters.
+    pub fn parameters(&self) -> &ParameterTable {
+        &self.config.parameters
+    }
+
+    /// The mission.
+    pub fn mission(&self) -> &[MissionItem] {
+        self.missions.items()
+    }
+
+    /// Takes the bytes to be sent to every station. They are whole frames.
+    pub fn take_output(&mut self) -> Vec<u8> {
+        self.writer.take()
+    }
+
+    /// Bytes skipped so far because they belonged to no intact frame.
+    pub fn bad_bytes(&self) -> u64 {
+        self.reader.bad_bytes()
+    }
+
+    fn handle(&mut self, now: Duration, frame: &Frame) {
+        let from = frame.sender;
+        let output = &mut self.writer;
+        match &frame.message {
+            MavMessage::COMMAND_LONG(message) => self.on_call(now, Call::from_long(from, message)),
+            MavMessage::COMMAND_INT(message) => self.on_call(now, Call::from_int(from, message)),
+            MavMessage::SET_MODE(message) => self.on_set_mode(from, message),
+            MavMessage::SET_POSITION_TARGET_LOCAL_NED(message) => {
+                if let Some(set_point) = SetPoint::decode(message, &self.local) {
+                    self.push(Request::SetPoint { set_point, from });
+                }
+            }
+            MavMessage::MANUAL_CONTROL(message) => self.on_sticks(message),
+            MavMessage::PARAM_REQUEST_LIST(_) => self.listing = Some(0),
+            MavMessage::PARAM_REQUEST_READ(message) => self.on_parameter_read(message),
+            MavMessage::PARAM_SET(message) => self.on_parameter_set(message),
+            MavMessage::MISSION_REQUEST_LIST(message) => {
+                self.missions.on_list(from, message.mission_type, output);
+            }
+            MavMessage::MISSION_REQUEST_INT(message) => {
+                self.missions.on_request(from, message.mission_type, message.seq, output);
+            }
+            MavMessage::MISSION_REQUEST(message) => {
+                self.missions.on_request(from, message.mission_type, message.seq, output);
+            }
+            MavMessage::MISSION_COUNT(message) => {
+                let changed = self.missions.on_count(now, from, message, output);
+                self.push_mission_change(changed);
+            }
+            MavMessage::MISSION_ITEM_INT(message) => {
+                let changed = self.missions.on_item(now, from, message, output);
+                self.push_mission_change(changed);
+            }
+            MavMessage::MISSION_CLEAR_ALL(message) => {
+                let changed = self.missions.on_clear(from, message.mission_type, output);
+                self.push_mission_change(changed);
+            }
+            MavMessage::MISSION_SET_CURRENT(message) => {
+                self.push_unacknowledged(from, AutopilotCommand::SetMissionItem(message.seq));
+            }
+            _ => {}
+        }
+    }
+
+    fn push(&mut self, request: Request) {
+        if self.requests.len() < MAX_REQUESTS {
+            self.requests.push_back(request);
+        }
+    }
+
+    fn push_mission_change(&mut self, changed: bool) {
+        if changed {
+            self.push(Request::MissionChanged);
+        }
+    }
+
+    fn push_unacknowledged(&mut self, from: Address, command: AutopilotCommand) {
+        let ticket = Ticket { from, command: MavCmd::MAV_CMD_DO_SET_MODE, acknowledged: false };
+        self.push(Request::Command { ticket, command, from });
+    }
+
+    fn on_call(&mut self, now: Duration, call: Call) {
+        match self.remembered.note(now, &call) {
+            Novelty::Repetition(None) => return,
+            Novelty::Repetition(Some(result)) => {
+                self.acknowledge(call.from, call.command, result);
+                return;
+            }
+            Novelty::New => {}
+        }
+        if let Some(result) = self.housekeeping(now, &call) {
+            self.remembered.settle(call.from, call.command, result);
+            self.acknowledge(call.from, call.command, result);
+            return;
+        }
+        let home_z_m = self.reported.and_then(|reported| reported.home).map_or(0.0, |home| home.z);
+        let ticket = Ticket { from: call.from, command: call.command, acknowledged: true };
+        match call.meaning(&self.config.datum, home_z_m) {
+            Ok(command) => self.push(Request::Command { ticket, command, from: call.from }),
+            Err(result) => self.answer(ticket, result),
+        }
+    }
+
+    /// Deals with the commands that do not concern flying; `None` for all others.
+    fn housekeeping(&mut self, now: Duration, call: &Call) -> Option<CommandResult> {
+        let [p1, p2, ..] = call.params;
+        let message_id = p1 as u32;
+        let done = match call.command {
+            MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL => {
+                self.streams.wish(now, call.from, message_id, Rate::from_interval_us(p2))
+            }
+            MavCmd::MAV_CMD_GET_MESSAGE_INTERVAL => {
+                self.writer.write(&MESSAGE_INTERVAL_DATA {
+                    interval_us: self.streams.interval_us(message_id),
+                    message_id: message_id as u16,
+                });
+                true
+            }
+            MavCmd::MAV_CMD_REQUEST_MESSAGE if message_id == PROTOCOL_VERSION_DATA::ID => {
+                self.send_protocol_version()
+            }
+            MavCmd::MAV_CMD_REQUEST_PROTOCOL_VERSION => self.send_protocol_version(),
+            MavCmd::MAV_CMD_REQUEST_MESSAGE => self.ask_once(message_id),
+            MavCmd::MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES => self.ask_once(AUTOPILOT_VERSION_DATA::ID),
+            MavCmd::MAV_CMD_GET_HOME_POSITION => self.ask_once(HOME_POSITION_DATA::ID),
+            _ => return None,
+        };
+        Some(if done { CommandResult::Accepted } else { CommandResult::Unsupported })
+    }
+
+    /// Has a message sent with the next report. Returns whether there is such a message.
+    fn ask_once(&mut self, message_id: u32) -> bool {
+        let known = self.streams.contains(message_id);
+        if known && !self.asked_once.contains(&message_id) {
+            self.asked_once.push(message_id);
+        }
+        known
+    }
+
+    fn send_protocol_version(&mut self) -> bool {
+        self.writer.write(&PROTOCOL_VERSION_DATA {
+            version: 200,
+            min_version: 100,
+            max_version: 200,
+            ..Default::default()
+        });
+        true
+    }
+
+    fn acknowledge(&mut self, to: Address, command: MavCmd, result: CommandResult) {
+        self.writer.write(&COMMAND_ACK_DATA {
+            command,
+            result: result.to_ack(),
+            target_system: to.system_id,
+            target_component: to.component_id,
+            ..Default::default()
+        });
+    }
+
+    fn on_set_mode(&mut self, from: Address, message: &SET_MODE_DATA) {
+        let custom = MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED;
+        let mode = FlightMode::from_custom(AutopilotKind::Px4, message.custom_mode);
+        if message.base_mode.contains(custom) && !matches!(mode, FlightMode::Other(_)) {
+            self.push_unacknowledged(from, AutopilotCommand::SetMode(mode));
+        }
+    }
+
+    fn on_sticks(&mut self, message: &MANUAL_CONTROL_DATA) {
+        // An axis that is not there is i16::MAX; the throttle axis rests at 500 of 0..1000.
+        let axis = |value: i16| match value {
+            -1000..=1000 => f64::from(value) / 1000.0,
+            _ => 0.0,
+        };
+        let up = if (0..=1000).contains(&message.z) { f64::from(message.z) / 500.0 - 1.0 } else { 0.0 };
+        if message.target == self.config.system_id || message.target == 0 {
+            self.push(Request::Sticks {
+                forward: axis(message.x),
+                left: -axis(message.y),
+                up,
+                turn_left: -axis(message.r),
+            });
+        }
+    }
+
+    fn on_parameter_read(&mut self, message: &PARAM_REQUEST_READ_DATA) {
+        let table = &self.config.parameters;
+        let index = match usize::try_from(message.param_index) {
+            Ok(index) => Some(index),
+            Err(_) => table.find(name_from_wire(&message.param_id)).map(|(index, _)| index),
+        };
+        if let Some(index) = index {
+            self.send_parameter(index);
+        }
+    }
+
+    /// Sets a parameter and tells its value, also when it was refused and kept the old one.
+    fn on_parameter_set(&mut self, message: &PARAM_SET_DATA) {
+        let name = name_from_wire(&message.param_id);
+        let value = ParameterValue::decode(message.param_value, message.param_type, AutopilotKind::Px4);
+        let outcome = self.config.parameters.set(name, value);
+        if let Some((index, entry)) = self.config.parameters.find(name) {
+            let name = entry.name;
+            self.send_parameter(index);
+            if outcome.is_ok() {
+                self.push(Request::ParameterChanged { name });
+            }
+        }
+        if let Err(error) = outcome {
+            self.text(Severity::Warning, &error.to_string());
+        }
+    }
+
+    fn send_parameter(&mut self, index: usize) {
+        let table = &self.config.parameters;
+        if let Some(entry) = table.at(index) {
+            let (param_value, param_type) = entry.value.encode(AutopilotKind::Px4);
+            self.writer.write(&PARAM_VALUE_DATA {
+                param_value,
+                param_count: table.len() as u16,
+                param_index: index as u16,
+                param_id: wire_name(entry.name),
+                param_type,
+            });
+        }
+    }
+
+    fn list_parameters(&mut self) {
+        let Some(first) = self.listing else {
+            return;
+        };
+        let end = first + LISTED_PER_REPORT;
+        for index in first..end {
+            self.send_parameter(index);
+        }
+        self.listing = (end < self.config.parameters.len()).then_some(end);
+    }
+
+    fn hurry_changes(&mut self, state: &VehicleState) {
+        let current = Reported::of(state);
+        if self.reported == Some(current) {
+            return;
+        }
+        if let Some(last) = self.reported.replace(current) {
+            let heart = |it: &Reported| (it.mode, it.armed, it.failsafe);
+            if heart(&last) != heart(&current) {
+                self.streams.hurry(HEARTBEAT_DATA::ID);
+            }
+            if last.landed != current.landed {
+                self.streams.hurry(EXTENDED_SYS_STATE_DATA::ID);
+            }
+            if last.home != current.home {
+                self.streams.hurry(HOME_POSITION_DATA::ID);
+            }
+            if last.mission_item != current.mission_item {
+                self.streams.hurry(MISSION_CURRENT_DATA::ID);
+            }
+        }
+    }
+}

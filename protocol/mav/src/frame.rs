@@ -1,0 +1,241 @@
+//! Frames: MAVLink 1 and 2 packets to and from bytes, whatever carries the bytes.
+
+use mavlink::dialects::common::MavMessage;
+use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc, consts};
+
+/// Who speaks: a MAVLink system and one component of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Address {
+    /// System id, 1..=255. Vehicles have one each; ground stations use 255 downwards.
+    pub system_id: u8,
+    /// Component id: 1 is the autopilot, 190 a ground station, 191 a companion computer.
+    pub component_id: u8,
+}
+
+impl Address {
+    /// The autopilot component of a system.
+    pub fn autopilot(system_id: u8) -> Self {
+        Self { system_id, component_id: 1 }
+    }
+
+    /// Whether a message for `(target_system, target_component)` is meant for this address; 0 means everyone.
+    pub fn is_target(&self, target_system: u8, target_component: u8) -> bool {
+        (target_system == 0 || target_system == self.system_id)
+            && (target_component == 0 || target_component == self.component_id)
+    }
+}
+
+/// One message, and who sent it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// Sender.
+    pub sender: Address,
+    /// The sender's packet counter, which wraps at 256.
+    pub sequence: u8,
+    /// Content.
+    pub message: MavMessage,
+}
+
+/// Turns bytes into frames. Bytes that belong to no intact frame are skipped and counted, one at a time, so
+/// that a marker inside garbage is never lost.
+///
+/// Signed frames are read and their signature is not checked.
+///
+/// ```
+/// use mavlink::dialects::common::HEARTBEAT_DATA;
+/// use skein_mav::{Address, FrameReader, FrameWriter};
+///
+/// let mut writer = FrameWriter::new(Address { system_id: 1, component_id: 191 });
+/// writer.write(&HEARTBEAT_DATA::default());
+///
+/// let mut reader = FrameReader::default();
+/// reader.push(b"noise");
+/// reader.push(&writer.take());
+/// assert_eq!(reader.next_frame().map(|frame| frame.sender.component_id), Some(191));
+/// assert_eq!(reader.bad_bytes(), 5);
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct FrameReader {
+    buffer: Vec<u8>,
+    /// Bytes of `buffer` already consumed.
+    start: usize,
+    bad_bytes: u64,
+    unknown_messages: u64,
+}
+
+/// What the front of the buffer holds.
+enum Candidate {
+    /// Not a frame: skip one byte.
+    Garbage,
+    /// Perhaps a frame, once more bytes are here.
+    Incomplete,
+    /// An intact frame of this length.
+    Intact(Layout),
+}
+
+/// Where things are in an intact frame.
+struct Layout {
+    version: MavlinkVersion,
+    sender: Address,
+    sequence: u8,
+    message_id: u32,
+    payload: std::ops::Range<usize>,
+    frame_len: usize,
+}
+
+impl FrameReader {
+    /// Takes in bytes as they came.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.buffer.drain(..self.start);
+        self.start = 0;
+        self.buffer.extend_from_slice(bytes);
+    }
+
+    /// The next intact frame whose message the common dialect knows, or `None` until more bytes come.
+    pub fn next_frame(&mut self) -> Option<Frame> {
+        loop {
+            self.skip_to_marker();
+            let bytes = self.buffer.get(self.start..).unwrap_or_default();
+            match examine(bytes) {
+                Candidate::Incomplete => return None,
+                Candidate::Garbage => self.skip(1),
+                Candidate::Intact(layout) => {
+                    let payload = bytes.get(layout.payload).unwrap_or_default();
+                    let parsed = MavMessage::parse(layout.version, layout.message_id, payload);
+                    self.start += layout.frame_len;
+                    match parsed {
+                        Ok(message) => {
+                            return Some(Frame { sender: layout.sender, sequence: layout.sequence, message });
+                        }
+                        Err(_) => self.unknown_messages += 1,
+                    }
+                }
+            }
+        }
+    }
+
+    /// Bytes skipped so far because they belonged to no intact frame of a known message.
+    pub fn bad_bytes(&self) -> u64 {
+        self.bad_bytes
+    }
+
+    /// Intact frames skipped so far because their content is not in the common dialect (an enumeration value
+    /// that is newer, for example).
+    pub fn unknown_messages(&self) -> u64 {
+        self.unknown_messages
+    }
+
+    fn skip_to_marker(&mut self) {
+        let rest = self.buffer.get(self.start..).unwrap_or_default();
+        let is_marker = |byte: &u8| *byte == mavlink::MAV_STX || *byte == mavlink::MAV_STX_V2;
+        let garbage = rest.iter().position(is_marker).unwrap_or(rest.len());
+        self.skip(garbage);
+    }
+
+    fn skip(&mut self, bytes: usize) {
+        self.start += bytes;
+        self.bad_bytes += bytes as u64;
+    }
+}
+
+/// Reads the front of `bytes`, which is empty or begins with a marker.
+fn examine(bytes: &[u8]) -> Candidate {
+    let (version, header_len, signature_len) = match *bytes {
+        [mavlink::MAV_STX, ..] => (MavlinkVersion::V1, consts::v1::HEADER_SIZE, 0),
+        [mavlink::MAV_STX_V2, _, 0, ..] => (MavlinkVersion::V2, consts::v2::MIN_HEADER_SIZE, 0),
+        [mavlink::MAV_STX_V2, _, consts::v2::IFLAG_SIGNED, ..] => {
+            (MavlinkVersion::V2, consts::v2::MIN_HEADER_SIZE, consts::v2::SIGNATURE_SIZE)
+        }
+        // Incompatible by its own word.
+        [mavlink::MAV_STX_V2, _, _, ..] => return Candidate::Garbage,
+        _ => return Candidate::Incomplete,
+    };
+    let payload_start = consts::STX_SIZE + header_len;
+    let payload_len = bytes.get(consts::PAYLOAD_LEN_OFFSET).map_or(0, |len| usize::from(*len));
+    let checksum_start = payload_start + payload_len;
+    let frame_len = checksum_start + consts::CHECKSUM_SIZE + signature_len;
+    let Some(frame) = bytes.get(..frame_len) else {
+        return Candidate::Incomplete;
+    };
+    let (sequence, system_id, component_id, message_id) = match (version, frame) {
+        (MavlinkVersion::V1, [_, _, sequence, system, component, id, ..]) => {
+            (*sequence, *system, *component, u32::from(*id))
+        }
+        (MavlinkVersion::V2, [_, _, _, _, sequence, system, component, a, b, c, ..]) => {
+            (*sequence, *system, *component, u32::from_le_bytes([*a, *b, *c, 0]))
+        }
+        _ => return Candidate::Garbage,
+    };
+    let (Some(covered), Some(&[low, high])) = (
+        frame.get(consts::STX_SIZE..checksum_start),
+        frame.get(checksum_start..checksum_start + consts::CHECKSUM_SIZE),
+    ) else {
+        return Candidate::Garbage;
+    };
+    if calculate_crc(covered, MavMessage::extra_crc(message_id)) != u16::from_le_bytes([low, high]) {
+        return Candidate::Garbage;
+    }
+    Candidate::Intact(Layout {
+        version,
+        sender: Address { system_id, component_id },
+        sequence,
+        message_id,
+        payload: payload_start..checksum_start,
+        frame_len,
+    })
+}
+
+/// Turns messages into MAVLink 2 frames of one sender, and collects the bytes.
+#[derive(Debug, Clone)]
+pub struct FrameWriter {
+    sender: Address,
+    sequence: u8,
+    buffer: Vec<u8>,
+}
+
+impl FrameWriter {
+    /// A writer for frames from `sender`.
+    pub fn new(sender: Address) -> Self {
+        Self { sender, sequence: 0, buffer: Vec::new() }
+    }
+
+    /// Who the frames are from.
+    pub fn sender(&self) -> Address {
+        self.sender
+    }
+
+    /// Appends one message.
+    pub fn write<D: MessageData>(&mut self, message: &D) {
+        let mut payload = [0; consts::MAX_PAYLOAD_LEN];
+        let payload_len = message.ser(MavlinkVersion::V2, &mut payload);
+        let [id0, id1, id2, _] = D::ID.to_le_bytes();
+        let frame_start = self.buffer.len();
+        self.buffer.extend_from_slice(&[
+            mavlink::MAV_STX_V2,
+            payload_len as u8,
+            0,
+            0,
+            self.sequence,
+            self.sender.system_id,
+            self.sender.component_id,
+            id0,
+            id1,
+            id2,
+        ]);
+        self.buffer.extend(payload.iter().take(payload_len));
+        let covered = self.buffer.get(frame_start + 1..).unwrap_or_default();
+        let crc = calculate_crc(covered, D::EXTRA_CRC);
+        self.buffer.extend_from_slice(&crc.to_le_bytes());
+        self.sequence = self.sequence.wrapping_add(1);
+    }
+
+    /// Whether nothing is waiting to be sent.
+    pub fn is_empty(&self) -> bool {
+        self.buffer.is_empty()
+    }
+
+    /// Takes the bytes written since the last call.
+    pub fn take(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.buffer)
+    }
+}

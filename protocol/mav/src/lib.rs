@@ -1,0 +1,56 @@
+//! MAVLink without I/O: frames, set-points, commands, mission and parameter protocols, at both ends of the
+//! link.
+//!
+//! - [`Companion`] is the end of a vehicle's program. It flies PX4, ArduPilot and Skein's built-in autopilot,
+//!   and learns from the heartbeat which of them it is talking to.
+//! - [`Endpoint`] is the end of an autopilot: what Skein's built-in one is reached through.
+//! - [`FrameReader`] and [`FrameWriter`] are the packets under both.
+//! - [`Datum`] and the [`axes`] are the only place where north-east-down and forward-right-down exist. All
+//!   that enters and leaves this crate is ENU about one datum, with bodies FLU.
+//!
+//! Nothing here reads a clock or a socket: time is the run's `now`, and bytes are passed in and taken out.
+//!
+//! ```
+//! use std::time::Duration;
+//! use skein_mav::{Companion, CompanionConfig, Datum, SetPoint};
+//!
+//! let datum = Datum::from_degrees(47.397742, 8.545594, 488.0);
+//! let mut companion = Companion::new(CompanionConfig::new(1, datum));
+//! let now = Duration::from_millis(20);
+//! companion.receive(now, b"bytes from a socket");
+//! companion.tick(now);
+//! let velocity = nalgebra::Vector3::new(1.0, 0.0, 0.0);
+//! companion.set_point(now, SetPoint::Velocity { velocity, yaw: None });
+//! let bytes_for_the_socket = companion.take_output();
+//! # assert!(!bytes_for_the_socket.is_empty());
+//! ```
+
+// MAVLink marks messages and frames as superseded that deployed autopilots and ground stations still send.
+#![expect(deprecated)]
+
+pub mod axes;
+mod command;
+mod companion;
+mod endpoint;
+mod frame;
+mod geodesy;
+mod mission;
+mod mode;
+mod parameter;
+mod set_point;
+mod telemetry;
+
+pub use command::{Command, CommandResult};
+pub use companion::{Companion, CompanionConfig, HEARTBEAT_TIMEOUT, MavEvent};
+pub use endpoint::{
+    AutopilotCommand, Endpoint, EndpointConfig, Parameter, ParameterError, ParameterTable, Request, Ticket,
+    VehicleState,
+};
+pub use frame::{Address, Frame, FrameReader, FrameWriter};
+pub use geodesy::{Datum, Geodetic, LocalFrame};
+pub use mavlink::dialects::common as dialect;
+pub use mission::{MAX_ITEMS, MissionError, MissionItem};
+pub use mode::{AutopilotKind, FlightMode};
+pub use parameter::ParameterValue;
+pub use set_point::SetPoint;
+pub use telemetry::{Battery, Landed, Severity, Stamped, Telemetry, Text};

@@ -1,0 +1,288 @@
+//! Missions: the list of items an autopilot flies by itself or a ground station shows, and the transfer of
+//! such a list in either direction (`MISSION_COUNT`, `MISSION_REQUEST_INT`, `MISSION_ITEM_INT`,
+//! `MISSION_ACK`).
+//!
+//! A transfer has two roles, whichever end asked for it: one end announces and sends the items, the other
+//! asks for each in turn. Both ends of this crate use the same two state machines, which repeat themselves
+//! until answered, so that a transfer survives loss in either direction.
+
+use std::time::Duration;
+
+use mavlink::dialects::common::{MISSION_ITEM_INT_DATA, MavCmd, MavFrame, MavMissionResult, MavMissionType};
+use nalgebra::Vector3;
+
+use crate::frame::Address;
+use crate::geodesy::{Datum, Geodetic};
+
+/// How long a transfer waits before it repeats itself.
+const RETRY: Duration = Duration::from_millis(250);
+/// How often it repeats itself before it gives up.
+const MAX_REPEATS: u32 = 12;
+/// Longest mission that is taken in, items. A longer one is refused, so that no peer can fill the memory.
+pub const MAX_ITEMS: u16 = 2000;
+
+/// One item of a mission, in MAVLink's own terms so that what is read back is exactly what was sent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MissionItem {
+    /// What to do; a waypoint is `MAV_CMD_NAV_WAYPOINT`.
+    pub command: MavCmd,
+    /// What `x`, `y`, `z` mean.
+    pub frame: MavFrame,
+    /// The command's parameters 1 to 4. For a waypoint: seconds to stay, acceptance radius in metres, pass-by
+    /// radius, heading in degrees clockwise from north (NaN: any).
+    pub params: [f32; 4],
+    /// Parameter 5: latitude in 1e-7 degrees in a global frame.
+    pub x: i32,
+    /// Parameter 6: longitude in 1e-7 degrees in a global frame.
+    pub y: i32,
+    /// Parameter 7: height in metres, above home or above mean sea level as the frame says.
+    pub z: f32,
+    /// Whether the next item follows by itself.
+    pub autocontinue: bool,
+}
+
+impl MissionItem {
+    /// A waypoint at a world position (ENU, metres), with its height given absolutely, where to stay `hold_s`
+    /// seconds.
+    pub fn waypoint(datum: &Datum, position: &Vector3<f64>, hold_s: f32) -> Self {
+        let place = datum.to_geodetic(position);
+        Self {
+            command: MavCmd::MAV_CMD_NAV_WAYPOINT,
+            frame: MavFrame::MAV_FRAME_GLOBAL_INT,
+            params: [hold_s, 0.0, 0.0, f32::NAN],
+            x: place.latitude_e7(),
+            y: place.longitude_e7(),
+            z: place.height_m as f32,
+            autocontinue: true,
+        }
+    }
+
+    /// World position (ENU, metres) of an item in a global frame; heights above home are added to
+    /// `home_height_m` (metres in the vertical reference of the datum). `None` for other frames and for an
+    /// item that gives no place (0, 0 by convention).
+    pub fn position(&self, datum: &Datum, home_height_m: f64) -> Option<Vector3<f64>> {
+        let base = match self.frame {
+            MavFrame::MAV_FRAME_GLOBAL | MavFrame::MAV_FRAME_GLOBAL_INT => 0.0,
+            MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT | MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT_INT => {
+                home_height_m
+            }
+            _ => return None,
+        };
+        if (self.x == 0 && self.y == 0) || !self.z.is_finite() {
+            return None;
+        }
+        let mut place = Geodetic::from_e7(self.x, self.y, 0);
+        place.height_m = base + f64::from(self.z);
+        Some(datum.to_enu(&place))
+    }
+
+    pub(crate) fn to_message(self, seq: u16, target: Address) -> MISSION_ITEM_INT_DATA {
+        let [param1, param2, param3, param4] = self.params;
+        MISSION_ITEM_INT_DATA {
+            param1,
+            param2,
+            param3,
+            param4,
+            x: self.x,
+            y: self.y,
+            z: self.z,
+            seq,
+            command: self.command,
+            target_system: target.system_id,
+            target_component: target.component_id,
+            frame: self.frame,
+            current: 0,
+            autocontinue: u8::from(self.autocontinue),
+            mission_type: MavMissionType::MAV_MISSION_TYPE_MISSION,
+        }
+    }
+
+    pub(crate) fn from_message(message: &MISSION_ITEM_INT_DATA) -> Self {
+        Self {
+            command: message.command,
+            frame: message.frame,
+            params: [message.param1, message.param2, message.param3, message.param4],
+            x: message.x,
+            y: message.y,
+            z: message.z,
+            autocontinue: message.autocontinue != 0,
+        }
+    }
+}
+
+/// Why a transfer did not end well.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MissionError {
+    /// The other end stopped answering.
+    #[error("the other end stopped answering during the mission transfer: check the link and repeat it")]
+    TimedOut,
+    /// The other end refused.
+    #[error("the other end refused the mission: {0:?}")]
+    Refused(MavMissionResult),
+    /// The list is longer than [`MAX_ITEMS`].
+    #[error("the mission has {items} items, at most {MAX_ITEMS} are taken: split it")]
+    TooLong {
+        /// Its length.
+        items: usize,
+    },
+    /// Another transfer began before this one had ended.
+    #[error("another mission transfer began before this one had ended")]
+    Superseded,
+}
+
+/// A patience: when to repeat, and how often it has been done.
+#[derive(Debug, Clone)]
+struct Patience {
+    repeat_at: Duration,
+    repeats: u32,
+}
+
+/// What to do now.
+#[derive(Debug, PartialEq)]
+enum Turn {
+    Wait,
+    Repeat,
+    GiveUp,
+}
+
+impl Patience {
+    fn new(now: Duration) -> Self {
+        Self { repeat_at: now + RETRY, repeats: 0 }
+    }
+
+    fn turn(&mut self, now: Duration) -> Turn {
+        if now < self.repeat_at {
+            return Turn::Wait;
+        }
+        if self.repeats == MAX_REPEATS {
+            return Turn::GiveUp;
+        }
+        self.repeats += 1;
+        self.repeat_at = now + RETRY;
+        Turn::Repeat
+    }
+}
+
+/// What the sending role says next.
+#[derive(Debug, PartialEq)]
+pub(crate) enum SenderMessage {
+    Count(u16),
+    Item(u16, MissionItem),
+}
+
+/// The sending role of a transfer.
+#[derive(Debug, Clone)]
+pub(crate) struct MissionSender {
+    items: Vec<MissionItem>,
+    /// The item sent last; `None` while only the count has been announced.
+    last_sent: Option<u16>,
+    patience: Patience,
+}
+
+impl MissionSender {
+    /// Begins: the caller sends the [`SenderMessage::Count`] of [`Self::repeat`].
+    pub(crate) fn new(now: Duration, items: Vec<MissionItem>) -> Self {
+        Self { items, last_sent: None, patience: Patience::new(now) }
+    }
+
+    /// Answers a request for an item; `None` for one that does not exist.
+    pub(crate) fn on_request(&mut self, now: Duration, seq: u16) -> Option<SenderMessage> {
+        let item = *self.items.get(usize::from(seq))?;
+        self.last_sent = Some(seq);
+        self.patience = Patience::new(now);
+        Some(SenderMessage::Item(seq, item))
+    }
+
+    /// What was said last, to be said again.
+    pub(crate) fn repeat(&self) -> SenderMessage {
+        let item = |seq| self.items.get(usize::from(seq)).map(|item| (seq, *item));
+        match self.last_sent.and_then(item) {
+            Some((seq, item)) => SenderMessage::Item(seq, item),
+            None => SenderMessage::Count(self.items.len() as u16),
+        }
+    }
+
+    /// To be called often: what to say again, if anything, or that the other end is gone.
+    pub(crate) fn tick(&mut self, now: Duration) -> Result<Option<SenderMessage>, MissionError> {
+        match self.patience.turn(now) {
+            Turn::Wait => Ok(None),
+            Turn::Repeat => Ok(Some(self.repeat())),
+            Turn::GiveUp => Err(MissionError::TimedOut),
+        }
+    }
+}
+
+/// What the receiving role says next.
+#[derive(Debug, PartialEq)]
+pub(crate) enum ReceiverMessage {
+    /// `MISSION_REQUEST_LIST`.
+    List,
+    /// `MISSION_REQUEST_INT`.
+    Item(u16),
+}
+
+/// The receiving role of a transfer.
+#[derive(Debug, Clone)]
+pub(crate) struct MissionReceiver {
+    /// How many items there are; `None` until the other end has said so.
+    count: Option<u16>,
+    items: Vec<MissionItem>,
+    patience: Patience,
+}
+
+impl MissionReceiver {
+    /// Begins by asking for the list.
+    pub(crate) fn new(now: Duration) -> Self {
+        Self { count: None, items: Vec::new(), patience: Patience::new(now) }
+    }
+
+    /// The number of items, announced by the sending role.
+    pub(crate) fn on_count(&mut self, now: Duration, count: u16) -> Result<(), MissionError> {
+        if count > MAX_ITEMS {
+            return Err(MissionError::TooLong { items: usize::from(count) });
+        }
+        if self.count != Some(count) {
+            self.count = Some(count);
+            self.items.clear();
+        }
+        self.patience = Patience::new(now);
+        Ok(())
+    }
+
+    /// An item arrived. Returns whether it was the one asked for.
+    pub(crate) fn on_item(&mut self, now: Duration, seq: u16, item: MissionItem) -> bool {
+        if usize::from(seq) != self.items.len() || self.is_complete() || self.count.is_none() {
+            return false;
+        }
+        self.items.push(item);
+        self.patience = Patience::new(now);
+        true
+    }
+
+    /// Whether everything announced is here.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.count.is_some_and(|count| self.items.len() == usize::from(count))
+    }
+
+    /// The items; sensible once complete.
+    pub(crate) fn into_items(self) -> Vec<MissionItem> {
+        self.items
+    }
+
+    /// What to ask for now.
+    pub(crate) fn request(&self) -> ReceiverMessage {
+        match self.count {
+            None => ReceiverMessage::List,
+            Some(_) => ReceiverMessage::Item(self.items.len() as u16),
+        }
+    }
+
+    /// To be called often: what to ask for again, if anything, or that the other end is gone.
+    pub(crate) fn tick(&mut self, now: Duration) -> Result<Option<ReceiverMessage>, MissionError> {
+        match self.patience.turn(now) {
+            Turn::Wait => Ok(None),
+            Turn::Repeat => Ok(Some(self.request())),
+            Turn::GiveUp => Err(MissionError::TimedOut),
+        }
+    }
+}

@@ -1,0 +1,475 @@
+//! Between the protocol's records and their protobuf forms.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use nalgebra::Vector3;
+use skein_bp::{Event, EventSet, Pattern, Real, Value};
+use skein_dbp::{
+    BidAck, BidRecord, NodeName, Occurrence, OnLoss, Presence, Refusal, RefusalReason, RemoteBid, Repair,
+    ServedRequest,
+};
+
+use crate::proto::{self, event_set, value::Kind};
+use crate::{DecodeError, State};
+
+type Result<T> = std::result::Result<T, DecodeError>;
+
+fn node(field: &'static str, name: &str) -> Result<NodeName> {
+    NodeName::new(name).map_err(|source| DecodeError::Name { field, source })
+}
+
+fn text(name: &NodeName) -> String {
+    name.as_str().into()
+}
+
+fn ns(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}
+
+fn required<T>(field: &'static str, value: Option<T>) -> Result<T> {
+    value.ok_or(DecodeError::Missing { field })
+}
+
+/// Numbers of epochs, occurrences and synchronisation points start at 1 and stay below 2^63.
+fn number(field: &'static str, given: u64, least: u64) -> Result<u64> {
+    if given >= least && i64::try_from(given).is_ok() {
+        Ok(given)
+    } else {
+        let expected = if least == 0 { "a number below 2^63" } else { "a number from 1 to 2^63 - 1" };
+        Err(DecodeError::Range { field, given: given.to_string(), expected })
+    }
+}
+
+fn finite(field: &'static str, given: f64) -> Result<f64> {
+    if given.is_finite() {
+        Ok(given)
+    } else {
+        Err(DecodeError::Range { field, given: given.to_string(), expected: "a finite number" })
+    }
+}
+
+fn not_negative(field: &'static str, given: f64) -> Result<f64> {
+    if given.is_finite() && given >= 0.0 {
+        Ok(given)
+    } else {
+        Err(DecodeError::Range { field, given: given.to_string(), expected: "a finite number of at least 0" })
+    }
+}
+
+impl From<&Value> for proto::Value {
+    fn from(value: &Value) -> Self {
+        let kind = match value {
+            Value::Bool(flag) => Kind::Flag(*flag),
+            Value::Int(integer) => Kind::Integer(*integer),
+            Value::Real(real) => Kind::Real(real.get()),
+            Value::Text(text) => Kind::Text(text.as_ref().into()),
+        };
+        Self { kind: Some(kind) }
+    }
+}
+
+impl TryFrom<proto::Value> for Value {
+    type Error = DecodeError;
+
+    fn try_from(value: proto::Value) -> Result<Self> {
+        Ok(match required("Value.kind", value.kind)? {
+            Kind::Flag(flag) => flag.into(),
+            Kind::Integer(integer) => integer.into(),
+            Kind::Real(real) => real.into(),
+            Kind::Text(text) => text.into(),
+        })
+    }
+}
+
+impl From<&Event> for proto::Event {
+    fn from(event: &Event) -> Self {
+        Self {
+            name: event.name().into(),
+            data: event.data().map(|(key, value)| (key.into(), value.into())).collect(),
+        }
+    }
+}
+
+impl TryFrom<proto::Event> for Event {
+    type Error = DecodeError;
+
+    fn try_from(event: proto::Event) -> Result<Self> {
+        if event.name.is_empty() {
+            return Err(DecodeError::Missing { field: "Event.name" });
+        }
+        event.data.into_iter().try_fold(Event::new(event.name), |event, (key, value)| {
+            Ok(event.with(key, Value::try_from(value)?))
+        })
+    }
+}
+
+fn vec3(x: f64, y: f64, z: f64) -> proto::Vec3 {
+    proto::Vec3 { x, y, z }
+}
+
+impl From<&EventSet> for proto::EventSet {
+    fn from(set: &EventSet) -> Self {
+        use event_set::{Form, List};
+        let list = |sets: &[EventSet]| List { sets: sets.iter().map(Into::into).collect() };
+        let corner = |corner: &[Real; 3]| Some(vec3(corner[0].get(), corner[1].get(), corner[2].get()));
+        let form = match set {
+            EventSet::None => Form::None(event_set::Unit {}),
+            EventSet::All => Form::All(event_set::Unit {}),
+            EventSet::Exactly(event) => Form::Exactly(event.into()),
+            EventSet::Named(pattern) if pattern.is_literal() => Form::Name(pattern.as_str().into()),
+            EventSet::Named(pattern) => Form::Named(pattern.as_str().into()),
+            EventSet::Prefix(prefix) => Form::Prefix(prefix.as_ref().into()),
+            EventSet::FieldRange { key, min, max } => {
+                Form::Range(event_set::Range { key: key.as_ref().into(), min: min.get(), max: max.get() })
+            }
+            EventSet::FieldIs(fields) => Form::Fields(event_set::Fields {
+                fields: fields.iter().map(|(key, value)| (key.as_ref().into(), value.into())).collect(),
+            }),
+            EventSet::Region { min, max } => {
+                Form::Region(event_set::Region { min: corner(min), max: corner(max) })
+            }
+            EventSet::Not(set) => Form::Not(Box::new(set.as_ref().into())),
+            EventSet::And(sets) => Form::And(list(sets)),
+            EventSet::Or(sets) => Form::Or(list(sets)),
+        };
+        Self { form: Some(form) }
+    }
+}
+
+impl TryFrom<proto::EventSet> for EventSet {
+    type Error = DecodeError;
+
+    /// Ends for any input: the decoder has bounded the tree's depth.
+    fn try_from(set: proto::EventSet) -> Result<Self> {
+        use event_set::Form;
+        let list =
+            |list: event_set::List| list.sets.into_iter().map(EventSet::try_from).collect::<Result<Vec<_>>>();
+        let corner = |corner: proto::Vec3| [corner.x, corner.y, corner.z].map(Real::from);
+        Ok(match required("EventSet.form", set.form)? {
+            Form::None(_) => Self::None,
+            Form::All(_) => Self::All,
+            Form::Exactly(event) => Self::Exactly(event.try_into()?),
+            Form::Named(pattern) => Self::Named(Pattern::new(pattern)),
+            Form::Name(name) => Self::Named(Pattern::literal(name)),
+            Form::Prefix(prefix) => Self::Prefix(prefix.into()),
+            Form::Range(range) => {
+                Self::FieldRange { key: range.key.into(), min: range.min.into(), max: range.max.into() }
+            }
+            Form::Fields(fields) => Self::FieldIs(
+                fields
+                    .fields
+                    .into_iter()
+                    .map(|(key, value)| Ok((Arc::from(key), Value::try_from(value)?)))
+                    .collect::<Result<BTreeMap<_, _>>>()?,
+            ),
+            Form::Region(region) => Self::Region {
+                min: corner(required("EventSet.region.min", region.min)?),
+                max: corner(required("EventSet.region.max", region.max)?),
+            },
+            Form::Not(set) => Self::Not(Box::new((*set).try_into()?)),
+            Form::And(sets) => Self::And(list(sets)?),
+            Form::Or(sets) => Self::Or(list(sets)?),
+        })
+    }
+}
+
+impl From<&RemoteBid> for proto::RemoteBid {
+    fn from(bid: &RemoteBid) -> Self {
+        let on_loss = match bid.on_loss {
+            OnLoss::Release => proto::OnLoss::Release,
+            OnLoss::Hold => proto::OnLoss::Hold,
+        };
+        Self {
+            bthread: bid.bthread.clone(),
+            sync: bid.sync,
+            requests: bid.requests.iter().map(Into::into).collect(),
+            block: (!bid.block.is_none()).then(|| (&bid.block).into()),
+            priority: bid.priority,
+            on_loss: on_loss.into(),
+        }
+    }
+}
+
+impl TryFrom<proto::RemoteBid> for RemoteBid {
+    type Error = DecodeError;
+
+    fn try_from(bid: proto::RemoteBid) -> Result<Self> {
+        let on_loss = match proto::OnLoss::try_from(bid.on_loss) {
+            Ok(proto::OnLoss::Release) => OnLoss::Release,
+            Ok(proto::OnLoss::Hold) => OnLoss::Hold,
+            Err(_) => {
+                let given = bid.on_loss.to_string();
+                return Err(DecodeError::Range {
+                    field: "RemoteBid.on_loss",
+                    given,
+                    expected: "0 (release) or 1 (hold)",
+                });
+            }
+        };
+        Ok(Self {
+            bthread: bid.bthread,
+            sync: number("RemoteBid.sync", bid.sync, 1)?,
+            requests: bid.requests.into_iter().map(Event::try_from).collect::<Result<_>>()?,
+            block: bid.block.map_or(Ok(EventSet::None), EventSet::try_from)?,
+            priority: bid.priority,
+            on_loss,
+        })
+    }
+}
+
+impl From<&BidRecord> for proto::BidRecord {
+    fn from(record: &BidRecord) -> Self {
+        Self {
+            node: text(&record.node),
+            incarnation: record.incarnation,
+            home: text(&record.home),
+            home_incarnation: record.home_incarnation,
+            epoch: record.epoch,
+            sent_at_ns: ns(record.sent_at),
+            applied: record.applied,
+            lease_ms: record.lease_ms,
+            bids: record.bids.iter().map(Into::into).collect(),
+        }
+    }
+}
+
+impl TryFrom<proto::BidRecord> for BidRecord {
+    type Error = DecodeError;
+
+    fn try_from(record: proto::BidRecord) -> Result<Self> {
+        Ok(Self {
+            node: node("BidRecord.node", &record.node)?,
+            incarnation: record.incarnation,
+            home: node("BidRecord.home", &record.home)?,
+            home_incarnation: record.home_incarnation,
+            epoch: number("BidRecord.epoch", record.epoch, 1)?,
+            sent_at: Duration::from_nanos(record.sent_at_ns),
+            applied: number("BidRecord.applied", record.applied, 0)?,
+            lease_ms: record.lease_ms,
+            bids: record.bids.into_iter().map(RemoteBid::try_from).collect::<Result<_>>()?,
+        })
+    }
+}
+
+impl From<&BidAck> for proto::BidAck {
+    fn from(ack: &BidAck) -> Self {
+        Self {
+            home: text(&ack.home),
+            home_incarnation: ack.home_incarnation,
+            node: text(&ack.node),
+            incarnation: ack.incarnation,
+            epoch: ack.epoch,
+            sent_at_ns: ns(ack.sent_at),
+            latest_seq: ack.latest_seq,
+            refused: ack.refused.iter().map(Into::into).collect(),
+        }
+    }
+}
+
+impl TryFrom<proto::BidAck> for BidAck {
+    type Error = DecodeError;
+
+    fn try_from(ack: proto::BidAck) -> Result<Self> {
+        Ok(Self {
+            home: node("BidAck.home", &ack.home)?,
+            home_incarnation: ack.home_incarnation,
+            node: node("BidAck.node", &ack.node)?,
+            incarnation: ack.incarnation,
+            epoch: number("BidAck.epoch", ack.epoch, 1)?,
+            sent_at: Duration::from_nanos(ack.sent_at_ns),
+            latest_seq: number("BidAck.latest_seq", ack.latest_seq, 0)?,
+            refused: ack.refused.into_iter().map(Refusal::try_from).collect::<Result<_>>()?,
+        })
+    }
+}
+
+impl From<&Refusal> for proto::Refusal {
+    fn from(refusal: &Refusal) -> Self {
+        let reason = match refusal.reason {
+            RefusalReason::Unspecified => proto::RefusalReason::Unspecified,
+            RefusalReason::Safety => proto::RefusalReason::Safety,
+            RefusalReason::NotHome => proto::RefusalReason::NotHome,
+            RefusalReason::HoldUnsupported => proto::RefusalReason::HoldUnsupported,
+            RefusalReason::LeaseTooLong => proto::RefusalReason::LeaseTooLong,
+            RefusalReason::Reserved => proto::RefusalReason::Reserved,
+            RefusalReason::Quota => proto::RefusalReason::Quota,
+        };
+        Self { bthread: refusal.bthread.clone(), sync: refusal.sync, reason: reason.into() }
+    }
+}
+
+impl TryFrom<proto::Refusal> for Refusal {
+    type Error = DecodeError;
+
+    fn try_from(refusal: proto::Refusal) -> Result<Self> {
+        // A reason of a later version is still a refusal.
+        let reason = match proto::RefusalReason::try_from(refusal.reason).unwrap_or_default() {
+            proto::RefusalReason::Unspecified => RefusalReason::Unspecified,
+            proto::RefusalReason::Safety => RefusalReason::Safety,
+            proto::RefusalReason::NotHome => RefusalReason::NotHome,
+            proto::RefusalReason::HoldUnsupported => RefusalReason::HoldUnsupported,
+            proto::RefusalReason::LeaseTooLong => RefusalReason::LeaseTooLong,
+            proto::RefusalReason::Reserved => RefusalReason::Reserved,
+            proto::RefusalReason::Quota => RefusalReason::Quota,
+        };
+        Ok(Self { bthread: refusal.bthread, sync: number("Refusal.sync", refusal.sync, 1)?, reason })
+    }
+}
+
+impl From<&Occurrence> for proto::Occurrence {
+    fn from(occurrence: &Occurrence) -> Self {
+        let served = |request: &ServedRequest| proto::ServedRequest {
+            node: text(&request.node),
+            incarnation: request.incarnation,
+            bthread: request.bthread.clone(),
+            sync: request.sync,
+        };
+        Self {
+            home: text(&occurrence.home),
+            incarnation: occurrence.incarnation,
+            seq: occurrence.seq,
+            event: Some((&occurrence.event).into()),
+            requests_served: occurrence.requests_served.iter().map(served).collect(),
+            at_ns: ns(occurrence.at),
+        }
+    }
+}
+
+impl TryFrom<proto::Occurrence> for Occurrence {
+    type Error = DecodeError;
+
+    fn try_from(occurrence: proto::Occurrence) -> Result<Self> {
+        let served = |request: proto::ServedRequest| -> Result<ServedRequest> {
+            Ok(ServedRequest {
+                node: node("ServedRequest.node", &request.node)?,
+                incarnation: request.incarnation,
+                bthread: request.bthread,
+                sync: number("ServedRequest.sync", request.sync, 1)?,
+            })
+        };
+        Ok(Self {
+            home: node("Occurrence.home", &occurrence.home)?,
+            incarnation: occurrence.incarnation,
+            seq: number("Occurrence.seq", occurrence.seq, 1)?,
+            event: required("Occurrence.event", occurrence.event)?.try_into()?,
+            requests_served: occurrence.requests_served.into_iter().map(served).collect::<Result<_>>()?,
+            at: Duration::from_nanos(occurrence.at_ns),
+        })
+    }
+}
+
+impl From<&Repair> for proto::Repair {
+    fn from(repair: &Repair) -> Self {
+        Self {
+            home: text(&repair.home),
+            incarnation: repair.incarnation,
+            from_seq: repair.from_seq,
+            to_seq: repair.to_seq,
+            requester: text(&repair.requester),
+        }
+    }
+}
+
+impl TryFrom<proto::Repair> for Repair {
+    type Error = DecodeError;
+
+    fn try_from(repair: proto::Repair) -> Result<Self> {
+        Ok(Self {
+            home: node("Repair.home", &repair.home)?,
+            incarnation: repair.incarnation,
+            from_seq: number("Repair.from_seq", repair.from_seq, 1)?,
+            to_seq: number("Repair.to_seq", repair.to_seq, 1)?,
+            requester: node("Repair.requester", &repair.requester)?,
+        })
+    }
+}
+
+impl From<&Presence> for proto::Presence {
+    fn from(presence: &Presence) -> Self {
+        Self {
+            node: text(&presence.node),
+            incarnation: presence.incarnation,
+            up_ns: ns(presence.up),
+            latest_seq: presence.latest_seq,
+            oldest_seq: presence.oldest_seq,
+            lease_ms: presence.lease_ms,
+        }
+    }
+}
+
+impl TryFrom<proto::Presence> for Presence {
+    type Error = DecodeError;
+
+    fn try_from(presence: proto::Presence) -> Result<Self> {
+        Ok(Self {
+            node: node("Presence.node", &presence.node)?,
+            incarnation: presence.incarnation,
+            up: Duration::from_nanos(presence.up_ns),
+            latest_seq: number("Presence.latest_seq", presence.latest_seq, 0)?,
+            oldest_seq: number("Presence.oldest_seq", presence.oldest_seq, 1)?,
+            lease_ms: presence.lease_ms,
+        })
+    }
+}
+
+impl From<&State> for proto::State {
+    fn from(state: &State) -> Self {
+        let vector = |v: &Vector3<f64>| vec3(v.x, v.y, v.z);
+        Self {
+            node: text(&state.node),
+            incarnation: state.incarnation,
+            time_ns: ns(state.time),
+            position: Some(vector(&state.position)),
+            velocity: Some(vector(&state.velocity)),
+            yaw_rad: state.yaw_rad,
+            position_sigma_m: state.position_sigma_m,
+            radius_m: state.radius_m,
+            mode: state.mode.clone(),
+            armed: state.armed,
+            battery: state.battery,
+            task: state.task.clone(),
+            waiting_for: state.waiting_for.clone(),
+            path: state.path.iter().take(State::MAX_PATH).map(vector).collect(),
+        }
+    }
+}
+
+impl TryFrom<proto::State> for State {
+    type Error = DecodeError;
+
+    fn try_from(state: proto::State) -> Result<Self> {
+        fn vector(field: &'static str, v: &proto::Vec3) -> Result<Vector3<f64>> {
+            Ok(Vector3::new(finite(field, v.x)?, finite(field, v.y)?, finite(field, v.z)?))
+        }
+        if state.path.len() > Self::MAX_PATH {
+            let given = format!("{} points long", state.path.len());
+            return Err(DecodeError::Range { field: "State.path", given, expected: "at most 32 points" });
+        }
+        if !(0.0..=1.0).contains(&state.battery) {
+            let given = state.battery.to_string();
+            return Err(DecodeError::Range {
+                field: "State.battery",
+                given,
+                expected: "a share from 0 to 1",
+            });
+        }
+        Ok(Self {
+            node: node("State.node", &state.node)?,
+            incarnation: state.incarnation,
+            time: Duration::from_nanos(state.time_ns),
+            position: vector("State.position", &required("State.position", state.position)?)?,
+            velocity: vector("State.velocity", &required("State.velocity", state.velocity)?)?,
+            yaw_rad: finite("State.yaw_rad", state.yaw_rad)?,
+            position_sigma_m: not_negative("State.position_sigma_m", state.position_sigma_m)?,
+            radius_m: not_negative("State.radius_m", state.radius_m)?,
+            mode: state.mode,
+            armed: state.armed,
+            battery: state.battery,
+            task: state.task,
+            waiting_for: state.waiting_for,
+            path: state.path.iter().map(|point| vector("State.path", point)).collect::<Result<_>>()?,
+        })
+    }
+}

@@ -1,0 +1,53 @@
+//! What nodes say to one another: messages, keys, the [`Link`] seam and a [`Network`] in memory.
+//!
+//! The protocol's records ([`skein_dbp::Message`]) and each vehicle's [`State`] travel as protobuf under keys
+//! `skein/<fleet>/<what>/<node>/...`. A [`NodeLink`] couples a [`skein_dbp::Node`] to any [`Link`]; the
+//! [`vocabulary`] names the events that nodes agree on.
+//!
+//! ```
+//! use std::time::Duration;
+//! use skein_bp::{Program, ProgramConfig};
+//! use skein_dbp::{Node, NodeConfig};
+//! use skein_wire::{Fleet, Network, NetworkConfig, NodeLink, NodeName};
+//!
+//! let names = vec![NodeName::new("uav/1")?, NodeName::new("uav/2")?];
+//! let network = Network::new(NetworkConfig::default(), 1);
+//! let mut nodes = Vec::new();
+//! for name in &names {
+//!     let node = Node::new(NodeConfig::new(name.clone(), 1, names.clone()), Program::new(ProgramConfig::default()));
+//!     nodes.push((NodeLink::new(node, Fleet::new("demo")?), network.join(name)));
+//! }
+//! for tick in 0..10 {
+//!     let now = Duration::from_millis(20 * tick);
+//!     network.advance(now);
+//!     for (node, link) in &mut nodes {
+//!         node.pump(now, link)?;
+//!     }
+//! }
+//! assert!(nodes.iter().all(|(node, _)| node.node().peers().all(|(_, peer)| peer.alive)));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod convert;
+mod decode_error;
+mod key;
+mod link;
+mod network;
+mod node_link;
+mod payload;
+pub mod proto;
+mod state;
+mod trace;
+pub mod vocabulary;
+
+/// The compiled `proto/skein.proto`, a `FileDescriptorSet`: the schema to put beside recorded messages.
+pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/skein.bin"));
+
+pub use decode_error::DecodeError;
+pub use key::{Fleet, Key, KeyError, Topic};
+pub use link::Link;
+pub use network::{MemoryLink, Network, NetworkConfig, NetworkStats};
+pub use node_link::{NodeLink, NodeLinkStats};
+pub use payload::{MAX_PAYLOAD, Payload, VERSION};
+pub use skein_dbp::{NodeName, NodeNameError};
+pub use state::State;

@@ -1,0 +1,149 @@
+//! A node coupled to its link.
+
+use std::time::Duration;
+
+use skein_dbp::{Message, Node, NodeError, NodeName, Recipient};
+
+use crate::{Fleet, Key, Link, Payload, State, Topic};
+
+/// How many messages one pump takes in, so that a flood cannot keep a node from going on.
+const MOST_PER_PUMP: usize = 4096;
+
+/// A node, its fleet, and what has come in beside the protocol: other vehicles' states.
+///
+/// [`pump`](Self::pump) is the whole loop of a node: take in what has arrived, go on, send what is to be sent. A
+/// message under a key that its sender may not use, or that is no message, is counted and dropped.
+#[derive(Clone, Debug)]
+pub struct NodeLink {
+    node: Node,
+    fleet: Fleet,
+    states: Vec<State>,
+    stats: NodeLinkStats,
+}
+
+/// What has come in that was not understood.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NodeLinkStats {
+    /// Messages taken in.
+    pub received: u64,
+    /// Messages sent.
+    pub sent: u64,
+    /// Payloads that could not be decoded.
+    pub undecodable: u64,
+    /// Messages whose content claims another sender, receiver or kind than their key.
+    pub forged: u64,
+}
+
+impl NodeLink {
+    /// Couples `node` to its fleet.
+    #[must_use]
+    pub fn new(node: Node, fleet: Fleet) -> Self {
+        Self { node, fleet, states: Vec::new(), stats: NodeLinkStats::default() }
+    }
+
+    /// Takes in what has arrived, lets the node go on, and sends what it has to say.
+    ///
+    /// # Errors
+    /// Those of [`Node::step`]; what the node has to say is sent all the same.
+    pub fn pump(&mut self, now: Duration, link: &mut dyn Link) -> Result<(), NodeError> {
+        self.receive(now, link);
+        let outcome = self.node.step(now);
+        self.send(link);
+        outcome
+    }
+
+    /// Tells all what state this node's vehicle is in.
+    pub fn put_state(&mut self, state: &State, link: &mut dyn Link) {
+        let key = Key::new(&self.fleet, Topic::State { node: self.node.name().clone() });
+        link.put(&key, Payload::State(state.clone()).encode());
+        self.stats.sent += 1;
+    }
+
+    /// The states of other vehicles that have arrived since the last call, in order.
+    pub fn take_states(&mut self) -> Vec<State> {
+        std::mem::take(&mut self.states)
+    }
+
+    /// The node.
+    #[must_use]
+    pub fn node(&self) -> &Node {
+        &self.node
+    }
+
+    /// The node, to feed it and to take its selections.
+    pub fn node_mut(&mut self) -> &mut Node {
+        &mut self.node
+    }
+
+    /// The fleet.
+    #[must_use]
+    pub fn fleet(&self) -> &Fleet {
+        &self.fleet
+    }
+
+    /// What has come and gone.
+    #[must_use]
+    pub fn stats(&self) -> NodeLinkStats {
+        self.stats
+    }
+
+    /// Takes in what has arrived.
+    pub fn receive(&mut self, now: Duration, link: &mut dyn Link) {
+        for (key, payload) in std::iter::from_fn(|| link.poll()).take(MOST_PER_PUMP) {
+            self.stats.received += 1;
+            match Payload::decode(&payload) {
+                Err(_) => self.stats.undecodable += 1,
+                Ok(payload) if !speaks_for_itself(&key, &payload) => self.stats.forged += 1,
+                Ok(Payload::State(state)) if state.node == *self.node.name() => {}
+                Ok(Payload::State(state)) => self.states.push(state),
+                Ok(Payload::Message(message)) => self.node.handle(now, message),
+            }
+        }
+    }
+
+    /// Sends what the node has to say.
+    pub fn send(&mut self, link: &mut dyn Link) {
+        for (recipient, message) in self.node.take_outgoing() {
+            let key = Key::new(&self.fleet, topic(self.node.name(), recipient, &message));
+            link.put(&key, Payload::Message(message).encode());
+            self.stats.sent += 1;
+        }
+    }
+}
+
+/// The topic under which `node` puts a message.
+fn topic(node: &NodeName, recipient: Recipient, message: &Message) -> Topic {
+    let to = match recipient {
+        Recipient::Node(to) => Some(to),
+        Recipient::All => None,
+    };
+    let node = node.clone();
+    match message {
+        Message::Bid(bid) => Topic::Bid { from: node, home: bid.home.clone() },
+        Message::Ack(ack) => Topic::Ack { home: node, node: ack.node.clone() },
+        Message::Occurrence(_) => Topic::Occurrence { home: node, to },
+        Message::Repair(repair) => Topic::Repair { from: node, home: repair.home.clone() },
+        Message::Presence(_) => Topic::Presence { node },
+    }
+}
+
+/// Whether a payload says nothing but what the sender of its key may say there.
+fn speaks_for_itself(key: &Key, payload: &Payload) -> bool {
+    match (key.topic(), payload) {
+        (Topic::State { node }, Payload::State(state)) => *node == state.node,
+        (Topic::Bid { from, home }, Payload::Message(Message::Bid(bid))) => {
+            *from == bid.node && *home == bid.home
+        }
+        (Topic::Ack { home, node }, Payload::Message(Message::Ack(ack))) => {
+            *home == ack.home && *node == ack.node
+        }
+        (Topic::Occurrence { home, .. }, Payload::Message(Message::Occurrence(occurrence))) => {
+            *home == occurrence.home
+        }
+        (Topic::Repair { from, home }, Payload::Message(Message::Repair(repair))) => {
+            *from == repair.requester && *home == repair.home
+        }
+        (Topic::Presence { node }, Payload::Message(Message::Presence(presence))) => *node == presence.node,
+        _ => false,
+    }
+}

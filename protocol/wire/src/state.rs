@@ -1,0 +1,65 @@
+//! A vehicle's state, as its neighbours and the ground see it.
+
+use std::time::Duration;
+
+use nalgebra::Vector3;
+use skein_dbp::NodeName;
+
+/// A vehicle's state. World frame ENU, SI units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// The vehicle.
+    pub node: NodeName,
+    /// Its incarnation.
+    pub incarnation: u64,
+    /// When the position was measured, on the vehicle's clock.
+    pub time: Duration,
+    /// Position, metres.
+    pub position: Vector3<f64>,
+    /// Velocity, metres per second.
+    pub velocity: Vector3<f64>,
+    /// Heading, radians, counter-clockwise from east.
+    pub yaw_rad: f64,
+    /// Standard deviation of the position in each axis, metres.
+    pub position_sigma_m: f64,
+    /// Radius of the sphere that holds the vehicle, metres.
+    pub radius_m: f64,
+    /// The autopilot's mode.
+    pub mode: String,
+    /// Whether the motors are armed.
+    pub armed: bool,
+    /// Share of the battery's energy left, 0 to 1.
+    pub battery: f64,
+    /// What the vehicle is about.
+    pub task: String,
+    /// What it waits for, empty if for nothing.
+    pub waiting_for: String,
+    /// Points of the planned path, metres, for display; only the first [`State::MAX_PATH`] travel.
+    pub path: Vec<Vector3<f64>>,
+}
+
+impl State {
+    /// How many points of a path travel.
+    pub const MAX_PATH: usize = 32;
+
+    /// A vehicle that stands disarmed at the origin with a full battery: a start to fill in.
+    #[must_use]
+    pub fn new(node: NodeName) -> Self {
+        Self {
+            node,
+            incarnation: 0,
+            time: Duration::ZERO,
+            position: Vector3::zeros(),
+            velocity: Vector3::zeros(),
+            yaw_rad: 0.0,
+            position_sigma_m: 0.0,
+            radius_m: 0.25,
+            mode: String::new(),
+            armed: false,
+            battery: 1.0,
+            task: String::new(),
+            waiting_for: String::new(),
+            path: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! G3: after `confirmed`, a blocked event does not occur until the block is withdrawn or its holder has been told
+//! `block_lapsed`.
+
+#![allow(clippy::unwrap_used)] // A test fails by panicking.
+
+mod swarm;
+
+use std::time::Duration;
+
+use skein_bp::{EventSet, Program};
+use skein_dbp::NodeConfig;
+use skein_wire::NetworkConfig;
+use swarm::{Always, Blocker, Requester, Swarm, hostile, name, program};
+
+const HOMES: [&str; 3] = ["uav/1", "uav/2", "uav/3"];
+const HOLDER: &str = "ground/main";
+const ALL: [&str; 4] = ["uav/1", "uav/2", "uav/3", HOLDER];
+
+/// A home that does `step` all the time.
+fn stepper(home: &str, seed: u64) -> Program {
+    let mut program = program(seed);
+    program.add("steps", Requester::new(&format!("{home}/step"), i64::MAX, swarm::TICK));
+    program
+}
+
+fn fleet(network: NetworkConfig, seed: u64) -> Swarm {
+    let mut swarm = Swarm::new(&ALL, network, seed);
+    for home in HOMES {
+        swarm.start(home, 1, stepper(home, seed));
+    }
+    let mut holder = program(seed);
+    holder.add("hold", Blocker::new("uav/*/step", Duration::from_millis(2500), Duration::from_millis(700)));
+    swarm.start(HOLDER, 1, holder);
+    swarm
+}
+
+/// Follows what the holder may rely on.
+#[derive(Default)]
+struct Witness {
+    sure: bool,
+    confirmed: usize,
+    lapsed: usize,
+    ticks_held: usize,
+    steps: usize,
+}
+
+impl Witness {
+    /// One tick, in which no home may step if the holder was sure before it and is after it.
+    fn tick(&mut self, swarm: &mut Swarm) {
+        let before = self.sure;
+        let mut confirmed_at = None;
+        let seen = swarm.tick().to_vec();
+        for seen in seen.iter().filter(|seen| seen.node.as_str() == HOLDER) {
+            match seen.happened.event.name() {
+                "ground/main/confirmed" => {
+                    confirmed_at = seen.happened.event.int("sync");
+                    self.sure = true;
+                    self.confirmed += 1;
+                }
+                "ground/main/block_lapsed" => {
+                    self.sure = false;
+                    self.lapsed += 1;
+                }
+                _ => {}
+            }
+        }
+        let blocking = swarm.node(HOLDER).program().state_of::<Blocker>("hold").unwrap().blocking;
+        self.sure &= blocking;
+        if let (Some(sync), true) = (confirmed_at, blocking) {
+            let now_at = swarm.node(HOLDER).program().bids().find(|(name, ..)| *name == "hold").unwrap().2;
+            assert_eq!(sync as u64, now_at, "confirmed a synchronisation point that is over");
+        }
+        let steps = seen
+            .iter()
+            .filter(|seen| seen.happened.home == seen.node && seen.happened.event.kind() == "step")
+            .count();
+        self.steps += steps;
+        if before && self.sure {
+            self.ticks_held += 1;
+            let who: Vec<_> = seen
+                .iter()
+                .filter(|seen| seen.happened.event.kind() == "step")
+                .map(|seen| seen.node.to_string())
+                .collect();
+            assert_eq!(steps, 0, "{who:?} stepped at {:?} under a confirmed block", swarm.now);
+        }
+    }
+}
+
+#[test]
+fn a_confirmed_wildcard_block_holds_under_loss_and_delay() {
+    let mut total = Witness::default();
+    for seed in 0..15 {
+        let mut swarm = fleet(hostile(), seed);
+        let mut witness = Witness::default();
+        for _ in 0..1000 {
+            witness.tick(&mut swarm);
+        }
+        total.confirmed += witness.confirmed;
+        total.ticks_held += witness.ticks_held;
+        total.steps += witness.steps;
+    }
+    assert!(total.confirmed > 30 && total.ticks_held > 1000 && total.steps > 1000, "the test says nothing");
+}
+
+#[test]
+fn a_partition_is_told_to_the_holder_before_a_home_lets_go() {
+    let mut lapsed = 0;
+    for seed in 0..15 {
+        let mut swarm = fleet(NetworkConfig { loss: 0.1, ..hostile() }, seed);
+        let mut witness = Witness::default();
+        for round in 0..6 {
+            for _ in 0..(40 + 7 * seed) {
+                witness.tick(&mut swarm);
+            }
+            let cut = name(HOMES[round % HOMES.len()]);
+            swarm.network.partition(&[&[cut]]);
+            for _ in 0..100 {
+                witness.tick(&mut swarm);
+            }
+            swarm.network.heal();
+        }
+        lapsed += witness.lapsed;
+    }
+    assert!(lapsed > 10, "only {lapsed} blocks lapsed: the test says nothing");
+}
+
+#[test]
+fn a_guarded_event_respects_a_confirmed_block_across_a_restart_of_its_home() {
+    let mut held = 0;
+    for seed in 0..20 {
+        let mut swarm = fleet(NetworkConfig { loss: 0.1, ..hostile() }, seed);
+        let mut witness = Witness::default();
+        for incarnation in 1..8 {
+            let config =
+                NodeConfig { guarded: EventSet::from("uav/2/step"), ..swarm.config("uav/2", incarnation) };
+            swarm.start_with(config, stepper("uav/2", seed));
+            for _ in 0..(90 + 11 * seed) {
+                witness.tick(&mut swarm);
+            }
+        }
+        held += witness.ticks_held;
+        assert!(
+            swarm.occurred("uav/2", "uav/2/step").any(|seen| seen.incarnation > 1),
+            "the guard was never lifted"
+        );
+    }
+    assert!(held > 1000, "only {held} ticks under a confirmed block: the test says nothing");
+}
+
+#[test]
+fn a_silent_member_keeps_a_wildcard_block_unconfirmed() {
+    let mut swarm = Swarm::new(&ALL, NetworkConfig::default(), 1);
+    for home in &HOMES[..2] {
+        swarm.start(home, 1, stepper(home, 1));
+    }
+    let mut holder = program(1);
+    holder.add("all", Always(skein_bp::Bid::new().block("uav/*/step")));
+    holder.add("one", Always(skein_bp::Bid::new().block("uav/1/step")));
+    swarm.start(HOLDER, 1, holder);
+    swarm.run(Duration::from_secs(2));
+    let confirmed = |swarm: &Swarm| -> Vec<String> {
+        swarm
+            .saw(HOLDER, "ground/main/confirmed")
+            .map(|seen| seen.happened.event.text("bthread").unwrap().into())
+            .collect()
+    };
+    assert_eq!(confirmed(&swarm), ["one"]);
+    swarm.start("uav/3", 1, stepper("uav/3", 1));
+    swarm.run(Duration::from_secs(1));
+    assert_eq!(confirmed(&swarm), ["one", "all"]);
+}
+
+#[test]
+fn a_fleet_of_one_confirms_at_once() {
+    let mut swarm = Swarm::new(&[HOLDER], NetworkConfig::default(), 1);
+    let mut holder = program(1);
+    let confirmed = skein_dbp::facts::confirmed(&name(HOLDER), "hold");
+    holder.add("hold", Always(skein_bp::Bid::new().block("uav/*/step").wait_for(confirmed)));
+    swarm.start(HOLDER, 1, holder);
+    swarm.tick();
+    assert!(swarm.saw(HOLDER, "ground/main/confirmed").count() >= 1);
+}

@@ -1,0 +1,57 @@
+//! What may go wrong with a session.
+
+/// Why a session cannot be opened, or a link not be had.
+#[derive(Debug, thiserror::Error)]
+pub enum ZenohError {
+    /// An endpoint of another form.
+    #[error("`{endpoint}` is not an endpoint: expected `tcp/<address>:<port>`, such as `tcp/127.0.0.1:7447`")]
+    Endpoint {
+        /// The text at fault.
+        endpoint: String,
+    },
+    /// An endpoint that others could reach, or that leads to others, with nothing to tell friend from foe.
+    #[error(
+        "`{endpoint}` is not on the loopback interface: without security configured, only `127.0.0.1`, `[::1]` and `localhost` are accepted"
+    )]
+    NotLoopback {
+        /// The endpoint at fault.
+        endpoint: String,
+    },
+    /// The system gives no port.
+    #[error("no free port for `{endpoint}`: {source}")]
+    NoPort {
+        /// The endpoint.
+        endpoint: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Zenoh does not take a setting.
+    #[error("Zenoh refuses the setting `{key}` = {value}: {source}")]
+    Config {
+        /// The setting.
+        key: &'static str,
+        /// Its value.
+        value: String,
+        /// What Zenoh says.
+        source: zenoh::Error,
+    },
+    /// Zenoh cannot open the session, because an endpoint is in use already, for one.
+    #[error("cannot open a Zenoh session on {listen:?}: {source}")]
+    Open {
+        /// Where it was to listen.
+        listen: Vec<String>,
+        /// What Zenoh says.
+        source: zenoh::Error,
+    },
+    /// Zenoh cannot subscribe.
+    #[error("cannot subscribe to `{pattern}`: {source}")]
+    Subscribe {
+        /// The keys' pattern.
+        pattern: String,
+        /// What Zenoh says.
+        source: zenoh::Error,
+    },
+    /// The thread of the session cannot be started or has ended.
+    #[error("the session's thread is gone")]
+    ThreadGone,
+}

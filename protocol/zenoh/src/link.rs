@@ -1,0 +1,60 @@
+//! One node's link over Zenoh.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use skein_wire::{Key, Link};
+
+use crate::ZenohSession;
+use crate::inbox::Inbox;
+
+/// One node's link over a [`ZenohSession`]. It never waits.
+#[derive(Debug)]
+pub struct ZenohLink {
+    session: ZenohSession,
+    port: u64,
+    inbox: Arc<Inbox>,
+}
+
+/// What has arrived at a link.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ZenohLinkStats {
+    /// Messages that arrived.
+    pub received: u64,
+    /// Messages dropped because the node did not take them in time.
+    pub dropped: u64,
+    /// Messages under keys that are none of Skein's.
+    pub misnamed: u64,
+}
+
+impl ZenohLink {
+    pub(crate) fn new(session: ZenohSession, port: u64, inbox: Arc<Inbox>) -> Self {
+        Self { session, port, inbox }
+    }
+
+    /// What has arrived so far.
+    #[must_use]
+    pub fn stats(&self) -> ZenohLinkStats {
+        ZenohLinkStats {
+            received: self.inbox.received.load(Ordering::Relaxed),
+            dropped: self.inbox.dropped.load(Ordering::Relaxed),
+            misnamed: self.inbox.misnamed.load(Ordering::Relaxed),
+        }
+    }
+}
+
+impl Link for ZenohLink {
+    fn put(&mut self, key: &Key, payload: Vec<u8>) {
+        self.session.put(self.port, key, payload);
+    }
+
+    fn poll(&mut self) -> Option<(Key, Vec<u8>)> {
+        self.inbox.pop()
+    }
+}
+
+impl Drop for ZenohLink {
+    fn drop(&mut self) {
+        self.session.leave(self.port);
+    }
+}

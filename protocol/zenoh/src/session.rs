@@ -1,0 +1,252 @@
+//! A Zenoh session behind a bounded queue.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+use skein_wire::{Fleet, Key, NodeName};
+use zenoh::Wait;
+use zenoh::pubsub::Subscriber;
+use zenoh::qos::CongestionControl;
+
+use crate::inbox::Inbox;
+use crate::{ZenohConfig, ZenohError, ZenohLink};
+
+/// How often opening is tried when the port that was free has been taken meanwhile.
+const OPENING_TRIES: usize = 8;
+
+/// A session that any number of links of one process share. Cloning gives another handle to the same session, which
+/// closes with its last handle or link.
+///
+/// All of Zenoh is done on a thread of the session's own: whoever puts a message hands it to a bounded queue and never
+/// waits, whatever the network does.
+#[derive(Clone, Debug)]
+pub struct ZenohSession(Arc<Shared>);
+
+/// What has passed through a session.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ZenohStats {
+    /// Messages put.
+    pub messages: u64,
+    /// Bytes of keys and payloads put.
+    pub bytes: u64,
+    /// Messages dropped because the queue was full.
+    pub dropped: u64,
+    /// Messages that Zenoh refused.
+    pub failed: u64,
+}
+
+#[derive(Debug)]
+struct Shared {
+    fleet: Fleet,
+    locators: Vec<String>,
+    incoming_capacity: usize,
+    next_port: AtomicU64,
+    counters: Arc<Counters>,
+    /// Gone only while the session closes.
+    commands: Option<SyncSender<Command>>,
+    thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+#[derive(Debug, Default)]
+struct Counters {
+    messages: AtomicU64,
+    bytes: AtomicU64,
+    dropped: AtomicU64,
+    failed: AtomicU64,
+}
+
+/// What the session's thread is asked to do.
+enum Command {
+    Put { port: u64, key: Key, payload: Vec<u8> },
+    Join { port: u64, patterns: Vec<String>, inbox: Arc<Inbox>, answer: SyncSender<Result<(), ZenohError>> },
+    Leave { port: u64 },
+    CountPeers { answer: SyncSender<usize> },
+}
+
+impl ZenohSession {
+    /// Opens a session.
+    ///
+    /// That it opens does not mean that it is connected: see [`connected_peers`](Self::connected_peers).
+    ///
+    /// # Errors
+    /// [`ZenohError`] when an endpoint is not on the loopback interface, cannot be listened on, or is none.
+    pub fn open(config: ZenohConfig) -> Result<Self, ZenohError> {
+        let counters = Arc::new(Counters::default());
+        let (commands, queue) = sync_channel(config.outgoing_capacity.max(1));
+        let (answer, opened) = sync_channel(1);
+        let thread = std::thread::Builder::new().name("zenoh session".into()).spawn({
+            let (config, counters) = (config.clone(), counters.clone());
+            move || match open(&config) {
+                Ok((session, locators)) => {
+                    if answer.send(Ok(locators)).is_ok() {
+                        serve(&session, &queue, &counters);
+                    }
+                }
+                Err(error) => drop(answer.send(Err(error))),
+            }
+        });
+        let thread = thread.map_err(|_| ZenohError::ThreadGone)?;
+        let locators = opened.recv().map_err(|_| ZenohError::ThreadGone)??;
+        Ok(Self(Arc::new(Shared {
+            fleet: config.fleet,
+            locators,
+            incoming_capacity: config.incoming_capacity.max(1),
+            next_port: AtomicU64::new(0),
+            counters,
+            commands: Some(commands),
+            thread: Mutex::new(Some(thread)),
+        })))
+    }
+
+    /// A link for `node`, which hears from now on. Two links of one name are two nodes that share it.
+    ///
+    /// # Errors
+    /// [`ZenohError::Subscribe`] when Zenoh does not let it listen.
+    pub fn link(&self, node: &NodeName) -> Result<ZenohLink, ZenohError> {
+        let port = self.0.next_port.fetch_add(1, Ordering::Relaxed);
+        let inbox = Arc::new(Inbox::new(self.0.incoming_capacity));
+        let patterns = Key::subscriptions(&self.0.fleet, node);
+        let (answer, joined) = sync_channel(1);
+        self.ask(Command::Join { port, patterns, inbox: inbox.clone(), answer })?;
+        joined.recv().map_err(|_| ZenohError::ThreadGone)??;
+        Ok(ZenohLink::new(self.clone(), port, inbox))
+    }
+
+    /// Where others can connect to this session.
+    #[must_use]
+    pub fn locators(&self) -> &[String] {
+        &self.0.locators
+    }
+
+    /// To how many other sessions this one is connected now.
+    #[must_use]
+    pub fn connected_peers(&self) -> usize {
+        let (answer, peers) = sync_channel(1);
+        self.ask(Command::CountPeers { answer }).ok().and_then(|()| peers.recv().ok()).unwrap_or(0)
+    }
+
+    /// What has passed through.
+    #[must_use]
+    pub fn stats(&self) -> ZenohStats {
+        let Counters { messages, bytes, dropped, failed } = &*self.0.counters;
+        let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        ZenohStats {
+            messages: read(messages),
+            bytes: read(bytes),
+            dropped: read(dropped),
+            failed: read(failed),
+        }
+    }
+
+    /// Hands a message over for sending, or drops it when too many wait.
+    pub(crate) fn put(&self, port: u64, key: &Key, payload: Vec<u8>) {
+        let command = Command::Put { port, key: key.clone(), payload };
+        let taken = self.0.commands.as_ref().map(|commands| commands.try_send(command));
+        if !matches!(taken, Some(Ok(()))) {
+            self.0.counters.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Ends a link. When the queue is full its subscriptions stay until the session closes, and fill nothing but the
+    /// link's own bounded inbox.
+    pub(crate) fn leave(&self, port: u64) {
+        if let Some(commands) = &self.0.commands {
+            match commands.try_send(Command::Leave { port }) {
+                Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
+            }
+        }
+    }
+
+    /// Waits for room in the queue: for use outside control loops.
+    fn ask(&self, command: Command) -> Result<(), ZenohError> {
+        let commands = self.0.commands.as_ref().ok_or(ZenohError::ThreadGone)?;
+        commands.send(command).map_err(|_| ZenohError::ThreadGone)
+    }
+}
+
+impl Drop for Shared {
+    /// Ends the thread, which sends what still waits and closes the session.
+    fn drop(&mut self) {
+        self.commands = None;
+        if let Some(thread) = self.thread.get_mut().ok().and_then(Option::take) {
+            // Its panic, if any, has been reported where it happened.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn open(config: &ZenohConfig) -> Result<(zenoh::Session, Vec<String>), ZenohError> {
+    let mut tries = if config.chooses_port() { OPENING_TRIES } else { 1 };
+    loop {
+        let (zenoh_config, listen) = config.to_zenoh()?;
+        tries -= 1;
+        match zenoh::open(zenoh_config).wait() {
+            Ok(session) => return Ok((session, listen)),
+            Err(_) if tries > 0 => {}
+            Err(source) => return Err(ZenohError::Open { listen, source }),
+        }
+    }
+}
+
+/// The life of the session's thread, until the last handle is gone.
+fn serve(session: &zenoh::Session, queue: &Receiver<Command>, counters: &Counters) {
+    let mut subscribers: BTreeMap<u64, Vec<Subscriber<()>>> = BTreeMap::new();
+    while let Ok(command) = queue.recv() {
+        match command {
+            Command::Put { port, key, payload } => {
+                let key = key.to_string();
+                counters.messages.fetch_add(1, Ordering::Relaxed);
+                counters.bytes.fetch_add((key.len() + payload.len()) as u64, Ordering::Relaxed);
+                let put = session.put(key, payload).congestion_control(CongestionControl::Drop);
+                if let Err(error) = put.attachment(mark(session, port)).wait() {
+                    counters.failed.fetch_add(1, Ordering::Relaxed);
+                    tracing::debug!("Zenoh did not put: {error}");
+                }
+            }
+            Command::Join { port, patterns, inbox, answer } => {
+                let joined: Result<Vec<_>, _> =
+                    patterns.into_iter().map(|pattern| subscribe(session, port, pattern, &inbox)).collect();
+                let outcome = joined.map(|joined| drop(subscribers.insert(port, joined)));
+                // Who asked may have given up waiting.
+                let _ = answer.send(outcome);
+            }
+            Command::Leave { port } => drop(subscribers.remove(&port)),
+            Command::CountPeers { answer } => {
+                let _ = answer.send(session.info().peers_zid().wait().count());
+            }
+        }
+    }
+    drop(subscribers);
+    if let Err(error) = session.close().wait() {
+        tracing::debug!("Zenoh did not close in order: {error}");
+    }
+}
+
+/// Tells a link's own messages from those of all others, in other sessions too.
+fn mark(session: &zenoh::Session, port: u64) -> Vec<u8> {
+    let mut mark = session.zid().to_le_bytes().to_vec();
+    mark.extend(port.to_le_bytes());
+    mark
+}
+
+fn subscribe(
+    session: &zenoh::Session,
+    port: u64,
+    pattern: String,
+    inbox: &Arc<Inbox>,
+) -> Result<Subscriber<()>, ZenohError> {
+    let (own, inbox) = (mark(session, port), inbox.clone());
+    let heard = move |sample: zenoh::sample::Sample| {
+        if sample.attachment().is_none_or(|mark| *mark.to_bytes() != *own) {
+            inbox.push(sample.key_expr().as_str(), || sample.payload().to_bytes().into_owned());
+        }
+    };
+    session
+        .declare_subscriber(pattern.clone())
+        .callback(heard)
+        .wait()
+        .map_err(|source| ZenohError::Subscribe { pattern, source })
+}

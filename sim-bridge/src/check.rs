@@ -1,0 +1,101 @@
+//! `check`: whether a scenario, world or mission file is sound, and what of it is read over.
+
+use std::fmt;
+use std::path::Path;
+
+use serde::Serialize;
+use skein_world::Scene;
+
+use crate::mission::{self, MissionSet};
+use crate::scenario::{Overrides, Scenario, ScenarioError, read_world};
+
+/// What was found in a sound file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Findings {
+    /// The file, or the name of the built-in scenario.
+    pub file: String,
+    /// `scenario`, `world` or `mission`.
+    pub kind: &'static str,
+    /// What it holds, in words.
+    pub holds: String,
+    /// What of it is read over or gives way.
+    pub warnings: Vec<String>,
+}
+
+impl fmt::Display for Findings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: a sound {}: {}", self.file, self.kind, self.holds)?;
+        self.warnings.iter().try_for_each(|warning| write!(f, "\nwarning: {warning}"))
+    }
+}
+
+/// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`), a mission (`.plan`, `.json`), or
+/// else a scenario.
+///
+/// # Errors
+/// What is wrong with it: with file, line and what was expected.
+pub fn check(file: &Path) -> Result<Findings, ScenarioError> {
+    let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let (kind, holds, warnings) = match extension.as_deref() {
+        Some("sdf" | "world" | "csv") => {
+            let (scene, warnings) = read_world(file)?;
+            ("world", world(&scene), warnings)
+        }
+        Some("plan" | "json") => {
+            let set = mission::read_files(&[file.to_owned()], None)?;
+            ("mission", missions(&set), set.warnings.iter().map(ToString::to_string).collect())
+        }
+        _ => {
+            let scenario = Scenario::open(&file.to_string_lossy(), &Overrides::default(), 1)?;
+            let holds = format!("{} vehicles, {}", scenario.vehicles.len(), world(&scenario.scene));
+            ("scenario", holds, scenario.notes)
+        }
+    };
+    Ok(Findings { file: file.display().to_string(), kind, holds, warnings })
+}
+
+fn world(scene: &Scene) -> String {
+    let size = scene.bounds().max - scene.bounds().min;
+    let obstacles = scene.obstacles().len();
+    format!("{obstacles} obstacles in {:.0} x {:.0} x {:.0} m", size.x, size.y, size.z)
+}
+
+fn missions(set: &MissionSet) -> String {
+    let waypoints: usize = set.missions.iter().map(|m| m.waypoints.len()).sum();
+    format!("{} routes with {waypoints} waypoints in all", set.missions.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_kind_of_file_is_known_by_its_extension() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let put = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).map(|()| path)
+        };
+        let world = put("w.csv", "10,0,2.5,1,1,5\n")?;
+        let mission = put("m.json", r#"{"agents": [{"start": [0, 0, 1], "goal": [5, 1, 1]}]}"#)?;
+        let scenario = put("s.toml", "generator = \"open\"\nworld = \"w.csv\"\n")?;
+        assert_eq!(
+            (check(&world)?.kind, check(&world)?.holds.as_str()),
+            ("world", "1 obstacles in 100 x 100 x 21 m")
+        );
+        assert_eq!(check(&mission)?.holds, "1 routes with 1 waypoints in all");
+        assert_eq!(check(&scenario)?.holds, "4 vehicles, 1 obstacles in 100 x 100 x 21 m");
+        assert_eq!(check(Path::new("forest"))?.kind, "scenario");
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_file_is_the_error() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("m.plan");
+        std::fs::write(&path, "{\n\"mission\": {}}")?;
+        let error = check(&path).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(error.contains("m.plan:2: field `mission`"), "{error}");
+        Ok(())
+    }
+}

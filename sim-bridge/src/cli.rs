@@ -1,0 +1,209 @@
+//! The command line of `skein-sim`.
+//!
+//! Exit codes: 0 done, 1 the mission or check failed, 2 wrong usage or input.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::scenario::Overrides;
+
+/// How a program ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// Done.
+    Done,
+    /// The mission or check failed, with a reason.
+    Failed,
+    /// Wrong usage or input, with file, line and what was expected.
+    WrongInput,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        match exit {
+            Exit::Done => Self::from(0),
+            Exit::Failed => Self::from(1),
+            Exit::WrongInput => Self::from(2),
+        }
+    }
+}
+
+/// Skein: a swarm of vehicles, each a behavioural program, in a simulated world.
+#[derive(Debug, Clone, PartialEq, Parser)]
+#[command(
+    name = "skein-sim",
+    version,
+    after_help = "Exit codes: 0 done, 1 mission or check failed, 2 wrong usage or input."
+)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+    /// Print one JSON object on standard output and nothing else there.
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+/// What `skein-sim` does.
+#[derive(Debug, Clone, PartialEq, Subcommand)]
+pub enum Command {
+    /// Fly a whole mission on this host: world, vehicles, agents and ground.
+    Fly(Fly),
+    /// Host the world and its autopilots alone, for agents in other processes.
+    Serve(Serve),
+    /// List the built-in scenarios.
+    List,
+    /// Say whether a scenario, world or mission file is sound.
+    Check {
+        /// A scenario (.toml), world (.sdf, .world, .csv) or mission (.plan, .json), or a built-in scenario's name.
+        file: PathBuf,
+    },
+}
+
+/// Options of `fly`.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct Fly {
+    /// What is flown.
+    #[command(flatten)]
+    pub world: WorldArgs,
+    /// Real time over Zenoh, or in memory as fast as the processor allows.
+    #[arg(long, value_enum, default_value_t = Clock::Real)]
+    pub clock: Clock,
+    /// How many times faster than the clock on the wall; `--clock real` only.
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
+    pub speed: f64,
+    /// What decides on board: behavioural programs, or nothing (the vehicles stay where they are).
+    #[arg(long, value_enum, default_value_t = Controller::Bp)]
+    pub controller: Controller,
+    /// Folder for summary.json and mission.mcap; made if missing.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// No live table.
+    #[arg(long)]
+    pub headless: bool,
+}
+
+/// Options of `serve`.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct Serve {
+    /// What is hosted.
+    #[command(flatten)]
+    pub world: WorldArgs,
+    /// How many times faster than the clock on the wall.
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
+    pub speed: f64,
+}
+
+/// What world and swarm are simulated.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct WorldArgs {
+    /// A built-in scenario (see `list`), or a scenario file (.toml).
+    pub scenario: String,
+    /// Size of the swarm; the scenario's own if not given.
+    #[arg(long, value_name = "N")]
+    pub vehicles: Option<usize>,
+    /// What every random number comes from.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+    /// A Gazebo world (SDF) or a list of boxes (.csv) in place of the scenario's world.
+    #[arg(long = "world", value_name = "FILE")]
+    pub world_file: Option<PathBuf>,
+    /// A QGroundControl plan or LSC mission; one that all fly in trail, or one for each vehicle.
+    #[arg(long = "mission", value_name = "FILE")]
+    pub missions: Vec<PathBuf>,
+}
+
+impl WorldArgs {
+    /// What the options set over the scenario.
+    pub fn overrides(&self) -> Overrides {
+        Overrides { vehicles: self.vehicles, world: self.world_file.clone(), missions: self.missions.clone() }
+    }
+}
+
+/// What time a run follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Clock {
+    /// The clock on the wall, over Zenoh.
+    Real,
+    /// The simulation's own, in memory; one seed replays bit for bit.
+    Lockstep,
+}
+
+/// What decides on board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Controller {
+    /// Behavioural programs.
+    Bp,
+    /// The same vehicles with no b-threads loaded: nothing flies.
+    None,
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(speed) if speed.is_finite() && speed > 0.0 => Ok(speed),
+        _ => Err("expected a number above 0".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+    use clap::error::ErrorKind;
+
+    use super::*;
+
+    fn parse(line: &str) -> Result<Cli, clap::Error> {
+        Cli::try_parse_from(line.split(' '))
+    }
+
+    #[test]
+    fn the_definition_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn fly_takes_every_option_of_the_design() {
+        let line = "skein-sim fly open --vehicles 4 --seed 7 --clock lockstep --speed 2.5 --controller none \
+                    --world w.sdf --mission a.plan --mission b.plan --out run --headless --json";
+        let cli = parse(line).expect("all options are known");
+        assert!(cli.json);
+        let Command::Fly(fly) = cli.command else { panic!("fly is fly") };
+        assert_eq!(
+            (fly.clock, fly.controller, fly.speed, fly.headless),
+            (Clock::Lockstep, Controller::None, 2.5, true)
+        );
+        let world = &fly.world;
+        assert_eq!((world.scenario.as_str(), world.vehicles, world.seed), ("open", Some(4), 7));
+        assert_eq!(world.overrides().missions, [PathBuf::from("a.plan"), PathBuf::from("b.plan")]);
+        assert_eq!(fly.out, Some(PathBuf::from("run")));
+    }
+
+    #[test]
+    fn a_plain_fly_is_in_real_time_with_programs() {
+        let Command::Fly(fly) = parse("skein-sim fly forest").expect("a scenario is enough").command else {
+            panic!("fly is fly")
+        };
+        assert_eq!((fly.clock, fly.controller, fly.speed), (Clock::Real, Controller::Bp, 1.0));
+        assert_eq!(fly.world.overrides().vehicles, None);
+    }
+
+    #[test]
+    fn wrong_usage_exits_with_2() {
+        for line in [
+            "skein-sim",
+            "skein-sim fly",
+            "skein-sim fly open --speed 0",
+            "skein-sim fly open --speed nan",
+            "skein-sim fly open --vehicles -1",
+            "skein-sim fly open --clock sundial",
+            "skein-sim fly open --seed x",
+            "skein-sim dance",
+        ] {
+            let error = parse(line).expect_err("wrong usage");
+            assert_eq!(error.exit_code(), 2, "{line}");
+        }
+        assert_eq!(parse("skein-sim fly --help").expect_err("help").kind(), ErrorKind::DisplayHelp);
+    }
+}

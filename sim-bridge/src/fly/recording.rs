@@ -1,0 +1,110 @@
+//! What of a flight is recorded, and when.
+
+use std::path::Path;
+use std::time::Duration;
+
+use skein_ground::recorder::{Form, Level, Recorder, RecorderError, Scan, Solid};
+use skein_wire::proto::TraceEvent;
+use skein_wire::vocabulary::ADVANCE;
+use skein_world::{Scene, Shape};
+
+use super::{setup::vehicle_name, swarm::{Happenings, Swarm}};
+use crate::scenario::Scenario;
+
+/// Planned paths are recorded this often.
+const PATH_PERIOD: Duration = Duration::from_millis(500);
+
+/// A flight's `mission.mcap`.
+pub struct Recording {
+    recorder: Recorder,
+    names: Vec<String>,
+    paths_due: Duration,
+}
+
+impl Recording {
+    /// Begins a recording with what stands in the world.
+    ///
+    /// # Errors
+    /// [`RecorderError`] names the file that cannot be made.
+    pub fn create(path: &Path, scenario: &Scenario) -> Result<Self, RecorderError> {
+        let mut recorder = Recorder::create(path)?;
+        let names: Vec<String> = (0..scenario.vehicles.len()).map(|index| vehicle_name(index).to_string()).collect();
+        let hulls: Vec<(&str, f64)> =
+            names.iter().zip(&scenario.vehicles).map(|(name, plan)| (name.as_str(), plan.model.hull_radius_m)).collect();
+        recorder.scene(Duration::ZERO, &solids(&scenario.scene))?;
+        recorder.vehicles(Duration::ZERO, &hulls)?;
+        let line = format!("{} with {} vehicles, seed {}", scenario.name, names.len(), scenario.seed);
+        recorder.log(Duration::ZERO, Level::Info, "skein-sim", &line)?;
+        Ok(Self { recorder, names, paths_due: Duration::ZERO })
+    }
+
+    /// Records one step of the swarm.
+    ///
+    /// # Errors
+    /// [`RecorderError`] when the file cannot be continued.
+    pub fn take_in(&mut self, swarm: &Swarm, happenings: &Happenings) -> Result<(), RecorderError> {
+        let now = swarm.now();
+        for (index, scan) in &happenings.scans {
+            if let Some(name) = self.names.get(*index) {
+                let (angle_min, angle_step) = (scan.angle_min, scan.angle_step);
+                self.recorder.scan(now, name, Scan { ranges_m: &scan.ranges_m, angle_min, angle_step })?;
+            }
+        }
+        if happenings.ticked {
+            self.poses(swarm)?;
+            self.events(now, happenings)?;
+        }
+        if now >= self.paths_due {
+            self.paths_due = now + PATH_PERIOD;
+            for agent in swarm.agents() {
+                let path: Vec<_> = agent.path_ahead().collect();
+                self.recorder.path(now, agent.name().as_str(), &path)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn poses(&mut self, swarm: &Swarm) -> Result<(), RecorderError> {
+        let truth = swarm.simulation();
+        let poses: Vec<_> = self
+            .names
+            .iter()
+            .enumerate()
+            .filter_map(|(index, name)| Some((name.as_str(), truth.vehicle(index)?.motion.pose())))
+            .collect();
+        self.recorder.poses(swarm.now(), &poses)
+    }
+
+    fn events(&mut self, now: Duration, happenings: &Happenings) -> Result<(), RecorderError> {
+        for happened in &happenings.selections {
+            self.recorder.trace(&TraceEvent::new(&happened.home, happened))?;
+            // The trace holds every leave to move; people do not need to read each.
+            if happened.event.kind() != ADVANCE {
+                self.recorder.log(now, Level::Info, happened.home.as_str(), &happened.event.to_string())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Completes the file.
+    ///
+    /// # Errors
+    /// [`RecorderError`] when it cannot be completed.
+    pub fn finish(self) -> Result<(), RecorderError> {
+        self.recorder.finish()
+    }
+}
+
+/// The obstacles as Foxglove draws them; planes without end are left out.
+fn solids(scene: &Scene) -> Vec<Solid> {
+    let solid = |obstacle: &skein_world::Obstacle| {
+        let form = match obstacle.shape {
+            Shape::Box { half_extents } => Form::Box(2.0 * half_extents),
+            Shape::Cylinder { radius, half_height } => Form::Cylinder { radius, height: 2.0 * half_height },
+            Shape::Sphere { radius } => Form::Sphere { radius },
+            Shape::Plane { .. } => return None,
+        };
+        Some(Solid { form, pose: obstacle.pose })
+    };
+    scene.obstacles().iter().filter_map(solid).collect()
+}

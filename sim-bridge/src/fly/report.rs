@@ -1,0 +1,117 @@
+//! What a swarm says of itself: rows for the live table while it flies, a summary at the end.
+
+use std::time::Duration;
+
+use skein_agent::Outcome;
+
+use super::swarm::Swarm;
+use crate::scenario::Scenario;
+use crate::summary::{
+    self, Collisions, PlanTimes, Spread, Summary, Traffic, VehicleSummary,
+};
+use crate::table::{Progress, Row};
+
+/// The live table's rows.
+pub fn rows(swarm: &Swarm) -> Vec<Row> {
+    let now = swarm.now();
+    let row = |agent: &skein_agent::AgentCore| {
+        let status = agent.status(now);
+        Row {
+            vehicle: agent.name().to_string(),
+            mode: status.mode,
+            task: status.task,
+            waiting_for: status.waiting_for,
+            battery: Some(status.battery),
+            nearest: status.nearest.map(|(node, distance_m)| (node.to_string(), distance_m)),
+        }
+    };
+    swarm.agents().map(row).collect()
+}
+
+/// The live table's header.
+pub fn progress(swarm: &Swarm, wall: Duration, messages: u64) -> Progress {
+    Progress {
+        sim_time_s: swarm.now().as_secs_f64(),
+        realtime_factor: swarm.now().as_secs_f64() / wall.as_secs_f64().max(1e-9),
+        events: swarm.events().occurred,
+        messages,
+        arrived: swarm.outcomes().filter(|outcome| *outcome == Some(&Outcome::Complete)).count(),
+        vehicles: swarm.agents().len(),
+    }
+}
+
+/// What came of the run; `called_off` is why it was ended before it was over.
+pub fn summary(
+    scenario: &Scenario,
+    swarm: &Swarm,
+    wall: Duration,
+    called_off: Option<String>,
+    network: Traffic,
+) -> Summary {
+    let truth = swarm.truth();
+    let per_vehicle: Vec<VehicleSummary> = (0..swarm.agents().len()).map(|index| vehicle(swarm, index)).collect();
+    let collisions = Collisions {
+        obstacle: truth.collisions_obstacle.into(),
+        vehicle: truth.collisions_vehicle.into(),
+    };
+    let collided = match collisions {
+        Collisions { obstacle: 0, vehicle: 0 } => None,
+        Collisions { obstacle, vehicle } => Some(format!(
+            "{obstacle} collisions with obstacles and {vehicle} between vehicles"
+        )),
+    };
+    let failed = per_vehicle
+        .iter()
+        .find(|vehicle| vehicle.outcome != summary::Outcome::Arrived)
+        .map(|vehicle| format!("{}: {}", vehicle.id, vehicle.reason.as_deref().unwrap_or("did not arrive")));
+    let reason = called_off.or(collided).or(failed);
+    let flown = || (0..swarm.agents().len()).filter_map(|index| swarm.simulation().vehicle(index));
+    let sim_time_s = swarm.now().as_secs_f64();
+    Summary {
+        scenario: scenario.name.clone(),
+        seed: scenario.seed,
+        vehicles: per_vehicle.len(),
+        succeeded: reason.is_none(),
+        reason,
+        sim_time_s,
+        wall_time_s: wall.as_secs_f64(),
+        realtime_factor: sim_time_s / wall.as_secs_f64().max(1e-9),
+        collisions,
+        min_separation_m: truth.min_separation_m,
+        min_clearance_m: truth.min_clearance_m,
+        flight_time_s: Spread::of(flown().map(|vehicle| vehicle.flight_time.as_secs_f64())),
+        path_length_m: Spread::of(flown().map(|vehicle| vehicle.path_length_m)),
+        plan_ms: PlanTimes::of(swarm.plan_times_ms().to_vec()),
+        events: swarm.events(),
+        network,
+        trace_hash: swarm.trace_hash(),
+        per_vehicle,
+    }
+}
+
+fn vehicle(swarm: &Swarm, index: usize) -> VehicleSummary {
+    let agent = swarm.agents().nth(index);
+    let truth = swarm.simulation().vehicle(index);
+    let outcome = agent.and_then(skein_agent::AgentCore::outcome);
+    let crashed = truth.is_some_and(|vehicle| vehicle.crashed);
+    let airborne = truth.is_some_and(|vehicle| vehicle.airborne);
+    let flew = truth.is_some_and(|vehicle| !vehicle.flight_time.is_zero());
+    let (outcome, reason) = match outcome {
+        _ if crashed => (summary::Outcome::Crashed, Some("it crashed".to_owned())),
+        Some(Outcome::Complete) => (summary::Outcome::Arrived, None),
+        Some(Outcome::Failed(why)) => (summary::Outcome::LandedEarly, Some(why.clone())),
+        None if airborne => (summary::Outcome::Airborne, Some("it was still in the air".to_owned())),
+        None if flew => (summary::Outcome::LandedEarly, Some("it landed before its goal".to_owned())),
+        None => (summary::Outcome::Grounded, Some("it never took off".to_owned())),
+    };
+    VehicleSummary {
+        id: agent.map(|agent| agent.name().to_string()).unwrap_or_default(),
+        outcome,
+        reason,
+        flight_time_s: truth.map_or(0.0, |vehicle| vehicle.flight_time.as_secs_f64()),
+        path_length_m: truth.map_or(0.0, |vehicle| vehicle.path_length_m),
+        min_separation_m: None,
+        min_clearance_m: None,
+        battery: truth.map_or(0.0, |vehicle| vehicle.battery.fraction),
+    }
+}

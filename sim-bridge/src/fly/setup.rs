@@ -1,0 +1,124 @@
+//! From a scenario to the configurations of its world, agents and ground station.
+
+use std::sync::LazyLock;
+use std::time::Duration;
+
+use skein_agent::bthreads::LinkLossPolicy;
+use skein_agent::{AgentConfig, Controller, Envelope, Fence};
+use skein_dbp::NodeName;
+use skein_ground::{GroundConfig, Order, Who};
+use skein_wire::Fleet;
+use skein_world::{SimulationConfig, VehicleSetup};
+
+use crate::cli;
+use crate::scenario::{self, OrderKind, Scenario};
+
+/// The fleet's name on one host.
+pub const FLEET: &str = "sim";
+/// Lease of every node's bids.
+const LEASE: Duration = Duration::from_secs(1);
+/// Lowest height at which vehicles return, m above the world's origin.
+const RETURN_ALTITUDE_M: f64 = 3.0;
+/// Vehicles return at so many heights, this far apart, m.
+const RETURN_LEVELS: (usize, f64) = (4, 1.0);
+
+/// The ground station's node name.
+pub static GROUND: LazyLock<NodeName> = LazyLock::new(|| node_name("ground", "main"));
+
+/// The node name of vehicle `index`: `uav/{index + 1}`.
+#[must_use]
+pub fn vehicle_name(index: usize) -> NodeName {
+    node_name("uav", &(index + 1).to_string())
+}
+
+/// A name made of two known words.
+#[allow(clippy::expect_used)]
+fn node_name(kind: &str, id: &str) -> NodeName {
+    NodeName::new(&format!("{kind}/{id}")).expect("both chunks are plain words")
+}
+
+/// The world of a scenario.
+#[must_use]
+pub fn simulation_config(scenario: &Scenario) -> SimulationConfig {
+    let vehicles = (1..).zip(&scenario.vehicles).map(|(system_id, plan)| VehicleSetup {
+        model: plan.model.clone(),
+        position: plan.start,
+        yaw: plan.yaw,
+        system_id,
+    });
+    SimulationConfig {
+        scene: scenario.scene.clone(),
+        vehicles: vehicles.collect(),
+        seed: scenario.seed,
+        wind: scenario.wind,
+    }
+}
+
+/// The agents of a scenario, in the order of its vehicles.
+#[must_use]
+pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<AgentConfig> {
+    let vehicles = || (0..scenario.vehicles.len()).map(vehicle_name);
+    let roster: Vec<String> = vehicles().chain([GROUND.clone()]).map(|name| name.to_string()).collect();
+    let bounds = scenario.scene.bounds();
+    let fence = Fence { min: bounds.min.into(), max: bounds.max.into() };
+    let (levels, spacing_m) = RETURN_LEVELS;
+    scenario
+        .vehicles
+        .iter()
+        .enumerate()
+        .map(|(index, plan)| AgentConfig {
+            fleet: FLEET.to_owned(),
+            node: vehicle_name(index).to_string(),
+            ground: GROUND.to_string(),
+            roster: roster.clone(),
+            incarnation: 1,
+            system_id: u8::try_from(index + 1).unwrap_or(u8::MAX),
+            datum: *scenario.scene.datum(),
+            home: plan.start.into(),
+            waypoints: plan.waypoints.iter().map(|point| (*point).into()).collect(),
+            takeoff_height_m: scenario.takeoff_height_m,
+            return_altitude_m: RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64,
+            fence,
+            envelope: Envelope {
+                cruise_m_s: scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
+                climb_m_s: plan.model.max_climb_m_s.min(1.5),
+                brake_m_s2: plan.model.max_accel_m_s2 * 0.7,
+                hull_m: plan.model.hull_radius_m,
+                ..Envelope::default()
+            },
+            link_loss: LinkLossPolicy::default(),
+            controller: match controller {
+                cli::Controller::Bp => Controller::Bp,
+                cli::Controller::None => Controller::None,
+            },
+            lease: LEASE,
+            seed: scenario.seed.wrapping_mul(1000).wrapping_add(index as u64),
+        })
+        .collect()
+}
+
+/// The ground station of a scenario, with its operator's orders.
+#[must_use]
+pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Controller) -> GroundConfig {
+    let orders = scenario.orders.iter().map(|said| {
+        let who = match said.who {
+            scenario::Who::All => Who::All,
+            scenario::Who::Vehicle(number) => Who::Vehicle(vehicle_name(number.saturating_sub(1))),
+        };
+        let order = match said.order {
+            OrderKind::Hold => Order::Hold(who),
+            OrderKind::Resume => Order::Resume(who),
+            OrderKind::Land => Order::Land(who),
+            OrderKind::Return => Order::Return(who),
+        };
+        (Duration::from_secs_f64(said.at_s), order)
+    });
+    let vehicles = (0..scenario.vehicles.len()).map(vehicle_name).collect();
+    GroundConfig {
+        orders: orders.collect(),
+        loaded: controller == cli::Controller::Bp,
+        lease: LEASE,
+        seed: scenario.seed,
+        ..GroundConfig::new(fleet, GROUND.clone(), vehicles)
+    }
+}

@@ -1,0 +1,221 @@
+//! A whole swarm in one process: the world, an agent for each vehicle, and the ground station.
+//!
+//! One call of [`Swarm::step`] is one step of the world. Who calls it, and how often, is the clock's business.
+
+use std::time::{Duration, Instant};
+
+use skein_agent::{AgentConfig, AgentCore, AgentError, Outcome, Scan};
+use skein_dbp::{Happened, NodeName};
+use skein_ground::{GroundConfig, GroundCore, Order};
+use skein_wire::Link;
+use skein_world::{LidarScan, Simulation, Truth};
+
+use super::{plan_times::PlanTimes, trace_hash::TraceHash};
+use crate::summary::EventCounts;
+
+/// Agents and ground tick once in so many steps of the world: every 20 ms.
+const STEPS_PER_TICK: u64 = 5;
+
+/// A swarm, the world it flies in, and the links between its nodes.
+pub struct Swarm {
+    simulation: Simulation,
+    vehicles: Vec<Vehicle>,
+    ground: GroundCore,
+    ground_link: Box<dyn Link>,
+    steps: u64,
+    trace: TraceHash,
+    events: EventCounts,
+    plan_times: PlanTimes,
+}
+
+struct Vehicle {
+    agent: AgentCore,
+    link: Box<dyn Link>,
+}
+
+/// What happened in one step that somebody may want to record.
+#[derive(Debug, Default)]
+pub struct Happenings {
+    /// Selections at their homes, by node.
+    pub selections: Vec<Happened>,
+    /// Lidar scans, by vehicle.
+    pub scans: Vec<(usize, LidarScan)>,
+    /// Whether agents and ground ticked.
+    pub ticked: bool,
+}
+
+impl Swarm {
+    /// Puts an agent beside each vehicle of the world; `links` has one link for each, then the ground's.
+    ///
+    /// # Errors
+    /// [`AgentError`] names what is wrong in an agent's configuration.
+    pub fn new(
+        simulation: Simulation,
+        agents: Vec<AgentConfig>,
+        ground: GroundConfig,
+        links: Links,
+    ) -> Result<Self, AgentError> {
+        let vehicles = agents
+            .into_iter()
+            .zip(links.vehicles)
+            .map(|(config, link)| Ok(Vehicle { agent: AgentCore::new(config)?, link }))
+            .collect::<Result<_, AgentError>>()?;
+        Ok(Self {
+            simulation,
+            vehicles,
+            ground: GroundCore::new(ground),
+            plan_times: PlanTimes::default(),
+            ground_link: links.ground,
+            steps: 0,
+            trace: TraceHash::default(),
+            events: EventCounts::default(),
+        })
+    }
+
+    /// Moves world, agents and ground on by one step of 4 ms.
+    pub fn step(&mut self) -> Happenings {
+        self.simulation.step();
+        self.steps += 1;
+        let now = self.simulation.now();
+        let mut happenings = Happenings { scans: self.simulation.take_scans(), ..Happenings::default() };
+        for (index, vehicle) in self.vehicles.iter_mut().enumerate() {
+            let bytes = self.simulation.receive(index);
+            vehicle.agent.receive_mavlink(now, &bytes);
+        }
+        for (index, scan) in &happenings.scans {
+            if let Some(vehicle) = self.vehicles.get_mut(*index) {
+                vehicle.agent.sense(now, &scan_for_agent(scan));
+            }
+        }
+        if self.steps.is_multiple_of(STEPS_PER_TICK) {
+            happenings.ticked = true;
+            self.tick(now, &mut happenings.selections);
+        }
+        for index in 0..self.vehicles.len() {
+            if let Some(state) = self.simulation.vehicle(index) {
+                self.trace.pose(&state.motion);
+            }
+        }
+        happenings
+    }
+
+    fn tick(&mut self, now: Duration, selections: &mut Vec<Happened>) {
+        if let Err(error) = self.ground.tick(now, self.ground_link.as_mut()) {
+            tracing::error!("{error}");
+        }
+        let mut heard = self.ground.take_selections();
+        keep_own(&mut heard, self.ground.name());
+        selections.append(&mut heard);
+        for (index, vehicle) in self.vehicles.iter_mut().enumerate() {
+            let began = Instant::now();
+            vehicle.agent.tick(now, vehicle.link.as_mut());
+            let mut heard = vehicle.agent.take_selections();
+            self.plan_times.take_in(began, &heard);
+            self.simulation.send(index, &vehicle.agent.take_mavlink());
+            keep_own(&mut heard, vehicle.agent.name());
+            selections.append(&mut heard);
+        }
+        for selection in selections.iter() {
+            self.trace.event(selection.home.as_str(), selection.seq, &selection.event);
+            self.events.occurred += 1;
+            self.events.remote += u64::from(is_requested_from_afar(selection));
+        }
+    }
+
+    /// Says something to the vehicles, as an operator at the ground station.
+    pub fn order(&mut self, order: &Order) {
+        self.ground.order(order);
+    }
+
+    /// Whether every vehicle's mission has ended and it stands on the ground.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.vehicles.iter().zip(0..).all(|(vehicle, index)| {
+            let crashed = self.simulation.vehicle(index).is_some_and(|state| state.crashed);
+            crashed || vehicle.agent.outcome().is_some()
+        })
+    }
+
+    /// Whether no vehicle is in the air.
+    #[must_use]
+    pub fn is_grounded(&self) -> bool {
+        (0..self.vehicles.len()).all(|index| self.simulation.vehicle(index).is_none_or(|state| !state.airborne))
+    }
+
+    /// Time since the run began.
+    #[must_use]
+    pub fn now(&self) -> Duration {
+        self.simulation.now()
+    }
+
+    /// The world.
+    #[must_use]
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// The agents, in the order of their vehicles.
+    pub fn agents(&self) -> impl ExactSizeIterator<Item = &AgentCore> {
+        self.vehicles.iter().map(|vehicle| &vehicle.agent)
+    }
+
+    /// How each vehicle's mission ended, as far as it has.
+    pub fn outcomes(&self) -> impl Iterator<Item = Option<&Outcome>> {
+        self.agents().map(AgentCore::outcome)
+    }
+
+    /// What the referee has seen so far.
+    #[must_use]
+    pub fn truth(&self) -> Truth {
+        self.simulation.truth()
+    }
+
+    /// Events so far.
+    #[must_use]
+    pub fn events(&self) -> EventCounts {
+        self.events
+    }
+
+    /// How long each plan took, in milliseconds of wall time.
+    #[must_use]
+    pub fn plan_times_ms(&self) -> &[f64] {
+        self.plan_times.milliseconds()
+    }
+
+    /// The hash of everything so far.
+    #[must_use]
+    pub fn trace_hash(&self) -> String {
+        self.trace.hex()
+    }
+}
+
+/// The links of a swarm's nodes.
+pub struct Links {
+    /// One for each vehicle.
+    pub vehicles: Vec<Box<dyn Link>>,
+    /// The ground station's.
+    pub ground: Box<dyn Link>,
+}
+
+/// Remote b-threads are named `node#bthread`.
+fn is_requested_from_afar(selection: &Happened) -> bool {
+    selection.requested_by.iter().any(|bthread| bthread.contains('#'))
+}
+
+/// A node hears of all occurrences; each is recorded once, at its home.
+fn keep_own(selections: &mut Vec<Happened>, node: &NodeName) {
+    selections.retain(|selection| selection.home == *node);
+}
+
+/// What the agent gets of a scan: all but the true pose, which it never learns.
+fn scan_for_agent(scan: &LidarScan) -> Scan {
+    Scan {
+        stamp: scan.stamp,
+        angle_min: scan.angle_min,
+        angle_step: scan.angle_step,
+        max_range_m: scan.max_range_m,
+        ranges_m: scan.ranges_m.clone(),
+        up_m: scan.up_m,
+        down_m: scan.down_m,
+    }
+}

@@ -1,0 +1,71 @@
+//! `skein-sim`: see `skein-sim --help`.
+
+use std::process::ExitCode;
+
+use clap::Parser as _;
+use serde_json::json;
+use skein_sim::cli::{Cli, Command, Exit};
+use skein_sim::scenario::Scenario;
+use skein_sim::{check, fly, serve};
+
+fn main() -> ExitCode {
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_env_filter(
+            tracing_subscriber::EnvFilter::builder()
+                .with_default_directive(tracing_subscriber::filter::LevelFilter::WARN.into())
+                .from_env_lossy(),
+        )
+        .init();
+    let cli = Cli::parse();
+    let exit = run(&cli).unwrap_or_else(|error| {
+        let message = format!("{error:#}");
+        if cli.json {
+            println!("{}", json!({ "error": message }));
+        }
+        eprintln!("skein-sim: {message}");
+        Exit::WrongInput
+    });
+    exit.into()
+}
+
+fn run(cli: &Cli) -> anyhow::Result<Exit> {
+    match &cli.command {
+        Command::Fly(args) => {
+            let summary = fly::run(args)?;
+            if cli.json {
+                print!("{}", summary.to_json()?);
+            } else {
+                print!("{}", summary.render());
+            }
+            Ok(if summary.succeeded { Exit::Done } else { Exit::Failed })
+        }
+        Command::Serve(args) => serve::run(args, cli.json).map(|()| Exit::Done),
+        Command::List => {
+            list(cli.json);
+            Ok(Exit::Done)
+        }
+        Command::Check { file } => {
+            let report = check::check(file)?;
+            if cli.json {
+                println!("{}", serde_json::to_string(&report)?);
+            } else {
+                print!("{report}");
+            }
+            Ok(Exit::Done)
+        }
+    }
+}
+
+fn list(as_json: bool) {
+    let scenarios = Scenario::names();
+    if as_json {
+        let names: serde_json::Map<_, _> =
+            scenarios.into_iter().map(|(name, about)| (name.to_owned(), about.into())).collect();
+        println!("{}", json!({ "scenarios": names }));
+    } else {
+        for (name, about) in scenarios {
+            println!("{name:<10} {about}");
+        }
+    }
+}

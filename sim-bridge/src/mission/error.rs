@@ -1,0 +1,69 @@
+//! What can be wrong with a mission file.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why a mission file cannot be flown.
+#[derive(Debug, Error)]
+pub enum MissionError {
+    /// A file that cannot be read.
+    #[error("cannot read `{}`: {source}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Not JSON.
+    #[error("{file}:{line}:{column}: {message}")]
+    Syntax {
+        /// The mission file.
+        file: String,
+        /// Line from 1.
+        line: usize,
+        /// Column from 1.
+        column: usize,
+        /// What the parser met.
+        message: String,
+    },
+    /// JSON, but not what a mission says in this place.
+    #[error("{file}:{line}: field `{field}`: expected {expected}, found {found}")]
+    Field {
+        /// The mission file.
+        file: String,
+        /// Line from 1 of the value, or of what should hold it.
+        line: usize,
+        /// Path of the value, such as `mission.items[3].params[4]`.
+        field: String,
+        /// What should be there.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// Neither of the formats that are read.
+    #[error(
+        "{file}: expected a QGroundControl plan (a member `mission`) or an LSC mission (a member `agents`)"
+    )]
+    Unknown {
+        /// The mission file.
+        file: String,
+    },
+}
+
+/// Something in a mission file that is read over.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Warning {
+    /// The mission file.
+    pub file: String,
+    /// Line from 1.
+    pub line: usize,
+    /// What is read over, and what happens instead.
+    pub message: String,
+}
+
+impl std::fmt::Display for Warning {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}:{}: {}", self.file, self.line, self.message)
+    }
+}

@@ -1,0 +1,181 @@
+//! What can be wrong with a scenario, in words that name the input at fault and what to do about it.
+
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+use skein_world::{CsvError, SdfError, VehicleError};
+use thiserror::Error;
+
+use crate::mission::MissionError;
+
+/// Why a scenario cannot be flown.
+#[derive(Debug, Error)]
+pub enum ScenarioError {
+    /// Neither a built-in name nor a file.
+    #[error("unknown scenario `{name}`: expected one of {known}, or the path of a scenario file (.toml)")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The built-in names, separated by commas.
+        known: String,
+    },
+    /// A file that cannot be read.
+    #[error("cannot read `{}`: {source}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Not TOML, an unknown key, or a value of the wrong type or range.
+    #[error("{file}:{line}:{column}: {}{message}", at_field(.field))]
+    Malformed {
+        /// The scenario file.
+        file: String,
+        /// Line from 1.
+        line: usize,
+        /// Column from 1, in characters.
+        column: usize,
+        /// Path of the field, such as `vehicle[2].start_m`; empty at top level.
+        field: String,
+        /// What was found and what was expected.
+        message: String,
+    },
+    /// Fields that are sound alone but not together.
+    #[error("{file}: {field}: {message}")]
+    Contradiction {
+        /// The scenario file.
+        file: String,
+        /// Path of the field.
+        field: String,
+        /// What is wrong and what to do.
+        message: String,
+    },
+    /// A world file that cannot be read as SDF.
+    #[error(transparent)]
+    Sdf(#[from] SdfError),
+    /// A world file that cannot be read as a list of boxes.
+    #[error(transparent)]
+    Csv(#[from] CsvError),
+    /// A vehicle model that is unknown or malformed.
+    #[error(transparent)]
+    Vehicle(#[from] VehicleError),
+    /// A mission file that cannot be read.
+    #[error(transparent)]
+    Mission(#[from] MissionError),
+    /// Nothing to fly.
+    #[error(
+        "scenario `{scenario}` has no vehicles: expected at least 1; give --vehicles N or [[vehicle]] tables"
+    )]
+    NoVehicles {
+        /// Name of the scenario.
+        scenario: String,
+    },
+    /// More vehicles than MAVLink system numbers.
+    #[error("{vehicles} vehicles are too many: expected at most {limit}")]
+    TooManyVehicles {
+        /// What was asked for.
+        vehicles: usize,
+        /// The largest swarm.
+        limit: usize,
+    },
+    /// More vehicles than the file describes.
+    #[error("scenario `{scenario}` describes {described} vehicles, {wanted} were asked for")]
+    TooFewDescribed {
+        /// Name of the scenario.
+        scenario: String,
+        /// What was asked for.
+        wanted: usize,
+        /// `[[vehicle]]` tables in the file.
+        described: usize,
+    },
+    /// Several missions, but not one for each vehicle.
+    #[error(
+        "{missions} missions for {vehicles} vehicles: give one mission that all fly in trail, or one for each vehicle"
+    )]
+    MissionCount {
+        /// Missions given.
+        missions: usize,
+        /// Vehicles of the scenario.
+        vehicles: usize,
+    },
+    /// A vehicle that would start within an obstacle.
+    #[error("vehicle {vehicle}: start {} is inside obstacle `{obstacle}` (its hull overlaps by {overlap_m:.2} m); move the start", place(.position))]
+    StartInObstacle {
+        /// Number of the vehicle, from 1.
+        vehicle: usize,
+        /// Name of the obstacle.
+        obstacle: String,
+        /// Where: ENU, metres.
+        position: Vector3<f64>,
+        /// How deep the hull reaches into it, in metres.
+        overlap_m: f64,
+    },
+    /// A start or waypoint out of the world.
+    #[error("vehicle {vehicle}: {what} {} is outside the world, which reaches from {} to {}", place(.position), place(.min), place(.max))]
+    OutsideBounds {
+        /// Number of the vehicle, from 1.
+        vehicle: usize,
+        /// `start`, `goal` or `waypoint 2`.
+        what: String,
+        /// Where: ENU, metres.
+        position: Vector3<f64>,
+        /// Lowest corner of the world.
+        min: Vector3<f64>,
+        /// Highest corner of the world.
+        max: Vector3<f64>,
+    },
+    /// A goal or waypoint under the ground.
+    #[error("vehicle {vehicle}: {what} {} is not above the ground: expected a height above 0 m", place(.position))]
+    BelowGround {
+        /// Number of the vehicle, from 1.
+        vehicle: usize,
+        /// `goal` or `waypoint 2`.
+        what: String,
+        /// Where: ENU, metres.
+        position: Vector3<f64>,
+    },
+    /// Two vehicles that would stand in one another.
+    #[error(
+        "{what}s of vehicles {first} and {second} are {distance_m:.2} m apart: expected at least {least_m:.2} m"
+    )]
+    TooClose {
+        /// `start` or `goal`.
+        what: &'static str,
+        /// Number of one vehicle, from 1.
+        first: usize,
+        /// Number of the other.
+        second: usize,
+        /// Horizontal distance, in metres.
+        distance_m: f64,
+        /// What their hulls need, in metres.
+        least_m: f64,
+    },
+    /// A vehicle without a way.
+    #[error("vehicle {vehicle} has nowhere to go: give it waypoints or a mission")]
+    NoWaypoints {
+        /// Number of the vehicle, from 1.
+        vehicle: usize,
+    },
+    /// No room for a start or goal.
+    #[error("vehicle {vehicle}: no place for its {what} near {}: everything within {reach_m} m is too close to an obstacle, to another vehicle or to the bounds", place(.near))]
+    NoRoom {
+        /// Number of the vehicle, from 1.
+        vehicle: usize,
+        /// `start` or `goal`.
+        what: &'static str,
+        /// Where one was wanted: ENU, metres.
+        near: Vector3<f64>,
+        /// How far was searched, in metres.
+        reach_m: f64,
+    },
+}
+
+fn at_field(field: &str) -> String {
+    if field.is_empty() { String::new() } else { format!("field `{field}`: ") }
+}
+
+/// A position as people write it.
+pub(super) fn place(p: &Vector3<f64>) -> String {
+    format!("({:.2}, {:.2}, {:.2})", p.x, p.y, p.z)
+}

@@ -1,0 +1,440 @@
+//! The scenario file: what its TOML may say, and how a scenario comes out of it.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::Deserialize;
+use skein_world::{Aabb, Obstacle, Scene, Shape, VehicleModel, WindConfig};
+
+use super::antipodal::Antipodal;
+use super::field;
+use super::forest::Forest;
+use super::layout::Layout;
+use super::open::Open;
+use super::window::Window;
+use super::{
+    DEFAULT_TIME_LIMIT_S, Network, Order, OrderKind, Scenario, ScenarioError, VehiclePlan, Who, check_count,
+    read, read_world, stated_datum,
+};
+use crate::mission;
+
+const DEFAULT_VEHICLES: usize = 4;
+const DEFAULT_MODEL: &str = "x500";
+const DEFAULT_CRUISE_SPEED_M_S: f64 = 3.0;
+const DEFAULT_TAKEOFF_HEIGHT_M: f64 = 3.0;
+
+/// A parsed scenario file with the place it came from.
+pub struct ScenarioFile {
+    /// What errors call it.
+    file: String,
+    table: FileTable,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileTable {
+    name: Option<String>,
+    about: Option<String>,
+    generator: Option<Generator>,
+    vehicles: Option<usize>,
+    model: Option<String>,
+    #[serde(default, deserialize_with = "field::optional_positive")]
+    cruise_speed_m_s: Option<f64>,
+    #[serde(default, deserialize_with = "field::optional_positive")]
+    takeoff_height_m: Option<f64>,
+    #[serde(default, deserialize_with = "field::optional_positive")]
+    time_limit_s: Option<f64>,
+    world: Option<PathBuf>,
+    #[serde(default)]
+    mission: Vec<PathBuf>,
+    forest: Option<Forest>,
+    antipodal: Option<Antipodal>,
+    window: Option<Window>,
+    open: Option<Open>,
+    bounds: Option<BoundsTable>,
+    wind: Option<WindTable>,
+    #[serde(default)]
+    network: Network,
+    gps: Option<GpsTable>,
+    #[serde(default)]
+    order: Vec<OrderTable>,
+    #[serde(default)]
+    vehicle: Vec<VehicleTable>,
+    #[serde(default)]
+    obstacle: Vec<ObstacleTable>,
+}
+
+/// Makes world and routes from the seed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Generator {
+    Forest,
+    Antipodal,
+    Window,
+    Open,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BoundsTable {
+    #[serde(deserialize_with = "field::point")]
+    min_m: Vector3<f64>,
+    #[serde(deserialize_with = "field::point")]
+    max_m: Vector3<f64>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WindTable {
+    #[serde(deserialize_with = "field::point")]
+    mean_m_s: Vector3<f64>,
+    #[serde(default, deserialize_with = "field::non_negative")]
+    gust_m_s: f64,
+}
+
+impl From<WindTable> for WindConfig {
+    fn from(table: WindTable) -> Self {
+        Self { mean: table.mean_m_s, gust_sigma_m_s: table.gust_m_s, ..Self::default() }
+    }
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GpsTable {
+    #[serde(deserialize_with = "field::non_negative")]
+    sigma_m: f64,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OrderTable {
+    #[serde(deserialize_with = "field::non_negative")]
+    at_s: f64,
+    order: OrderKind,
+    vehicle: Option<usize>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct VehicleTable {
+    #[serde(deserialize_with = "field::ground_point")]
+    start_m: Vector3<f64>,
+    yaw_rad: Option<f64>,
+    #[serde(default, deserialize_with = "field::points")]
+    waypoints_m: Vec<Vector3<f64>>,
+    model: Option<String>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ObstacleTable {
+    name: Option<String>,
+    #[serde(deserialize_with = "field::point")]
+    centre_m: Vector3<f64>,
+    #[serde(default)]
+    yaw_rad: f64,
+    #[serde(default, deserialize_with = "field::optional_extent")]
+    box_m: Option<Vector3<f64>>,
+    cylinder: Option<CylinderTable>,
+    sphere: Option<SphereTable>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CylinderTable {
+    #[serde(deserialize_with = "field::positive")]
+    radius_m: f64,
+    #[serde(deserialize_with = "field::positive")]
+    height_m: f64,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SphereTable {
+    #[serde(deserialize_with = "field::positive")]
+    radius_m: f64,
+}
+
+impl ScenarioFile {
+    /// Reads TOML; `file` is what errors call it.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Malformed`] at the first thing that is not as expected.
+    pub fn parse(text: &str, file: &str) -> Result<Self, ScenarioError> {
+        let malformed = |error: &toml::de::Error, field: String| {
+            let (line, column) = line_and_column(text, error.span().map_or(0, |span| span.start));
+            ScenarioError::Malformed {
+                file: file.to_owned(),
+                line,
+                column,
+                field,
+                message: error.message().to_owned(),
+            }
+        };
+        let parser = toml::Deserializer::parse(text).map_err(|e| malformed(&e, String::new()))?;
+        let table = serde_path_to_error::deserialize(parser).map_err(|error| {
+            let field = error.path().to_string();
+            let field = if field == "." { String::new() } else { field };
+            malformed(error.inner(), field)
+        })?;
+        Ok(Self { file: file.to_owned(), table })
+    }
+
+    /// One line that says what the scenario is.
+    pub fn about(&self) -> String {
+        self.table.about.clone().unwrap_or_default()
+    }
+
+    /// Makes the world and the vehicles' plans; see [`Scenario::validate`] for what is left to check.
+    pub fn build(self, vehicles: Option<usize>, seed: u64) -> Result<Scenario, ScenarioError> {
+        self.check_tables()?;
+        let name = self.name();
+        let world = self.table.world.as_deref().map(|path| read_world(&self.beside(path))).transpose()?;
+        let datum = world.as_ref().and_then(|(scene, _)| stated_datum(scene));
+        let paths: Vec<_> = self.table.mission.iter().map(|path| self.beside(path)).collect();
+        let set = mission::read_files(&paths, datum)?;
+        let count = self.count(vehicles, set.missions.len());
+        check_count(&name, count)?;
+        let layout = self.generate(count, seed);
+        let mut plans = self.plans(count, layout.as_ref(), set.missions.is_empty())?;
+        self.tune_gps(&mut plans);
+        let replaced = world.is_some() && layout.is_some();
+        let (scene, notes) = self.scene(&name, layout, world)?;
+        let orders = self.orders(count)?;
+        let fixed_bounds = self.fixed_bounds();
+        let table = self.table;
+        let mut scenario = Scenario {
+            name,
+            about: table.about.unwrap_or_default(),
+            seed,
+            scene,
+            fixed_bounds,
+            vehicles: plans,
+            cruise_speed_m_s: table.cruise_speed_m_s.unwrap_or(DEFAULT_CRUISE_SPEED_M_S),
+            takeoff_height_m: table.takeoff_height_m.unwrap_or(DEFAULT_TAKEOFF_HEIGHT_M),
+            time_limit_s: table.time_limit_s.unwrap_or(DEFAULT_TIME_LIMIT_S),
+            wind: table.wind.map(WindConfig::from).unwrap_or_default(),
+            orders,
+            network: table.network,
+            notes,
+        };
+        if set.missions.is_empty() {
+            scenario.include_routes();
+            if replaced {
+                scenario.settle()?;
+            }
+        }
+        scenario.fly(set)?;
+        Ok(scenario)
+    }
+
+    /// Refuses keys that would be read and then have no effect.
+    fn check_tables(&self) -> Result<(), ScenarioError> {
+        let table = &self.table;
+        let given = [
+            ("forest", table.forest.is_some(), Generator::Forest),
+            ("antipodal", table.antipodal.is_some(), Generator::Antipodal),
+            ("window", table.window.is_some(), Generator::Window),
+            ("open", table.open.is_some(), Generator::Open),
+        ];
+        for (name, given, generator) in given {
+            if given && table.generator != Some(generator) {
+                return Err(self.contradiction(name, format!("has no effect without generator = \"{name}\"")));
+            }
+        }
+        if let Some(forest) = &table.forest
+            && let Err((field, message)) = forest.check()
+        {
+            return Err(self.contradiction(format!("forest.{field}"), message));
+        }
+        if let Some(bounds) = &table.bounds
+            && (0..3).any(|axis| bounds.min_m[axis] >= bounds.max_m[axis])
+        {
+            return Err(self.contradiction("bounds", "expected min_m below max_m in every axis".to_owned()));
+        }
+        Ok(())
+    }
+
+    fn contradiction(&self, field: impl Into<String>, message: impl Into<String>) -> ScenarioError {
+        ScenarioError::Contradiction { file: self.file.clone(), field: field.into(), message: message.into() }
+    }
+
+    /// The scenario's own name, or that of its file.
+    fn name(&self) -> String {
+        let stem = || Path::new(&self.file).file_stem().map(|s| s.to_string_lossy().into_owned());
+        self.table.name.clone().or_else(stem).unwrap_or_default()
+    }
+
+    /// Paths in a scenario are relative to its file.
+    fn beside(&self, path: &Path) -> PathBuf {
+        Path::new(&self.file).parent().unwrap_or(Path::new("")).join(path)
+    }
+
+    fn count(&self, wanted: Option<usize>, missions: usize) -> usize {
+        let described = match self.table.vehicle.len() {
+            0 => None,
+            described => Some(described),
+        };
+        let one_each = (missions > 1).then_some(missions);
+        let default = || if self.table.generator.is_some() || missions > 0 { DEFAULT_VEHICLES } else { 0 };
+        wanted.or(self.table.vehicles).or(described).or(one_each).unwrap_or_else(default)
+    }
+
+    fn generate(&self, vehicles: usize, seed: u64) -> Option<Layout> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let table = &self.table;
+        let layout = match table.generator? {
+            Generator::Forest => table.forest.clone().unwrap_or_default().generate(vehicles, &mut rng),
+            Generator::Antipodal => table.antipodal.clone().unwrap_or_default().generate(vehicles, &mut rng),
+            Generator::Window => table.window.clone().unwrap_or_default().generate(vehicles, &mut rng),
+            Generator::Open => table.open.clone().unwrap_or_default().generate(vehicles, &mut rng),
+        };
+        Some(layout)
+    }
+
+    /// `[[vehicle]]` tables where there are any, else the generator's routes, else blanks for a mission to fill.
+    fn plans(
+        &self,
+        count: usize,
+        layout: Option<&Layout>,
+        no_mission: bool,
+    ) -> Result<Vec<VehiclePlan>, ScenarioError> {
+        let model = self.model(self.table.model.as_deref().unwrap_or(DEFAULT_MODEL))?;
+        if !self.table.vehicle.is_empty() {
+            return self.described(count, &model);
+        }
+        if let Some(layout) = layout {
+            let plan = |route: &super::layout::Route| VehiclePlan {
+                start: route.start,
+                yaw: route.yaw(),
+                waypoints: vec![route.goal],
+                model: model.clone(),
+            };
+            return Ok(layout.routes.iter().map(plan).collect());
+        }
+        if no_mission {
+            let message =
+                "expected a generator, a mission or [[vehicle]] tables: the vehicles have nowhere to go";
+            return Err(self.contradiction("vehicles", message));
+        }
+        let blank = VehiclePlan { start: Vector3::zeros(), yaw: 0.0, waypoints: Vec::new(), model };
+        Ok(vec![blank; count])
+    }
+
+    fn described(&self, count: usize, model: &VehicleModel) -> Result<Vec<VehiclePlan>, ScenarioError> {
+        let tables = &self.table.vehicle;
+        if count > tables.len() {
+            let scenario = self.name();
+            return Err(ScenarioError::TooFewDescribed { scenario, wanted: count, described: tables.len() });
+        }
+        let plan = |table: &VehicleTable| {
+            let start = table.start_m;
+            let ahead = table.waypoints_m.first().map_or(Vector3::x(), |first| first - start);
+            Ok(VehiclePlan {
+                start,
+                yaw: table.yaw_rad.unwrap_or_else(|| ahead.y.atan2(ahead.x)),
+                waypoints: table.waypoints_m.clone(),
+                model: table.model.as_deref().map_or_else(|| Ok(model.clone()), |name| self.model(name))?,
+            })
+        };
+        tables.iter().take(count).map(plan).collect()
+    }
+
+    /// A built-in vehicle model by name, or one from a file beside the scenario.
+    fn model(&self, name: &str) -> Result<VehicleModel, ScenarioError> {
+        if !name.ends_with(".toml") {
+            return Ok(VehicleModel::built_in(name)?);
+        }
+        let path = self.beside(Path::new(name));
+        Ok(VehicleModel::from_toml(&read(&path)?, &path.display().to_string())?)
+    }
+
+    /// A `[gps]` table makes every receiver as good in all axes as it says.
+    fn tune_gps(&self, plans: &mut [VehiclePlan]) {
+        let Some(gps) = &self.table.gps else { return };
+        for plan in plans {
+            plan.model.gps.sigma_horizontal_m = gps.sigma_m;
+            plan.model.gps.sigma_vertical_m = gps.sigma_m;
+        }
+    }
+
+    /// The world of a file or of the generator, with the scenario's own obstacles and bounds; and notes on it.
+    fn scene(
+        &self,
+        name: &str,
+        layout: Option<Layout>,
+        world: Option<(Scene, Vec<String>)>,
+    ) -> Result<(Scene, Vec<String>), ScenarioError> {
+        let own = self.obstacles()?;
+        let (scene, notes) = match (world, layout) {
+            (Some((scene, warnings)), _) => {
+                let obstacles = scene.obstacles().iter().cloned().chain(own).collect();
+                (Scene::new(name, obstacles).with_datum(*scene.datum()), warnings)
+            }
+            (None, Some(layout)) => {
+                let obstacles = layout.obstacles.into_iter().chain(own).collect();
+                (Scene::new(name, obstacles).with_bounds(layout.bounds), layout.notes)
+            }
+            (None, None) => (Scene::new(name, own), Vec::new()),
+        };
+        match &self.table.bounds {
+            Some(bounds) => Ok((scene.with_bounds(Aabb { min: bounds.min_m, max: bounds.max_m }), notes)),
+            None => Ok((scene, notes)),
+        }
+    }
+
+    /// Stated bounds are part of the scenario, and so are those of a generated world; but an empty field has no edge.
+    fn fixed_bounds(&self) -> bool {
+        let generated = self.table.generator.is_some_and(|g| g != Generator::Open);
+        self.table.bounds.is_some() || (generated && self.table.world.is_none())
+    }
+
+    fn obstacles(&self) -> Result<Vec<Obstacle>, ScenarioError> {
+        self.table.obstacle.iter().enumerate().map(|(i, table)| self.obstacle(i, table)).collect()
+    }
+
+    fn obstacle(&self, index: usize, table: &ObstacleTable) -> Result<Obstacle, ScenarioError> {
+        let shape = match (&table.box_m, &table.cylinder, &table.sphere) {
+            (Some(size), None, None) => Shape::Box { half_extents: size / 2.0 },
+            (None, Some(c), None) => Shape::Cylinder { radius: c.radius_m, half_height: c.height_m / 2.0 },
+            (None, None, Some(s)) => Shape::Sphere { radius: s.radius_m },
+            _ => {
+                let message = "expected exactly one of box_m, cylinder and sphere";
+                return Err(self.contradiction(format!("obstacle[{index}]"), message));
+            }
+        };
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), table.yaw_rad);
+        Ok(Obstacle {
+            name: table.name.clone().unwrap_or_else(|| format!("obstacle {}", index + 1)),
+            shape,
+            pose: Isometry3::from_parts(table.centre_m.into(), turn),
+        })
+    }
+
+    fn orders(&self, vehicles: usize) -> Result<Vec<Order>, ScenarioError> {
+        let order = |(i, table): (usize, &OrderTable)| {
+            let who = match table.vehicle {
+                None => Who::All,
+                Some(number) if (1..=vehicles).contains(&number) => Who::Vehicle(number),
+                Some(number) => {
+                    let message = format!("there is no vehicle {number}: expected 1 to {vehicles}");
+                    return Err(self.contradiction(format!("order[{i}].vehicle"), message));
+                }
+            };
+            Ok(Order { at_s: table.at_s, order: table.order, who })
+        };
+        let mut orders = self.table.order.iter().enumerate().map(order).collect::<Result<Vec<_>, _>>()?;
+        orders.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+        Ok(orders)
+    }
+}
+
+/// Line and column (both from 1, the column in characters) of a byte offset.
+fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
+    let before = text.get(..offset).unwrap_or(text);
+    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    let column = before.get(line_start..).map_or(0, |line| line.chars().count());
+    (before.matches('\n').count() + 1, column + 1)
+}

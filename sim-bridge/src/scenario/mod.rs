@@ -1,0 +1,417 @@
+//! Scenarios: a world, a swarm in it, and what is asked of the swarm.
+//!
+//! A scenario is a TOML file. The built-in ones are the files of `scenarios/`, read as a user's own would be;
+//! those whose `generator` makes world and routes make them from the seed, so that one seed is one world.
+
+mod antipodal;
+mod error;
+mod field;
+mod file;
+mod forest;
+mod layout;
+mod open;
+pub(crate) mod placement;
+mod window;
+mod world_file;
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+use skein_mav::Datum;
+use skein_world::{Aabb, Scene, VehicleModel, WindConfig};
+
+pub use error::ScenarioError;
+pub use layout::SPACING_M;
+pub use world_file::read_world;
+
+use crate::mission::{self, MissionSet};
+
+/// Largest swarm: MAVLink numbers systems from 1 to 255, and the ground takes the last.
+pub const MAX_VEHICLES: usize = 254;
+
+/// Seconds after which a mission counts as failed, unless the scenario says otherwise.
+pub const DEFAULT_TIME_LIMIT_S: f64 = 300.0;
+
+/// From a route to bounds that grow with it, in metres.
+const ROUTE_MARGIN: Vector3<f64> = Vector3::new(5.0, 5.0, 5.0);
+
+/// Room between two hulls on the ground, in metres, below which a scenario is refused.
+const HULL_ROOM_M: f64 = 0.2;
+
+const BUILT_IN: [(&str, &str); 4] = [
+    ("forest", include_str!("../../scenarios/forest.toml")),
+    ("antipodal", include_str!("../../scenarios/antipodal.toml")),
+    ("window", include_str!("../../scenarios/window.toml")),
+    ("open", include_str!("../../scenarios/open.toml")),
+];
+
+/// A world, a swarm in it, and what is asked of the swarm. World frame ENU, metres, seconds.
+#[derive(Debug, Clone)]
+pub struct Scenario {
+    /// Short name, for the summary.
+    pub name: String,
+    /// One line for people.
+    pub about: String,
+    /// What every random number of the run comes from.
+    pub seed: u64,
+    /// Obstacles and bounds.
+    pub scene: Scene,
+    /// Whether the bounds are part of the scenario; otherwise they grow to hold a mission.
+    pub fixed_bounds: bool,
+    /// The vehicles; vehicle `i` is `uav/{i + 1}`.
+    pub vehicles: Vec<VehiclePlan>,
+    /// Speed the vehicles aim for between waypoints.
+    pub cruise_speed_m_s: f64,
+    /// Height above the ground at which a take-off ends.
+    pub takeoff_height_m: f64,
+    /// Simulated seconds after which the mission has failed.
+    pub time_limit_s: f64,
+    /// Air that moves.
+    pub wind: WindConfig,
+    /// What an operator says during the mission, in order of time.
+    pub orders: Vec<Order>,
+    /// What the in-memory network does to messages.
+    pub network: Network,
+    /// What the user should be told: parameters that gave way, parts of files that were not understood.
+    pub notes: Vec<String>,
+}
+
+/// What one vehicle is and is to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VehiclePlan {
+    /// Where it stands before take-off: ENU, metres, on the ground.
+    pub start: Vector3<f64>,
+    /// Heading at the start: radians counter-clockwise from east.
+    pub yaw: f64,
+    /// Where to fly: ENU, metres. It lands under the last.
+    pub waypoints: Vec<Vector3<f64>>,
+    /// What it is made of.
+    pub model: VehicleModel,
+}
+
+impl VehiclePlan {
+    /// The last waypoint; the start where there is none.
+    pub fn goal(&self) -> Vector3<f64> {
+        self.waypoints.last().copied().unwrap_or(self.start)
+    }
+}
+
+/// What the in-memory network does to messages.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Network {
+    /// Mean one-way delay, in milliseconds.
+    #[serde(deserialize_with = "field::non_negative")]
+    pub latency_ms: f64,
+    /// Share of messages that are lost, 0 to below 1.
+    #[serde(deserialize_with = "field::share")]
+    pub loss: f64,
+}
+
+impl Default for Network {
+    fn default() -> Self {
+        Self { latency_ms: 5.0, loss: 0.0 }
+    }
+}
+
+/// What an operator says at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Order {
+    /// When, in simulated seconds.
+    pub at_s: f64,
+    /// What.
+    pub order: OrderKind,
+    /// To whom.
+    pub who: Who,
+}
+
+/// What an operator can say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OrderKind {
+    /// Stop and hover.
+    Hold,
+    /// Go on after a hold.
+    Resume,
+    /// Land here.
+    Land,
+    /// Fly home and land.
+    Return,
+}
+
+/// Whom an order is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Who {
+    /// The whole swarm.
+    All,
+    /// The vehicle of that number, from 1.
+    Vehicle(usize),
+}
+
+/// What a command line sets over a scenario.
+#[derive(Debug, Clone, Default)]
+pub struct Overrides {
+    /// Size of the swarm.
+    pub vehicles: Option<usize>,
+    /// A world file instead of the scenario's own world.
+    pub world: Option<PathBuf>,
+    /// Mission files: one that all fly in trail, or one for each vehicle.
+    pub missions: Vec<PathBuf>,
+}
+
+impl Scenario {
+    /// Names of the built-in scenarios, each with a line that says what it is.
+    pub fn names() -> Vec<(&'static str, String)> {
+        let about = |(name, text): &(&'static str, &str)| {
+            file::ScenarioFile::parse(text, name).ok().map(|file| (*name, file.about()))
+        };
+        BUILT_IN.iter().filter_map(about).collect()
+    }
+
+    /// A built-in scenario; `vehicles` is the scenario's own number where `None`.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Unknown`] lists the names there are; others as [`Scenario::validate`].
+    pub fn built_in(name: &str, vehicles: Option<usize>, seed: u64) -> Result<Self, ScenarioError> {
+        match BUILT_IN.iter().find(|(known, _)| *known == name) {
+            Some((_, text)) => Self::from_toml(text, &format!("{name}.toml"), vehicles, seed),
+            None => Err(ScenarioError::Unknown {
+                name: name.to_owned(),
+                known: BUILT_IN.map(|(known, _)| known).join(", "),
+            }),
+        }
+    }
+
+    /// A scenario from the text of its file; `file` names it in errors, and paths inside are relative to it.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Malformed`] with line, column and field; others as [`Scenario::validate`].
+    pub fn from_toml(
+        text: &str,
+        file: &str,
+        vehicles: Option<usize>,
+        seed: u64,
+    ) -> Result<Self, ScenarioError> {
+        let scenario = file::ScenarioFile::parse(text, file)?.build(vehicles, seed)?;
+        scenario.validate()?;
+        Ok(scenario)
+    }
+
+    /// The scenario that a command line names: built in, or the path of a file; with its overrides.
+    ///
+    /// # Errors
+    /// Whatever is wrong with any of the files, or with all together.
+    pub fn open(name: &str, overrides: &Overrides, seed: u64) -> Result<Self, ScenarioError> {
+        let world = overrides.world.as_deref().map(read_world).transpose()?;
+        let datum = world.as_ref().and_then(|(scene, _)| stated_datum(scene));
+        let set = mission::read_files(&overrides.missions, datum)?;
+        let own_number = || (set.missions.len() > 1).then_some(set.missions.len());
+        let vehicles = overrides.vehicles.or_else(own_number);
+        let mut scenario = match text_of(name)? {
+            Some(text) => Self::from_toml(&text, name, vehicles, seed)?,
+            None => Self::built_in(name, vehicles, seed)?,
+        };
+        if let Some((scene, warnings)) = world {
+            scenario.replace_world(scene);
+            scenario.notes.extend(warnings);
+            if set.missions.is_empty() {
+                scenario.settle()?;
+            }
+        }
+        scenario.fly(set)?;
+        scenario.validate()?;
+        Ok(scenario)
+    }
+
+    /// Puts another world in place of the scenario's own; the routes stay until [`Scenario::settle`] or a mission.
+    pub fn replace_world(&mut self, scene: Scene) {
+        self.scene = scene;
+        self.fixed_bounds = false;
+        self.include_routes();
+    }
+
+    /// Applies missions, if there are any, puts the world where on earth they are, and notes their warnings.
+    fn fly(&mut self, set: MissionSet) -> Result<(), ScenarioError> {
+        self.notes.extend(set.warnings.iter().map(ToString::to_string));
+        if let Some(datum) = set.datum {
+            self.scene = self.scene.clone().with_datum(datum);
+        }
+        if set.missions.is_empty() { Ok(()) } else { mission::apply_missions(self, set.missions) }
+    }
+
+    /// Moves each start and goal that stands too near an obstacle to the nearest clear place, and notes it.
+    ///
+    /// # Errors
+    /// [`ScenarioError::NoRoom`] where there is none.
+    pub fn settle(&mut self) -> Result<(), ScenarioError> {
+        let (mut starts, mut goals) = (Vec::new(), Vec::new());
+        for i in 0..self.vehicles.len() {
+            let Some((start, goal)) = self.vehicles.get(i).map(|v| (v.start, v.goal())) else { continue };
+            let start = self.clear_place(i, "start", start, &starts)?;
+            let goal = self.clear_place(i, "goal", goal, &goals)?;
+            self.move_start(i, start);
+            self.move_goal(i, goal);
+            starts.push(start);
+            goals.push(goal);
+        }
+        Ok(())
+    }
+
+    fn clear_place(
+        &self,
+        index: usize,
+        what: &'static str,
+        near: Vector3<f64>,
+        taken: &[Vector3<f64>],
+    ) -> Result<Vector3<f64>, ScenarioError> {
+        let clear = |place: &Vector3<f64>| placement::is_clear(&self.scene, place, self.takeoff_height_m);
+        let none = ScenarioError::NoRoom { vehicle: index + 1, what, near, reach_m: placement::REACH_M };
+        placement::clear_place(&near, taken, clear).ok_or(none)
+    }
+
+    /// Puts a vehicle's start elsewhere, and notes it.
+    pub(crate) fn move_start(&mut self, index: usize, to: Vector3<f64>) {
+        let Some(vehicle) = self.vehicles.get_mut(index) else { return };
+        note_move(&mut self.notes, index, "start", vehicle.start, to);
+        vehicle.start = to;
+    }
+
+    /// Puts a vehicle's last waypoint elsewhere, and notes it.
+    pub(crate) fn move_goal(&mut self, index: usize, to: Vector3<f64>) {
+        let Some(goal) = self.vehicles.get_mut(index).and_then(|v| v.waypoints.last_mut()) else { return };
+        note_move(&mut self.notes, index, "goal", *goal, to);
+        *goal = to;
+    }
+
+    /// Checks what a run relies on.
+    ///
+    /// Whether a goal can be reached is not looked at: the vehicles find that out and land.
+    ///
+    /// # Errors
+    /// No vehicles or too many; a start inside an obstacle; a start or waypoint outside of the bounds or under the
+    /// ground; starts or goals so close that vehicles would touch.
+    pub fn validate(&self) -> Result<(), ScenarioError> {
+        check_count(&self.name, self.vehicles.len())?;
+        for (i, vehicle) in self.vehicles.iter().enumerate() {
+            self.check_start(i + 1, vehicle)?;
+            self.check_waypoints(i + 1, vehicle)?;
+        }
+        self.check_spacing("start", |v| v.start)?;
+        self.check_spacing("goal", VehiclePlan::goal)
+    }
+
+    fn check_start(&self, number: usize, vehicle: &VehiclePlan) -> Result<(), ScenarioError> {
+        self.check_bounds(number, "start", vehicle.start)?;
+        let hull = vehicle.model.hull_radius_m;
+        let centre = vehicle.start + Vector3::z() * hull;
+        match self.scene.nearest(&centre) {
+            Some(nearest) if nearest.distance_m < hull => Err(ScenarioError::StartInObstacle {
+                vehicle: number,
+                obstacle: nearest.obstacle.name.clone(),
+                position: vehicle.start,
+                overlap_m: hull - nearest.distance_m,
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    fn check_waypoints(&self, number: usize, vehicle: &VehiclePlan) -> Result<(), ScenarioError> {
+        if vehicle.waypoints.is_empty() {
+            return Err(ScenarioError::NoWaypoints { vehicle: number });
+        }
+        for (i, &waypoint) in vehicle.waypoints.iter().enumerate() {
+            let last = i + 1 == vehicle.waypoints.len();
+            let what = if last { "goal".to_owned() } else { format!("waypoint {}", i + 1) };
+            self.check_bounds(number, &what, waypoint)?;
+            if waypoint.z <= 0.0 {
+                return Err(ScenarioError::BelowGround { vehicle: number, what, position: waypoint });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_bounds(&self, number: usize, what: &str, position: Vector3<f64>) -> Result<(), ScenarioError> {
+        let bounds = self.scene.bounds();
+        if bounds.contains(&position) {
+            return Ok(());
+        }
+        let (min, max) = (bounds.min, bounds.max);
+        Err(ScenarioError::OutsideBounds { vehicle: number, what: what.to_owned(), position, min, max })
+    }
+
+    fn check_spacing(
+        &self,
+        what: &'static str,
+        place: impl Fn(&VehiclePlan) -> Vector3<f64>,
+    ) -> Result<(), ScenarioError> {
+        for (i, a) in self.vehicles.iter().enumerate() {
+            for (j, b) in self.vehicles.iter().enumerate().skip(i + 1) {
+                let distance_m = (place(a) - place(b)).xy().norm();
+                let least_m = a.model.hull_radius_m + b.model.hull_radius_m + HULL_ROOM_M;
+                if distance_m < least_m - 1e-9 {
+                    return Err(ScenarioError::TooClose {
+                        what,
+                        first: i + 1,
+                        second: j + 1,
+                        distance_m,
+                        least_m,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Widens bounds that nobody stated so that every route lies well inside.
+    pub(crate) fn include_routes(&mut self) {
+        if self.fixed_bounds {
+            return;
+        }
+        let places = self.vehicles.iter().flat_map(|v| v.waypoints.iter().chain([&v.start]));
+        let around = |place: &Vector3<f64>| Aabb { min: *place, max: *place }.grown(ROUTE_MARGIN);
+        let mut bounds = *self.scene.bounds();
+        let floor = bounds.min.z;
+        for place in places {
+            bounds = bounds.union(&around(place));
+        }
+        bounds.min.z = floor;
+        self.scene = self.scene.clone().with_bounds(bounds);
+    }
+}
+
+fn note_move(notes: &mut Vec<String>, index: usize, what: &str, from: Vector3<f64>, to: Vector3<f64>) {
+    if from != to {
+        let (from, to) = (error::place(&from), error::place(&to));
+        notes.push(format!(
+            "vehicle {}: {what} moved from {from} to {to}, clear of obstacles and other vehicles",
+            index + 1
+        ));
+    }
+}
+
+/// Where on earth a world says it is; `None` where it has the datum of worlds that do not say.
+fn stated_datum(scene: &Scene) -> Option<Datum> {
+    let unsaid = *Scene::new("", Vec::new()).datum();
+    Some(*scene.datum()).filter(|datum| *datum != unsaid)
+}
+
+fn check_count(scenario: &str, vehicles: usize) -> Result<(), ScenarioError> {
+    match vehicles {
+        0 => Err(ScenarioError::NoVehicles { scenario: scenario.to_owned() }),
+        1..=MAX_VEHICLES => Ok(()),
+        _ => Err(ScenarioError::TooManyVehicles { vehicles, limit: MAX_VEHICLES }),
+    }
+}
+
+/// The text of a scenario file; `None` where the argument is a name and not a path.
+fn text_of(name: &str) -> Result<Option<String>, ScenarioError> {
+    let path = Path::new(name);
+    let names_a_file = path.extension().is_some() || path.components().count() > 1;
+    if names_a_file { read(path).map(Some) } else { Ok(None) }
+}
+
+fn read(path: &Path) -> Result<String, ScenarioError> {
+    std::fs::read_to_string(path)
+        .map_err(|source| ScenarioError::Unreadable { path: path.to_owned(), source })
+}

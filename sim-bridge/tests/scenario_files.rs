@@ -1,0 +1,295 @@
+//! Scenario files that users write: what they may say, and how they are told what is wrong.
+
+// Helpers fail like the tests that call them.
+#![allow(clippy::expect_used)]
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+use skein_sim::scenario::{Order, OrderKind, Overrides, Scenario, ScenarioError, Who};
+
+const YARD: &str = r#"
+name = "yard"
+about = "two vehicles change places round a pole"
+cruise_speed_m_s = 1.5
+takeoff_height_m = 2.0
+time_limit_s = 60
+
+[network]
+latency_ms = 20
+loss = 0.1
+
+[wind]
+mean_m_s = [2.0, 0.0, 0.0]
+gust_m_s = 0.5
+
+[gps]
+sigma_m = 0.2
+
+[[order]]
+at_s = 9.0
+order = "land"
+vehicle = 2
+
+[[order]]
+at_s = 4.0
+order = "hold"
+
+[[vehicle]]
+start_m = [-5.0, 0.0]
+waypoints_m = [[-5.0, 5.0, 2.5], [5.0, 0.0, 2.5]]
+
+[[vehicle]]
+start_m = [5.0, 0.5]
+waypoints_m = [[-5.0, 0.5, 3.0]]
+yaw_rad = 1.0
+model = "crazyflie"
+
+[[obstacle]]
+name = "pole"
+centre_m = [0.0, 0.0, 2.0]
+cylinder = { radius_m = 0.3, height_m = 4.0 }
+
+[[obstacle]]
+centre_m = [20.0, 0.0, 1.0]
+yaw_rad = 0.5
+box_m = [1.0, 2.0, 2.0]
+"#;
+
+fn read(text: &str) -> Result<Scenario, ScenarioError> {
+    Scenario::from_toml(text, "yard.toml", None, 1)
+}
+
+/// The message for [`YARD`] with one piece of it replaced.
+fn message(from: &str, to: &str) -> String {
+    assert!(YARD.contains(from), "`{from}` is in the file");
+    read(&YARD.replacen(from, to, 1)).expect_err("the file is wrong").to_string()
+}
+
+/// `yard.toml:LINE:` where [`YARD`] says `part`.
+fn line_of(part: &str) -> String {
+    let before = YARD.find(part).map_or(0, |offset| YARD[..offset].matches('\n').count());
+    format!("yard.toml:{}:", before + 1)
+}
+
+#[test]
+fn a_scenario_file_sets_vehicles_obstacles_orders_and_conditions() -> Result<(), ScenarioError> {
+    let yard = read(YARD)?;
+    assert_eq!((yard.name.as_str(), yard.vehicles.len()), ("yard", 2));
+    assert_eq!((yard.cruise_speed_m_s, yard.takeoff_height_m, yard.time_limit_s), (1.5, 2.0, 60.0));
+    assert_eq!((yard.network.latency_ms, yard.network.loss), (20.0, 0.1));
+    assert_eq!((yard.wind.mean, yard.wind.gust_sigma_m_s), (Vector3::new(2.0, 0.0, 0.0), 0.5));
+    let orders = [
+        Order { at_s: 4.0, order: OrderKind::Hold, who: Who::All },
+        Order { at_s: 9.0, order: OrderKind::Land, who: Who::Vehicle(2) },
+    ];
+    assert_eq!(yard.orders, orders);
+    let [first, second] = &yard.vehicles[..] else { panic!("two vehicles") };
+    assert_eq!(first.start, Vector3::new(-5.0, 0.0, 0.0));
+    assert!((first.yaw - std::f64::consts::FRAC_PI_2).abs() < 1e-12, "looks at its first waypoint");
+    assert_eq!((second.yaw, second.model.name.as_str()), (1.0, "crazyflie"));
+    assert_eq!(first.model.gps.sigma_horizontal_m, 0.2);
+    let names: Vec<_> = yard.scene.obstacles().iter().map(|o| o.name.as_str()).collect();
+    assert_eq!(names, ["pole", "obstacle 2"]);
+    assert!((yard.scene.clearance(&Vector3::new(-5.0, 0.0, 1.0)) - 4.7).abs() < 1e-12);
+    Ok(())
+}
+
+#[test]
+fn fewer_vehicles_than_described_may_fly_but_not_more() {
+    let two =
+        Scenario::from_toml(YARD, "yard.toml", Some(1), 1).expect_err("an order is for the second vehicle");
+    assert!(two.to_string().contains("order[0].vehicle"), "{two}");
+    let one = YARD.replace("vehicle = 2\n", "");
+    assert_eq!(Scenario::from_toml(&one, "yard.toml", Some(1), 1).map(|s| s.vehicles.len()).ok(), Some(1));
+    let three =
+        Scenario::from_toml(&one, "yard.toml", Some(3), 1).expect_err("two are described").to_string();
+    assert_eq!(three, "scenario `yard` describes 2 vehicles, 3 were asked for");
+}
+
+#[test]
+fn malformed_toml_is_refused_with_file_line_and_column() {
+    let text = message("name = \"yard\"", "name = \"yard");
+    assert!(text.starts_with(&line_of("name = ")), "{text}");
+    let text = message("at_s = 9.0", "at_s 9.0");
+    assert!(text.starts_with(&line_of("at_s = 9.0")), "{text}");
+}
+
+#[test]
+fn an_unknown_key_is_refused_with_its_place_and_the_known_ones() {
+    let text = message("gust_m_s = 0.5", "gusts = 0.5");
+    let place = line_of("gust_m_s = 0.5");
+    assert!(text.starts_with(&format!("{place}1: field `wind.gusts`: unknown field `gusts`")), "{text}");
+    assert!(text.contains("`gust_m_s`"), "{text}");
+    let text = message("model = \"crazyflie\"", "modle = \"crazyflie\"");
+    let place = line_of("model = \"crazyflie\"");
+    assert!(text.starts_with(&format!("{place}1: field `vehicle[1].modle`")), "{text}");
+}
+
+#[test]
+fn a_value_out_of_range_is_refused_with_its_field_and_what_was_expected() {
+    let cases = [
+        (
+            "cruise_speed_m_s = 1.5",
+            "cruise_speed_m_s = -1.5",
+            "20: field `cruise_speed_m_s`",
+            "a number above 0",
+        ),
+        ("loss = 0.1", "loss = 1.0", "8: field `network.loss`", "a number from 0 to below 1"),
+        ("radius_m = 0.3", "radius_m = nan", "25: field `obstacle[0].cylinder.radius_m`", "a number above 0"),
+        ("[5.0, 0.0, 2.5]]", "[5.0, inf, 2.5]]", "15: field `vehicle[0].waypoints_m`", "finite"),
+        ("order = \"hold\"", "order = \"stop\"", "9: field `order[1].order`", "`hold`"),
+        ("start_m = [5.0, 0.5]", "start_m = [5.0]", "11: field `vehicle[1].start_m`", "2"),
+        ("box_m = [1.0, 2.0, 2.0]", "box_m = [1.0, 0.0, 2.0]", "9: field `obstacle[1].box_m`", "above 0"),
+    ];
+    for (from, to, place, expected) in cases {
+        let text = message(from, to);
+        assert!(text.starts_with(&(line_of(from) + place)) && text.contains(expected), "{to}: {text}");
+    }
+}
+
+#[test]
+fn fields_that_contradict_one_another_are_refused() {
+    let text = message("box_m = [1.0, 2.0, 2.0]", "");
+    assert_eq!(text, "yard.toml: obstacle[1]: expected exactly one of box_m, cylinder and sphere");
+    let text = message("[gps]", "[forest]\n[gps]");
+    assert_eq!(text, "yard.toml: forest: has no effect without generator = \"forest\"");
+    let text = message("[gps]", "[bounds]\nmin_m = [0, 0, 0]\nmax_m = [1, 0, 1]\n[gps]");
+    assert!(text.contains("min_m below max_m"), "{text}");
+    let thick = "generator = \"forest\"\n[forest]\nmin_radius_m = 0.9\n";
+    let text = read(thick).expect_err("thin is thicker than thick").to_string();
+    assert_eq!(text, "yard.toml: forest.min_radius_m: expected at most max_radius_m, 0.6");
+    let dense = "generator = \"forest\"\n[forest]\ndensity_per_m2 = 1e6\n";
+    assert!(read(dense).expect_err("too many trunks").to_string().contains("forest.density_per_m2"));
+}
+
+#[test]
+fn a_start_inside_an_obstacle_names_vehicle_obstacle_and_position() {
+    let text = message("start_m = [5.0, 0.5]", "start_m = [0.1, 0.0]");
+    assert!(text.starts_with("vehicle 2: start (0.10, 0.00, 0.00) is inside obstacle `pole`"), "{text}");
+}
+
+#[test]
+fn a_start_or_goal_out_of_stated_bounds_is_refused() {
+    let bounded = |edge: &str| format!("[bounds]\nmin_m = [{edge}, -20, -1]\nmax_m = [6, 20, 9]\n[gps]");
+    let text = message("[gps]", &bounded("-4.0"));
+    assert!(text.starts_with("vehicle 1: start (-5.00, 0.00, 0.00) is outside the world"), "{text}");
+    let tall = YARD.replace("[5.0, 0.0, 2.5]]", "[5.0, 0.0, 9.5]]").replace("[gps]", &bounded("-9.0"));
+    let text = read(&tall).expect_err("over the ceiling").to_string();
+    assert!(text.starts_with("vehicle 1: goal (5.00, 0.00, 9.50) is outside the world"), "{text}");
+}
+
+#[test]
+fn bounds_that_nobody_stated_grow_with_the_routes() -> Result<(), ScenarioError> {
+    let far = read(&YARD.replace("[5.0, 0.0, 2.5]]", "[500.0, 0.0, 2.5]]"))?;
+    assert_eq!(far.scene.bounds().max.x, 505.0);
+    Ok(())
+}
+
+#[test]
+fn vehicles_that_would_stand_in_one_another_are_refused() {
+    let text = message("start_m = [5.0, 0.5]", "start_m = [-5.0, 0.3]");
+    assert!(text.starts_with("starts of vehicles 1 and 2 are 0.30 m apart: expected at least"), "{text}");
+    let text = message("[[-5.0, 0.5, 3.0]]", "[[5.0, 0.1, 6.0]]");
+    assert!(text.starts_with("goals of vehicles 1 and 2 are 0.10 m apart"), "{text}");
+}
+
+#[test]
+fn a_vehicle_without_a_way_or_below_the_ground_is_refused() {
+    let text = message("waypoints_m = [[-5.0, 0.5, 3.0]]", "");
+    assert_eq!(text, "vehicle 2 has nowhere to go: give it waypoints or a mission");
+    let text = message("[[-5.0, 0.5, 3.0]]", "[[-5.0, 0.5, 0.0]]");
+    assert!(text.starts_with("vehicle 2: goal (-5.00, 0.50, 0.00) is not above the ground"), "{text}");
+}
+
+#[test]
+fn no_vehicles_are_refused() {
+    let text = Scenario::built_in("forest", Some(0), 1).expect_err("nothing to fly").to_string();
+    assert_eq!(
+        text,
+        "scenario `forest` has no vehicles: expected at least 1; give --vehicles N or [[vehicle]] tables"
+    );
+    assert!(matches!(read("name = \"empty\""), Err(ScenarioError::NoVehicles { .. })));
+}
+
+#[test]
+fn an_unknown_scenario_lists_the_known_ones() {
+    let error =
+        Scenario::open("forrest", &Overrides::default(), 1).expect_err("no such scenario").to_string();
+    assert!(error.contains("`forrest`") && error.contains("forest, antipodal, window, open"), "{error}");
+    let error =
+        Scenario::open("no/such.toml", &Overrides::default(), 1).expect_err("no such file").to_string();
+    assert!(error.starts_with("cannot read `no/such.toml`"), "{error}");
+}
+
+#[test]
+fn files_named_in_a_scenario_are_beside_it() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let put = |name: &str, text: &str| std::fs::write(folder.path().join(name), text);
+    put("boxes.csv", "10,0,2.5,1,1,5\n")?;
+    put("crossing.toml", "generator = \"open\"\nworld = \"boxes.csv\"\nvehicles = 2\n")?;
+    let path = folder.path().join("crossing.toml").display().to_string();
+    let scenario = Scenario::open(&path, &Overrides::default(), 1)?;
+    assert_eq!((scenario.name.as_str(), scenario.scene.obstacles().len()), ("crossing", 1));
+    put("crossing.toml", "generator = \"open\"\nworld = \"none.csv\"\n")?;
+    let error = Scenario::open(&path, &Overrides::default(), 1).expect_err("no such world").to_string();
+    assert!(error.contains("none.csv"), "{error}");
+    Ok(())
+}
+
+#[test]
+fn in_another_world_starts_and_goals_move_out_of_its_obstacles() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let world = folder.path().join("boxes.csv");
+    // A building over each start of the eastbound pair.
+    std::fs::write(&world, "-12,2,2.5,3,12,5\n")?;
+    let overrides = Overrides { world: Some(world), ..Overrides::default() };
+    let scenario = Scenario::open("open", &overrides, 1)?;
+    for vehicle in &scenario.vehicles {
+        assert!(scenario.scene.clearance(&vehicle.start) >= 1.5, "{}", vehicle.start);
+    }
+    let starts: Vec<_> = scenario.vehicles.iter().map(|v| v.start).collect();
+    assert!(
+        starts
+            .iter()
+            .enumerate()
+            .all(|(i, a)| starts.iter().skip(i + 1).all(|b| (a - b).norm() >= 3.0 - 1e-9))
+    );
+    assert!(
+        scenario.notes.iter().any(|note| note.starts_with("vehicle 1: start moved from")),
+        "{:?}",
+        scenario.notes
+    );
+    Ok(())
+}
+
+#[test]
+fn malformed_world_files_name_file_and_line() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    for (name, text) in [("bad.csv", "1,2,3,1,1,1\n1,2,x\n"), ("bad.world", "<sdf>\n<world>\n</sdf>\n")] {
+        let world = folder.path().join(name);
+        std::fs::write(&world, text)?;
+        let overrides = Overrides { world: Some(world.clone()), ..Overrides::default() };
+        let error = Scenario::open("open", &overrides, 1).expect_err("malformed").to_string();
+        assert!(error.contains(&format!("{}:", Path::new(name).display())), "{error}");
+    }
+    Ok(())
+}
+
+#[test]
+fn the_example_scenario_is_sound_and_explains_every_key() -> Result<(), ScenarioError> {
+    let text = include_str!("../scenarios/yard.toml");
+    let yard = Scenario::from_toml(text, "yard.toml", None, 1)?;
+    assert_eq!((yard.vehicles.len(), yard.scene.obstacles().len(), yard.orders.len()), (2, 3, 2));
+    assert!(yard.notes.is_empty(), "{:?}", yard.notes);
+    let refusal = read("nothing = 1").expect_err("no such key").to_string();
+    let generated = ["forest", "antipodal", "window", "open"];
+    let (_, expected) = refusal.split_once("expected one of").expect("lists the keys");
+    let named = expected.split('`').skip(1).step_by(2);
+    let keys: Vec<_> = named.filter(|key| !generated.contains(key)).collect();
+    assert!(keys.len() > 12, "{refusal}");
+    for key in keys {
+        assert!(text.contains(key), "`{key}` is not in the example");
+    }
+    Ok(())
+}

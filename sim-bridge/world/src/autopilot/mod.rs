@@ -1,0 +1,228 @@
+//! The built-in autopilot: one per vehicle, reached over MAVLink alone, as PX4 would be.
+//!
+//! Each step of 4 ms it estimates its motion from the instruments ([`estimator`]), decides what to fly
+//! ([`modes`], [`mission`]) and flies it with a cascade of loops: position and velocity
+//! ([`position_control`]), attitude and rate ([`attitude_control`]), rotors ([`mixer`]). It speaks PX4's
+//! dialect and uses PX4's parameter names, so that one companion flies both.
+
+mod attitude_control;
+mod estimator;
+mod mission;
+mod mixer;
+mod modes;
+mod parameters;
+mod position_control;
+
+use std::time::Duration;
+
+use nalgebra::Vector3;
+use skein_mav::{Battery, Datum, Endpoint, EndpointConfig, ParameterTable, Request, VehicleState};
+
+use crate::sensors::{MotorCommands, SensorReadings};
+use crate::vehicle::VehicleModel;
+use attitude_control::AttitudeControl;
+use estimator::Estimator;
+use mixer::Mixer;
+use modes::{Drive, Modes, Situation, Sticks};
+use parameters::Settings;
+pub use parameters::default_parameters;
+use position_control::PositionControl;
+
+/// Share of full thrust of rotors that idle on the ground.
+const IDLE_SHARE: f64 = 0.05;
+
+/// All that an autopilot is made from.
+#[derive(Debug, Clone)]
+pub struct AutopilotConfig {
+    /// MAVLink system id of the vehicle, 1..=255.
+    pub system_id: u8,
+    /// The vehicle it flies: its gains and limits follow from that.
+    pub vehicle: VehicleModel,
+    /// Datum of the world.
+    pub datum: Datum,
+    /// Its parameters; see [`default_parameters`].
+    pub parameters: ParameterTable,
+}
+
+impl AutopilotConfig {
+    /// An autopilot with default parameters.
+    pub fn new(system_id: u8, vehicle: VehicleModel, datum: Datum) -> Self {
+        Self { system_id, parameters: default_parameters(&vehicle), vehicle, datum }
+    }
+}
+
+/// The built-in autopilot of one vehicle.
+///
+/// ```
+/// use std::time::Duration;
+/// use nalgebra::Vector3;
+/// use skein_mav::Datum;
+/// use skein_world::{Battery, Imu, MotorCommands, SensorReadings, VehicleModel};
+/// use skein_world::autopilot::{Autopilot, AutopilotConfig};
+///
+/// let model = VehicleModel::built_in("x500")?;
+/// let datum = Datum::from_degrees(47.397742, 8.545594, 488.0);
+/// let mut autopilot = Autopilot::new(AutopilotConfig::new(1, model, datum));
+/// let readings = SensorReadings {
+///     imu: Imu { angular_rate: Vector3::zeros(), specific_force: Vector3::new(0.0, 0.0, 9.81) },
+///     gps: None,
+///     baro_height_m: None,
+///     magnetic_heading: None,
+///     rangefinder_down_m: None,
+///     contact: true,
+///     battery: Battery { fraction: 1.0, voltage_v: 16.8 },
+/// };
+/// let motors = autopilot.step(Duration::ZERO, &readings);
+/// assert_eq!(motors, MotorCommands::default(), "disarmed");
+/// assert!(!autopilot.take_output().is_empty(), "a heartbeat");
+/// # Ok::<(), skein_world::VehicleError>(())
+/// ```
+pub struct Autopilot {
+    endpoint: Endpoint,
+    datum: Datum,
+    settings: Settings,
+    estimator: Estimator,
+    modes: Modes,
+    position_control: PositionControl,
+    attitude_control: AttitudeControl,
+    mixer: Mixer,
+    /// Time of the last step: bytes that arrive between two steps are stamped with it.
+    now: Duration,
+}
+
+impl Autopilot {
+    /// An autopilot that has just been switched on.
+    pub fn new(config: AutopilotConfig) -> Self {
+        let model = &config.vehicle;
+        let attitude_control = AttitudeControl::new(model);
+        Self {
+            datum: config.datum,
+            settings: Settings::read(&config.parameters),
+            estimator: Estimator::new(model),
+            modes: Modes::new(),
+            position_control: PositionControl::new(model, attitude_control.bandwidth()),
+            attitude_control,
+            mixer: Mixer::new(model),
+            now: Duration::ZERO,
+            endpoint: Endpoint::new(EndpointConfig {
+                system_id: config.system_id,
+                datum: config.datum,
+                parameters: config.parameters,
+                accepts_item: mission::accepts,
+            }),
+        }
+    }
+
+    /// Takes in bytes from any station, in whatever pieces they come.
+    pub fn receive(&mut self, bytes: &[u8]) {
+        self.endpoint.receive(self.now, bytes);
+    }
+
+    /// Takes the bytes to be sent to every station.
+    pub fn take_output(&mut self) -> Vec<u8> {
+        self.endpoint.take_output()
+    }
+
+    /// One step of 4 ms: `now` is the time since the run began, the readings are those of this step.
+    pub fn step(&mut self, now: Duration, readings: &SensorReadings) -> MotorCommands {
+        self.now = now;
+        self.estimator.update(now, readings);
+        while let Some(request) = self.endpoint.next_request() {
+            self.serve(request, readings);
+        }
+        let (modes, situation) = self.decide(readings);
+        let drive = modes.step(&situation);
+        let commands = self.drive(drive);
+        self.report(readings, &commands);
+        commands
+    }
+
+    /// The state machine, and what it decides from.
+    fn decide<'a>(&'a mut self, readings: &'a SensorReadings) -> (&'a mut Modes, Situation<'a>) {
+        let situation = Situation {
+            now: self.now,
+            estimate: self.estimator.estimate(),
+            readiness: self.estimator.readiness(self.now),
+            readings,
+            settings: &self.settings,
+            datum: &self.datum,
+            mission: self.endpoint.mission(),
+            home: self.modes.home().unwrap_or_else(Vector3::zeros),
+        };
+        (&mut self.modes, situation)
+    }
+
+    fn serve(&mut self, request: Request, readings: &SensorReadings) {
+        let now = self.now;
+        match request {
+            Request::Command { ticket, command, .. } => {
+                let (modes, situation) = self.decide(readings);
+                let result = modes.command(&situation, command);
+                self.read_settings();
+                self.endpoint.answer(ticket, result);
+            }
+            Request::SetPoint { set_point, .. } => self.modes.on_set_point(now, set_point),
+            Request::Sticks { forward, left, up, turn_left } => {
+                let sticks = Sticks { forward, left, up, turn_left };
+                self.modes.on_sticks(now, sticks);
+            }
+            Request::ParameterChanged { .. } => self.read_settings(),
+            Request::MissionChanged => {
+                let (modes, situation) = self.decide(readings);
+                modes.on_mission_changed(&situation);
+            }
+        }
+    }
+
+    /// The settings follow the parameters, but for the cruising speed that a station or the mission asked
+    /// for.
+    fn read_settings(&mut self) {
+        self.settings = Settings::read(self.endpoint.parameters());
+        if let Some(speed_m_s) = self.modes.speed() {
+            self.settings.cruise_speed_m_s = speed_m_s;
+        }
+    }
+
+    fn drive(&mut self, drive: Drive) -> MotorCommands {
+        let Drive::Fly(demand) = drive else {
+            self.position_control.reset();
+            self.attitude_control.reset();
+            let share = if drive == Drive::Idle { IDLE_SHARE } else { 0.0 };
+            return MotorCommands([share; 4]);
+        };
+        let estimate = self.estimator.estimate();
+        let target = self.position_control.step(estimate, &demand, &self.settings);
+        let torque = self.attitude_control.step(estimate, &target);
+        self.mixer.mix(target.thrust_n, &torque)
+    }
+
+    fn report(&mut self, readings: &SensorReadings, commands: &MotorCommands) {
+        for (severity, text) in self.modes.take_texts() {
+            self.endpoint.text(severity, &text);
+        }
+        for item in self.modes.take_items_reached() {
+            self.endpoint.item_reached(item as u16);
+        }
+        let (modes, situation) = self.decide(readings);
+        let ready_to_arm = modes.armed() || modes.arming_check(&situation).is_ok();
+        let sensors_ok = situation.readiness.is_ok();
+        let estimate = *situation.estimate;
+        let state = VehicleState {
+            mode: self.modes.mode(),
+            armed: self.modes.armed(),
+            landed: self.modes.landed(),
+            position: self.estimator.has_position().then_some(estimate.position),
+            velocity: estimate.velocity,
+            attitude: estimate.attitude,
+            angular_rate: estimate.angular_rate,
+            battery: Battery { fraction: readings.battery.fraction, voltage_v: readings.battery.voltage_v },
+            home: self.modes.home(),
+            sensors_ok,
+            ready_to_arm,
+            failsafe: self.modes.failsafe(),
+            throttle: commands.0.iter().sum::<f64>() / 4.0,
+            mission_item: self.modes.mission_item() as u16,
+        };
+        self.endpoint.report(self.now, &state);
+    }
+}

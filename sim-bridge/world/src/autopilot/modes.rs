@@ -1,0 +1,242 @@
+//! Flight modes: what the vehicle is doing, who may change it, and what it does by itself when something is
+//! lost.
+
+mod commands;
+mod failsafes;
+mod ground;
+mod tasks;
+
+use std::time::Duration;
+
+use nalgebra::{Vector2, Vector3};
+use skein_mav::{Datum, FlightMode, Landed, MissionItem, SetPoint, Severity, Stamped};
+
+use super::estimator::Estimate;
+use super::mission::MissionFlight;
+use super::parameters::{FailsafeAction, Settings};
+use super::position_control::Demand;
+use crate::sensors::SensorReadings;
+
+/// Within this of its height a climb is over, m.
+const HEIGHT_REACHED_M: f64 = 0.25;
+
+/// What decisions are made from.
+pub(super) struct Situation<'a> {
+    pub(super) now: Duration,
+    pub(super) estimate: &'a Estimate,
+    /// Why the estimate cannot be flown by, if so.
+    pub(super) readiness: Result<(), &'static str>,
+    pub(super) readings: &'a SensorReadings,
+    pub(super) settings: &'a Settings,
+    pub(super) datum: &'a Datum,
+    pub(super) mission: &'a [MissionItem],
+    pub(super) home: Vector3<f64>,
+}
+
+/// A pilot's sticks, each -1..1.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Sticks {
+    pub(super) forward: f64,
+    pub(super) left: f64,
+    pub(super) up: f64,
+    pub(super) turn_left: f64,
+}
+
+/// What the vehicle is doing, with all it needs for that.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Task {
+    Hold { position: Vector3<f64> },
+    Takeoff { target: Vector3<f64> },
+    Offboard,
+    Land { over: Vector2<f64> },
+    Return(ReturnLeg),
+    Mission(MissionFlight),
+    Manual,
+}
+
+/// The legs of a return.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum ReturnLeg {
+    Climb { over: Vector2<f64>, z: f64 },
+    Home { z: f64 },
+    Descend,
+}
+
+/// A failsafe that acts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Failsafe {
+    /// Holding until then, then the action.
+    Holding { until: Duration, action: FailsafeAction },
+    /// The action is under way.
+    Acting,
+}
+
+/// How far the battery is down.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Charge {
+    Good,
+    Low,
+    Critical,
+    Emergency,
+}
+
+/// What the motors are to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Drive {
+    /// Disarmed.
+    Stopped,
+    /// Armed on the ground.
+    Idle,
+    /// Flying, or lifting off.
+    Fly(Demand),
+}
+
+/// The state machine.
+#[derive(Debug, Clone)]
+pub(super) struct Modes {
+    task: Task,
+    armed: bool,
+    airborne: bool,
+    home: Option<Vector3<f64>>,
+    failsafe: Option<Failsafe>,
+    charge: Charge,
+    inside_fence: bool,
+    set_point: Option<Stamped<SetPoint>>,
+    /// How long before the newest set-point the one before came.
+    set_point_interval: Option<Duration>,
+    sticks: Option<Stamped<Sticks>>,
+    ground_distance: Option<Stamped<f64>>,
+    /// Since when the legs have touched the ground.
+    contact_since: Option<Duration>,
+    /// Since when the vehicle has stood armed on the ground, and whether that followed a flight.
+    standing: Option<(Duration, bool)>,
+    /// Speed asked for by a station or the mission in place of the parameter, m/s.
+    speed: Option<f64>,
+    mission_item: usize,
+    texts: Vec<(Severity, String)>,
+    items_reached: Vec<usize>,
+}
+
+impl Modes {
+    pub(super) fn new() -> Self {
+        Self {
+            task: Task::Hold { position: Vector3::zeros() },
+            armed: false,
+            airborne: false,
+            home: None,
+            failsafe: None,
+            charge: Charge::Good,
+            inside_fence: true,
+            set_point: None,
+            set_point_interval: None,
+            sticks: None,
+            ground_distance: None,
+            contact_since: None,
+            standing: None,
+            speed: None,
+            mission_item: 0,
+            texts: Vec::new(),
+            items_reached: Vec::new(),
+        }
+    }
+
+    pub(super) fn mode(&self) -> FlightMode {
+        match self.task {
+            Task::Hold { .. } => FlightMode::Hold,
+            Task::Takeoff { .. } => FlightMode::Takeoff,
+            Task::Offboard => FlightMode::Offboard,
+            Task::Land { .. } => FlightMode::Land,
+            Task::Return(_) => FlightMode::Return,
+            Task::Mission(_) => FlightMode::Mission,
+            Task::Manual => FlightMode::Manual,
+        }
+    }
+
+    pub(super) fn armed(&self) -> bool {
+        self.armed
+    }
+
+    pub(super) fn failsafe(&self) -> bool {
+        self.failsafe.is_some()
+    }
+
+    pub(super) fn home(&self) -> Option<Vector3<f64>> {
+        self.home
+    }
+
+    pub(super) fn mission_item(&self) -> usize {
+        self.mission_item
+    }
+
+    /// The speed that is flown in place of the parameter's, m/s.
+    pub(super) fn speed(&self) -> Option<f64> {
+        self.speed
+    }
+
+    pub(super) fn landed(&self) -> Landed {
+        match (self.airborne, self.task) {
+            (false, _) => Landed::OnGround,
+            (true, Task::Takeoff { .. }) => Landed::TakingOff,
+            (true, Task::Land { .. } | Task::Return(ReturnLeg::Descend)) => Landed::Landing,
+            (true, _) => Landed::InAir,
+        }
+    }
+
+    /// What is to be told to the stations.
+    pub(super) fn take_texts(&mut self) -> Vec<(Severity, String)> {
+        std::mem::take(&mut self.texts)
+    }
+
+    /// The mission items that have been reached.
+    pub(super) fn take_items_reached(&mut self) -> Vec<usize> {
+        std::mem::take(&mut self.items_reached)
+    }
+
+    /// A set-point arrived.
+    pub(super) fn on_set_point(&mut self, now: Duration, set_point: SetPoint) {
+        let arrived = Stamped { stamp: now, value: set_point };
+        let before = self.set_point.replace(arrived);
+        self.set_point_interval = before.map(|before| before.age(now));
+    }
+
+    /// A pilot's sticks arrived.
+    pub(super) fn on_sticks(&mut self, now: Duration, sticks: Sticks) {
+        self.sticks = Some(Stamped { stamp: now, value: sticks });
+    }
+
+    /// The mission was replaced.
+    pub(super) fn on_mission_changed(&mut self, situation: &Situation<'_>) {
+        self.mission_item = 0;
+        if matches!(self.task, Task::Mission(_)) {
+            self.hold(situation);
+        }
+    }
+
+    /// One step: failsafes, progress of the task, and what the motors are to do.
+    pub(super) fn step(&mut self, situation: &Situation<'_>) -> Drive {
+        self.sense_ground(situation);
+        self.watch_battery(situation);
+        if self.armed {
+            self.watch_set_points(situation);
+            self.watch_sticks(situation);
+            self.watch_fence(situation);
+            self.finish_hold_of_failsafe(situation);
+        } else {
+            self.rest(situation);
+            return Drive::Stopped;
+        }
+        let demand = self.pursue(situation);
+        self.judge_flight(situation, &demand);
+        self.disarm_when_standing(situation);
+        let lifts_off = demand.lifts_off(&situation.estimate.position);
+        match (self.armed, self.airborne || lifts_off) {
+            (false, _) => Drive::Stopped,
+            (true, false) => Drive::Idle,
+            (true, true) => Drive::Fly(demand),
+        }
+    }
+
+    fn tell(&mut self, severity: Severity, text: impl Into<String>) {
+        self.texts.push((severity, text.into()));
+    }
+}

@@ -1,0 +1,236 @@
+//! Solid bodies that stand in a world.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
+
+use crate::aabb::Aabb;
+
+/// The form of an obstacle in its own frame, metres, centred on its origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape {
+    /// A cuboid.
+    Box {
+        /// Half of the length along each axis.
+        half_extents: Vector3<f64>,
+    },
+    /// A solid cylinder whose axis is z.
+    Cylinder {
+        /// Radius of the round section.
+        radius: f64,
+        /// Half of the length along z.
+        half_height: f64,
+    },
+    /// A ball.
+    Sphere {
+        /// Radius.
+        radius: f64,
+    },
+    /// Everything below an infinite plane through the origin.
+    Plane {
+        /// Points out of the solid half.
+        normal: Unit<Vector3<f64>>,
+    },
+}
+
+impl Shape {
+    /// Radius of the smallest ball about the origin that holds the shape; infinite for a plane.
+    pub fn bounding_radius(&self) -> f64 {
+        match *self {
+            Self::Box { half_extents } => half_extents.norm(),
+            Self::Cylinder { radius, half_height } => radius.hypot(half_height),
+            Self::Sphere { radius } => radius,
+            Self::Plane { .. } => f64::INFINITY,
+        }
+    }
+
+    /// Distance from `point` (own frame) to the surface, negative inside.
+    pub fn signed_distance(&self, point: &Point3<f64>) -> f64 {
+        match *self {
+            Self::Box { half_extents } => {
+                let beyond = point.coords.abs() - half_extents;
+                let outside = beyond.sup(&Vector3::zeros()).norm();
+                outside + beyond.max().min(0.0)
+            }
+            Self::Cylinder { radius, half_height } => {
+                let beyond_side = point.x.hypot(point.y) - radius;
+                let beyond_cap = point.z.abs() - half_height;
+                let outside = beyond_side.max(0.0).hypot(beyond_cap.max(0.0));
+                outside + beyond_side.max(beyond_cap).min(0.0)
+            }
+            Self::Sphere { radius } => point.coords.norm() - radius,
+            Self::Plane { normal } => point.coords.dot(&normal),
+        }
+    }
+
+    /// Distance along the unit vector `direction` from `origin` (both in the own frame) to the
+    /// first point of the solid: 0 when the ray starts inside, `None` when it misses.
+    pub fn cast_ray(&self, origin: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
+        let inside = match *self {
+            Self::Box { half_extents } => {
+                let mut inside = Interval::RAY;
+                for axis in 0..3 {
+                    inside = inside.within_slab(origin.coords[axis], direction[axis], half_extents[axis])?;
+                }
+                inside
+            }
+            // The side first: that is what most rays miss.
+            Self::Cylinder { radius, half_height } => Interval::RAY
+                .within_roots(
+                    direction.x * direction.x + direction.y * direction.y,
+                    origin.x * direction.x + origin.y * direction.y,
+                    origin.x * origin.x + origin.y * origin.y - radius * radius,
+                )?
+                .within_slab(origin.z, direction.z, half_height)?,
+            Self::Sphere { radius } => Interval::RAY.within_roots(
+                direction.norm_squared(),
+                origin.coords.dot(direction),
+                origin.coords.norm_squared() - radius * radius,
+            )?,
+            Self::Plane { normal } => {
+                Interval::RAY.below(origin.coords.dot(&normal), direction.dot(&normal))?
+            }
+        };
+        Some(inside.from)
+    }
+}
+
+/// The part of a ray that lies inside the bodies intersected so far, as distances along it.
+#[derive(Clone, Copy)]
+struct Interval {
+    from: f64,
+    to: f64,
+}
+
+impl Interval {
+    const RAY: Self = Self { from: 0.0, to: f64::INFINITY };
+
+    /// `None` when nothing is left.
+    fn intersect(self, from: f64, to: f64) -> Option<Self> {
+        let left = Self { from: self.from.max(from), to: self.to.min(to) };
+        (left.from <= left.to).then_some(left)
+    }
+
+    /// Keeps what lies between the planes at `-half` and `+half` of one axis.
+    fn within_slab(self, origin: f64, direction: f64, half: f64) -> Option<Self> {
+        if direction == 0.0 {
+            return (origin.abs() <= half).then_some(self);
+        }
+        let a = (-half - origin) / direction;
+        let b = (half - origin) / direction;
+        self.intersect(a.min(b), a.max(b))
+    }
+
+    /// Keeps where `a t^2 + 2 b t + c <= 0`, of which `a` is not negative.
+    fn within_roots(self, a: f64, b: f64, c: f64) -> Option<Self> {
+        if a == 0.0 {
+            return (c <= 0.0).then_some(self);
+        }
+        let discriminant = b * b - a * c;
+        if discriminant < 0.0 {
+            return None;
+        }
+        let root = discriminant.sqrt();
+        self.intersect((-b - root) / a, (-b + root) / a)
+    }
+
+    /// Keeps where a height that begins as `height` and rises by `slope` is not above 0.
+    fn below(self, height: f64, slope: f64) -> Option<Self> {
+        if slope == 0.0 {
+            return (height <= 0.0).then_some(self);
+        }
+        let crossing = -height / slope;
+        if slope < 0.0 {
+            self.intersect(crossing, f64::INFINITY)
+        } else {
+            self.intersect(f64::NEG_INFINITY, crossing)
+        }
+    }
+}
+
+/// A solid body at a fixed place in the world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Obstacle {
+    /// What the world file calls it; for messages, not unique.
+    pub name: String,
+    /// Its form in its own frame.
+    pub shape: Shape,
+    /// Own frame to world ENU, metres.
+    pub pose: Isometry3<f64>,
+}
+
+impl Obstacle {
+    /// An upright cylinder that stands on the ground (z = 0) at `(x, y)`: a tree trunk, a pole.
+    pub fn trunk(name: impl Into<String>, x: f64, y: f64, radius: f64, height: f64) -> Self {
+        Self {
+            name: name.into(),
+            shape: Shape::Cylinder { radius, half_height: height / 2.0 },
+            pose: Isometry3::translation(x, y, height / 2.0),
+        }
+    }
+
+    /// A box with edges along the world axes, by its centre and whole size.
+    pub fn block(name: impl Into<String>, centre: Vector3<f64>, size: Vector3<f64>) -> Self {
+        Self {
+            name: name.into(),
+            shape: Shape::Box { half_extents: size / 2.0 },
+            pose: Isometry3::translation(centre.x, centre.y, centre.z),
+        }
+    }
+
+    /// Distance from `point` (world) to the surface, negative inside.
+    pub fn signed_distance(&self, point: &Point3<f64>) -> f64 {
+        self.shape.signed_distance(&self.pose.inverse_transform_point(point))
+    }
+
+    /// Distance along the unit vector `direction` from `origin` (both world) to the solid: 0 when
+    /// the ray starts inside, `None` when it misses.
+    pub fn cast_ray(&self, origin: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
+        self.shape.cast_ray(
+            &self.pose.inverse_transform_point(origin),
+            &self.pose.inverse_transform_vector(direction),
+        )
+    }
+
+    /// Corners of the smallest box along the world axes that holds the obstacle; `None` for a
+    /// plane, which has no end.
+    pub fn aabb(&self) -> Option<Aabb> {
+        let centre = self.pose.translation.vector;
+        let rotation = self.pose.rotation.to_rotation_matrix();
+        let reach = match self.shape {
+            Shape::Box { half_extents } => rotation.matrix().abs() * half_extents,
+            Shape::Cylinder { radius, half_height } => {
+                let axis = rotation * Vector3::z();
+                axis.map(|part| half_height * part.abs() + radius * (1.0 - part * part).max(0.0).sqrt())
+            }
+            Shape::Sphere { radius } => Vector3::repeat(radius),
+            Shape::Plane { .. } => return None,
+        };
+        Some(Aabb { min: centre - reach, max: centre + reach })
+    }
+
+    /// Outline of the upright projection on the ground, counter-clockwise, for maps and pictures;
+    /// round shapes are drawn with 16 corners. Empty for a plane.
+    pub fn footprint(&self) -> Vec<[f64; 2]> {
+        let outline: Vec<Vector3<f64>> = match self.shape {
+            Shape::Box { half_extents: h } => [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]
+                .iter()
+                .map(|(x, y)| Vector3::new(x * h.x, y * h.y, 0.0))
+                .collect(),
+            Shape::Cylinder { radius, .. } | Shape::Sphere { radius } => (0..16)
+                .map(|corner| {
+                    let (sin, cos) = (TAU * f64::from(corner) / 16.0).sin_cos();
+                    Vector3::new(radius * cos, radius * sin, 0.0)
+                })
+                .collect(),
+            Shape::Plane { .. } => Vec::new(),
+        };
+        outline
+            .into_iter()
+            .map(|corner| {
+                let world = self.pose * Point3::from(corner);
+                [world.x, world.y]
+            })
+            .collect()
+    }
+}

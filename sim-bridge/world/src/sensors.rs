@@ -1,0 +1,169 @@
+//! What a vehicle's instruments say, with seeded noise.
+
+use nalgebra::Vector3;
+
+use crate::lidar::{Surroundings, cast_ray};
+use crate::noise::Noise;
+use crate::quadrotor::{Quadrotor, STEP};
+use crate::vehicle::VehicleModel;
+
+/// One step's readings, the autopilot's whole view of the world.
+///
+/// A reading of a slower instrument is `Some` only in the step in which it is new.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorReadings {
+    /// Inertial unit, new at every step.
+    pub imu: Imu,
+    /// Satellite fix.
+    pub gps: Option<Gps>,
+    /// Height above the world's origin by air pressure, m; carries a constant unknown offset.
+    pub baro_height_m: Option<f64>,
+    /// Yaw in ENU: counter-clockwise from east, rad, in (-pi, pi].
+    pub magnetic_heading: Option<f64>,
+    /// Distance along body -z from the centre to the first solid, m; `None` also beyond range.
+    pub rangefinder_down_m: Option<f64>,
+    /// Whether the legs touch the ground.
+    pub contact: bool,
+    /// Energy store.
+    pub battery: Battery,
+}
+
+/// An inertial sample in the body frame (FLU).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Imu {
+    /// Angular rate, rad/s.
+    pub angular_rate: Vector3<f64>,
+    /// Acceleration less gravity, m/s^2: +9.81 along z at rest.
+    pub specific_force: Vector3<f64>,
+}
+
+/// A satellite fix.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gps {
+    /// World ENU, m.
+    pub position: Vector3<f64>,
+    /// World ENU, m/s.
+    pub velocity: Vector3<f64>,
+}
+
+/// State of the energy store.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Battery {
+    /// Energy left, 0..1 of full.
+    pub fraction: f64,
+    /// Voltage, V.
+    pub voltage_v: f64,
+}
+
+/// Thrust demanded of each rotor as a share (0..1) of its full thrust.
+///
+/// Order: front-right, rear-left (counter-clockwise seen from above), front-left, rear-right
+/// (clockwise).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MotorCommands(pub [f64; 4]);
+
+/// An accelerometer reads no more than 16 g.
+const ACCELEROMETER_LIMIT_M_S2: f64 = 157.0;
+
+/// The instruments of one vehicle.
+#[derive(Debug, Clone)]
+pub(crate) struct Sensors {
+    noise: Noise,
+    gyro_bias: Vector3<f64>,
+    accel_bias: Vector3<f64>,
+    baro_offset_m: f64,
+    /// Shifts the slow instruments in time, so that vehicles do not sample all at once.
+    phase: u64,
+}
+
+impl Sensors {
+    pub(crate) fn new(model: &VehicleModel, mut noise: Noise, phase: u64) -> Self {
+        Self {
+            gyro_bias: noise.vector(model.imu.gyro_bias_rad_s),
+            accel_bias: noise.vector(model.imu.accel_bias_m_s2),
+            baro_offset_m: noise.normal(model.baro.offset_m),
+            noise,
+            phase,
+        }
+    }
+
+    /// Readings at step number `tick`.
+    pub(crate) fn read(
+        &mut self,
+        tick: u64,
+        quadrotor: &Quadrotor,
+        surroundings: &Surroundings<'_>,
+    ) -> SensorReadings {
+        let model = quadrotor.model();
+        let due = |rate_hz| is_due(tick + self.phase, rate_hz);
+        let [gps, baro, compass, rangefinder] = [
+            due(model.gps.rate_hz),
+            due(model.baro.rate_hz),
+            due(model.compass.rate_hz),
+            due(model.rangefinder.rate_hz),
+        ];
+        SensorReadings {
+            imu: self.imu(quadrotor),
+            gps: gps.then(|| self.gps(quadrotor)),
+            baro_height_m: baro.then(|| self.baro_height_m(quadrotor)),
+            magnetic_heading: compass.then(|| self.magnetic_heading(quadrotor)),
+            rangefinder_down_m: rangefinder
+                .then(|| self.rangefinder_down_m(quadrotor, surroundings))
+                .flatten(),
+            contact: quadrotor.on_ground(),
+            battery: quadrotor.battery(),
+        }
+    }
+
+    fn imu(&mut self, quadrotor: &Quadrotor) -> Imu {
+        let imu = &quadrotor.model().imu;
+        let rate_noise = self.noise.vector(imu.gyro_sigma_rad_s);
+        let force_noise = self.noise.vector(imu.accel_sigma_m_s2);
+        let limit = ACCELEROMETER_LIMIT_M_S2;
+        Imu {
+            angular_rate: quadrotor.state().angular_rate + self.gyro_bias + rate_noise,
+            specific_force: (quadrotor.specific_force() + self.accel_bias + force_noise)
+                .map(|force| force.clamp(-limit, limit)),
+        }
+    }
+
+    fn gps(&mut self, quadrotor: &Quadrotor) -> Gps {
+        let gps = &quadrotor.model().gps;
+        let error = Vector3::new(
+            self.noise.normal(gps.sigma_horizontal_m),
+            self.noise.normal(gps.sigma_horizontal_m),
+            self.noise.normal(gps.sigma_vertical_m),
+        );
+        Gps {
+            position: quadrotor.state().position + error,
+            velocity: quadrotor.state().velocity + self.noise.vector(gps.sigma_velocity_m_s),
+        }
+    }
+
+    fn baro_height_m(&mut self, quadrotor: &Quadrotor) -> f64 {
+        let noise = self.noise.normal(quadrotor.model().baro.sigma_m);
+        quadrotor.state().position.z + self.baro_offset_m + noise
+    }
+
+    fn magnetic_heading(&mut self, quadrotor: &Quadrotor) -> f64 {
+        let noise = self.noise.normal(quadrotor.model().compass.sigma_rad);
+        let (_, _, yaw) = quadrotor.state().attitude.euler_angles();
+        let (sin, cos) = (yaw + noise).sin_cos();
+        sin.atan2(cos)
+    }
+
+    fn rangefinder_down_m(&mut self, quadrotor: &Quadrotor, surroundings: &Surroundings<'_>) -> Option<f64> {
+        let rangefinder = &quadrotor.model().rangefinder;
+        let state = quadrotor.state();
+        let down = state.attitude * -Vector3::z();
+        let noise = self.noise.normal(rangefinder.sigma_m);
+        cast_ray(surroundings, &state.position.into(), &down, rangefinder.range_m)
+            .map(|range| (range + noise).max(0.0))
+    }
+}
+
+/// Whether an instrument of that rate speaks at step number `tick`.
+pub(crate) fn is_due(tick: u64, rate_hz: f64) -> bool {
+    let period = (1.0 / (rate_hz * STEP.as_secs_f64())).round() as u64;
+    tick.is_multiple_of(period.max(1))
+}

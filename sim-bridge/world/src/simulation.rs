@@ -1,0 +1,297 @@
+//! The whole world in motion, one step at a time.
+
+use std::time::Duration;
+
+use nalgebra::Vector3;
+
+use crate::autopilot::{Autopilot, AutopilotConfig};
+use crate::lidar::{Hull, Lidar, LidarScan, Surroundings};
+use crate::noise::Noise;
+use crate::quadrotor::{Quadrotor, RigidState, STEP};
+use crate::scene::Scene;
+use crate::sensors::{Battery, MotorCommands, SensorReadings, Sensors, is_due};
+use crate::truth::{Player, Referee, Truth};
+use crate::vehicle::VehicleModel;
+use crate::wind::{Wind, WindConfig};
+
+/// All that a run depends on.
+#[derive(Debug, Clone)]
+pub struct SimulationConfig {
+    /// Where.
+    pub scene: Scene,
+    /// Who; a vehicle's place in this list is its index everywhere else.
+    pub vehicles: Vec<VehicleSetup>,
+    /// From which all noise is drawn: equal configurations give equal runs, bit for bit.
+    pub seed: u64,
+    /// In which air.
+    pub wind: WindConfig,
+}
+
+/// One vehicle at the start.
+#[derive(Debug, Clone)]
+pub struct VehicleSetup {
+    /// Its kind.
+    pub model: VehicleModel,
+    /// Where it stands, world ENU, m; below standing height means on the ground.
+    pub position: Vector3<f64>,
+    /// Where it faces, counter-clockwise from east, rad.
+    pub yaw: f64,
+    /// Its MAVLink system id.
+    pub system_id: u8,
+}
+
+/// What is true of a vehicle, for referees, recorders and pictures; its agent must not see it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VehicleState {
+    /// Position, velocity, attitude and angular rate.
+    pub motion: RigidState,
+    /// Energy left.
+    pub battery: Battery,
+    /// Whether it is off the ground.
+    pub airborne: bool,
+    /// Whether it has crashed.
+    pub crashed: bool,
+    /// Way flown, m.
+    pub path_length_m: f64,
+    /// From the first lift-off to the last landing, or to now when airborne.
+    pub flight_time: Duration,
+}
+
+/// A world with its vehicles, their instruments and built-in autopilots.
+///
+/// A vehicle that touches an obstacle, another vehicle, or the ground too hard is wrecked: it
+/// stops, its rotors give no thrust any more, and it falls.
+pub struct Simulation {
+    scene: Scene,
+    vehicles: Vec<Vehicle>,
+    /// One per vehicle, as of the last step.
+    hulls: Vec<Hull>,
+    wind: Wind,
+    referee: Referee,
+    tick: u64,
+}
+
+struct Vehicle {
+    quadrotor: Quadrotor,
+    sensors: Sensors,
+    readings: SensorReadings,
+    pilot: Pilot,
+    lidar: Lidar,
+    /// Shifts the instruments in time, in steps.
+    phase: u64,
+    scan: Option<LidarScan>,
+    path_length_m: f64,
+    lifted_off: Option<Duration>,
+    last_airborne: Duration,
+}
+
+/// Who turns readings into motor commands.
+enum Pilot {
+    BuiltIn(Box<Autopilot>),
+    External(MotorCommands),
+}
+
+impl Simulation {
+    /// A world in which every vehicle stands at its start, at time 0.
+    pub fn new(config: SimulationConfig) -> Self {
+        let SimulationConfig { scene, vehicles: setups, seed, wind } = config;
+        let quadrotors: Vec<Quadrotor> = setups
+            .iter()
+            .map(|setup| Quadrotor::new(setup.model.clone(), setup.position, setup.yaw))
+            .collect();
+        let hulls: Vec<Hull> = quadrotors.iter().map(hull_of).collect();
+        let players: Vec<Player> = quadrotors.iter().map(player_of).collect();
+        let vehicles = quadrotors
+            .into_iter()
+            .zip(&setups)
+            .enumerate()
+            .map(|(own, (quadrotor, setup))| {
+                let surroundings = Surroundings { scene: &scene, hulls: &hulls, own };
+                Vehicle::new(quadrotor, setup, seed, &surroundings)
+            })
+            .collect();
+        Self {
+            referee: Referee::new(&scene, &players),
+            wind: Wind::new(wind, STEP, seed),
+            scene,
+            vehicles,
+            hulls,
+            tick: 0,
+        }
+    }
+
+    /// Moves the world on by [`STEP`].
+    pub fn step(&mut self) {
+        let now = self.now();
+        let wind = self.wind.step();
+        self.tick += 1;
+        let after = self.now();
+        for vehicle in &mut self.vehicles {
+            if vehicle.fly(now, after, &wind) {
+                self.referee.count_hard_landing();
+            }
+        }
+        self.judge();
+        self.hulls.clear();
+        self.hulls.extend(self.vehicles.iter().map(|vehicle| hull_of(&vehicle.quadrotor)));
+        for (own, vehicle) in self.vehicles.iter_mut().enumerate() {
+            let surroundings = Surroundings { scene: &self.scene, hulls: &self.hulls, own };
+            vehicle.sense(self.tick, after, &surroundings);
+        }
+    }
+
+    /// Time since the run began.
+    pub fn now(&self) -> Duration {
+        // A tick count of centuries still fits.
+        Duration::from_millis(self.tick * STEP.as_millis() as u64)
+    }
+
+    /// The world's fixed part.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// How many vehicles there are.
+    pub fn vehicle_count(&self) -> usize {
+        self.vehicles.len()
+    }
+
+    /// What is true of vehicle `index`; `None` if there is no such vehicle.
+    pub fn vehicle(&self, index: usize) -> Option<VehicleState> {
+        self.vehicles.get(index).map(Vehicle::state)
+    }
+
+    /// What the instruments of vehicle `index` say now.
+    pub fn readings(&self, index: usize) -> Option<&SensorReadings> {
+        self.vehicles.get(index).map(|vehicle| &vehicle.readings)
+    }
+
+    /// Takes the lidar scans that have come since the last call, each with its vehicle's index;
+    /// of several by one vehicle the newest. Vehicles scan in turn, not all at once.
+    pub fn take_scans(&mut self) -> Vec<(usize, LidarScan)> {
+        let vehicles = self.vehicles.iter_mut().enumerate();
+        vehicles.filter_map(|(index, vehicle)| Some((index, vehicle.scan.take()?))).collect()
+    }
+
+    /// Sends MAVLink bytes to the autopilot of vehicle `index`. Without a built-in autopilot
+    /// there, nobody hears them.
+    pub fn send(&mut self, index: usize, bytes: &[u8]) {
+        if let Some(autopilot) = self.autopilot(index) {
+            autopilot.receive(bytes);
+        }
+    }
+
+    /// Takes the MAVLink bytes that the autopilot of vehicle `index` has sent since the last call.
+    pub fn receive(&mut self, index: usize) -> Vec<u8> {
+        self.autopilot(index).map_or_else(Vec::new, Autopilot::take_output)
+    }
+
+    /// Flies vehicle `index` by these commands from now on, in place of its built-in autopilot.
+    pub fn drive(&mut self, index: usize, commands: MotorCommands) {
+        if let Some(vehicle) = self.vehicles.get_mut(index) {
+            vehicle.pilot = Pilot::External(commands);
+        }
+    }
+
+    /// Puts vehicle `index` somewhere, in motion or at rest, as no force could; for tests and for
+    /// starts in the air.
+    pub fn place(&mut self, index: usize, motion: RigidState) {
+        if let Some(vehicle) = self.vehicles.get_mut(index) {
+            vehicle.quadrotor.set_state(motion);
+        }
+    }
+
+    /// The record of collisions, separation and clearance so far.
+    pub fn truth(&self) -> Truth {
+        self.referee.truth()
+    }
+
+    fn autopilot(&mut self, index: usize) -> Option<&mut Autopilot> {
+        match &mut self.vehicles.get_mut(index)?.pilot {
+            Pilot::BuiltIn(autopilot) => Some(autopilot),
+            Pilot::External(_) => None,
+        }
+    }
+
+    fn judge(&mut self) {
+        let players: Vec<Player> =
+            self.vehicles.iter().map(|vehicle| player_of(&vehicle.quadrotor)).collect();
+        for index in self.referee.judge(&players) {
+            if let Some(vehicle) = self.vehicles.get_mut(index) {
+                vehicle.quadrotor.wreck();
+            }
+        }
+    }
+}
+
+impl Vehicle {
+    fn new(quadrotor: Quadrotor, setup: &VehicleSetup, seed: u64, surroundings: &Surroundings<'_>) -> Self {
+        let index = surroundings.own as u64;
+        // Steps of 12 ms: 25 vehicles share the 100 ms of a 10 Hz instrument evenly.
+        let phase = 3 * index;
+        let model = quadrotor.model();
+        let mut sensors = Sensors::new(model, Noise::new(seed, 2 * index), phase);
+        let lidar = Lidar::new(model.lidar, seed, 2 * index + 1);
+        let autopilot =
+            Autopilot::new(AutopilotConfig::new(setup.system_id, model.clone(), *surroundings.scene.datum()));
+        Self {
+            readings: sensors.read(0, &quadrotor, surroundings),
+            quadrotor,
+            sensors,
+            pilot: Pilot::BuiltIn(Box::new(autopilot)),
+            lidar,
+            phase,
+            scan: None,
+            path_length_m: 0.0,
+            lifted_off: None,
+            last_airborne: Duration::ZERO,
+        }
+    }
+
+    /// One step from `now` to `after`; tells whether it ended in a crash on the ground.
+    fn fly(&mut self, now: Duration, after: Duration, wind: &Vector3<f64>) -> bool {
+        let commands = match &mut self.pilot {
+            Pilot::BuiltIn(autopilot) => autopilot.step(now, &self.readings),
+            Pilot::External(commands) => *commands,
+        };
+        let before = self.quadrotor.state().position;
+        let touchdown = self.quadrotor.step(&commands, wind);
+        if !self.quadrotor.on_ground() && !self.quadrotor.wrecked() {
+            self.path_length_m += (self.quadrotor.state().position - before).norm();
+            self.lifted_off.get_or_insert(now);
+            self.last_airborne = after;
+        }
+        let crashed = !self.quadrotor.wrecked() && touchdown.is_some_and(|touchdown| touchdown.is_crash());
+        if crashed {
+            self.quadrotor.wreck();
+        }
+        crashed
+    }
+
+    fn sense(&mut self, tick: u64, now: Duration, surroundings: &Surroundings<'_>) {
+        self.readings = self.sensors.read(tick, &self.quadrotor, surroundings);
+        if is_due(tick + self.phase, self.quadrotor.model().lidar.rate_hz) {
+            let pose = self.quadrotor.state().pose();
+            self.scan = Some(self.lidar.scan(now, &pose, surroundings));
+        }
+    }
+
+    fn state(&self) -> VehicleState {
+        VehicleState {
+            motion: *self.quadrotor.state(),
+            battery: self.quadrotor.battery(),
+            airborne: !self.quadrotor.on_ground(),
+            crashed: self.quadrotor.wrecked(),
+            path_length_m: self.path_length_m,
+            flight_time: self.lifted_off.map_or(Duration::ZERO, |lifted_off| self.last_airborne - lifted_off),
+        }
+    }
+}
+
+fn hull_of(quadrotor: &Quadrotor) -> Hull {
+    Hull { centre: quadrotor.state().position, radius_m: quadrotor.model().hull_radius_m }
+}
+
+fn player_of(quadrotor: &Quadrotor) -> Player {
+    Player { hull: hull_of(quadrotor), airborne: !quadrotor.on_ground(), wrecked: quadrotor.wrecked() }
+}

@@ -1,0 +1,204 @@
+//! What really happened: collisions, separation, clearance.
+//!
+//! The referee measures with parry, not with the formulas behind the lidar, so that a mistake in
+//! those cannot hide a collision.
+
+use glamx::{DPose3, DVec3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use parry3d_f64::query::PointQuery;
+use parry3d_f64::shape::{Compound, SharedShape};
+
+use crate::aabb::Aabb;
+use crate::lidar::Hull;
+use crate::obstacle::{Obstacle, Shape};
+use crate::scene::Scene;
+
+/// The record of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Truth {
+    /// Times a hull met an obstacle, the ground broke the legs, or a vehicle left the bounds.
+    pub collisions_obstacle: u32,
+    /// Times two hulls met while either flew.
+    pub collisions_vehicle: u32,
+    /// Least distance between two centres while either flew, m; `None` if there never were two.
+    pub min_separation_m: Option<f64>,
+    /// Least distance from a flying hull to an obstacle, m, 0 in contact; `None` if nobody flew
+    /// or there is no obstacle.
+    pub min_clearance_m: Option<f64>,
+}
+
+/// One vehicle at one moment, as the referee sees it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Player {
+    pub(crate) hull: Hull,
+    pub(crate) airborne: bool,
+    pub(crate) wrecked: bool,
+}
+
+/// Watches every step of a run.
+#[derive(Clone)]
+pub(crate) struct Referee {
+    truth: Truth,
+    solids: Solids,
+    bounds: Aabb,
+    /// Per vehicle.
+    watches: Vec<Watch>,
+    /// Whether vehicles `i < j` touch, at `j (j - 1) / 2 + i`: a contact counts once.
+    touching: Vec<bool>,
+}
+
+/// What the referee remembers of one vehicle.
+#[derive(Debug, Clone, Copy)]
+struct Watch {
+    centre: Vector3<f64>,
+    /// The clearance of the centre is not less than this.
+    clearance_at_least_m: f64,
+    out_of_bounds: bool,
+}
+
+impl Referee {
+    pub(crate) fn new(scene: &Scene, players: &[Player]) -> Self {
+        let watches = players
+            .iter()
+            .map(|player| Watch {
+                centre: player.hull.centre,
+                clearance_at_least_m: f64::NEG_INFINITY,
+                out_of_bounds: false,
+            })
+            .collect();
+        Self {
+            truth: Truth::default(),
+            solids: Solids::new(scene.obstacles()),
+            bounds: *scene.bounds(),
+            watches,
+            touching: vec![false; players.len() * players.len().saturating_sub(1) / 2],
+        }
+    }
+
+    pub(crate) fn truth(&self) -> Truth {
+        self.truth
+    }
+
+    /// Counts a collision with the ground.
+    pub(crate) fn count_hard_landing(&mut self) {
+        self.truth.collisions_obstacle += 1;
+    }
+
+    /// Judges one moment and names the vehicles that crashed in it.
+    pub(crate) fn judge(&mut self, players: &[Player]) -> Vec<usize> {
+        let mut crashed = Vec::new();
+        for (index, player) in players.iter().enumerate() {
+            if self.judge_obstacles(index, player) {
+                crashed.push(index);
+            }
+        }
+        let mut pair = 0;
+        for (j, second) in players.iter().enumerate() {
+            for (i, first) in players.iter().enumerate().take(j) {
+                if self.judge_pair(pair, first, second) {
+                    crashed.extend([i, j]);
+                }
+                pair += 1;
+            }
+        }
+        crashed
+    }
+
+    /// Whether the vehicle has just run into an obstacle.
+    fn judge_obstacles(&mut self, index: usize, player: &Player) -> bool {
+        let Some(watch) = self.watches.get_mut(index) else {
+            return false;
+        };
+        let Hull { centre, radius_m } = player.hull;
+        // The distance to a fixed thing shrinks by no more than the way flown, so most steps need
+        // no look at the obstacles.
+        watch.clearance_at_least_m -= (centre - watch.centre).norm();
+        watch.centre = centre;
+        if !player.airborne || player.wrecked {
+            return false;
+        }
+        let out = !self.bounds.contains(&centre);
+        if out && !watch.out_of_bounds {
+            self.truth.collisions_obstacle += 1;
+        }
+        watch.out_of_bounds = out;
+
+        let known_m = self.truth.min_clearance_m.unwrap_or(f64::INFINITY);
+        if watch.clearance_at_least_m - radius_m > known_m.max(0.0) {
+            return false;
+        }
+        let Some(clearance_m) = self.solids.distance(&centre) else {
+            watch.clearance_at_least_m = f64::INFINITY;
+            return false;
+        };
+        watch.clearance_at_least_m = clearance_m;
+        let hull_clearance_m = (clearance_m - radius_m).max(0.0);
+        self.truth.min_clearance_m = Some(known_m.min(hull_clearance_m));
+        let hit = hull_clearance_m == 0.0;
+        self.truth.collisions_obstacle += u32::from(hit);
+        hit
+    }
+
+    /// Whether the two vehicles have just run into each other.
+    fn judge_pair(&mut self, pair: usize, first: &Player, second: &Player) -> bool {
+        let Some(touching) = self.touching.get_mut(pair) else {
+            return false;
+        };
+        let flies = |player: &Player| player.airborne && !player.wrecked;
+        if !flies(first) && !flies(second) {
+            return false;
+        }
+        let separation_m = (first.hull.centre - second.hull.centre).norm();
+        let least_m = self.truth.min_separation_m.unwrap_or(f64::INFINITY);
+        self.truth.min_separation_m = Some(least_m.min(separation_m));
+        let touch = separation_m <= first.hull.radius_m + second.hull.radius_m;
+        let hit = touch && !*touching;
+        *touching = touch;
+        self.truth.collisions_vehicle += u32::from(hit);
+        hit
+    }
+}
+
+/// The obstacles as parry shapes.
+#[derive(Clone)]
+struct Solids {
+    /// All that have an end, under one bounding volume hierarchy.
+    bodies: Option<Compound>,
+    /// Those that have none.
+    planes: Vec<(DPose3, SharedShape)>,
+}
+
+impl Solids {
+    fn new(obstacles: &[Obstacle]) -> Self {
+        let (planes, bodies): (Vec<_>, Vec<_>) =
+            obstacles.iter().partition(|obstacle| matches!(obstacle.shape, Shape::Plane { .. }));
+        let parts = |obstacles: Vec<&Obstacle>| obstacles.into_iter().map(parry_shape).collect();
+        let bodies: Vec<_> = parts(bodies);
+        Self { bodies: (!bodies.is_empty()).then(|| Compound::new(bodies)), planes: parts(planes) }
+    }
+
+    /// Distance from a point to the nearest obstacle, 0 inside; `None` without obstacles.
+    fn distance(&self, point: &Vector3<f64>) -> Option<f64> {
+        let point = DVec3::new(point.x, point.y, point.z);
+        let bodies = self.bodies.iter().map(|compound| compound.distance_to_local_point(point, true));
+        let planes = self.planes.iter().map(|(pose, plane)| plane.distance_to_point(pose, point, true));
+        bodies.chain(planes).reduce(f64::min)
+    }
+}
+
+/// An obstacle as a parry shape and its pose.
+fn parry_shape(obstacle: &Obstacle) -> (DPose3, SharedShape) {
+    let mut pose = obstacle.pose;
+    let shape = match obstacle.shape {
+        Shape::Box { half_extents } => SharedShape::cuboid(half_extents.x, half_extents.y, half_extents.z),
+        Shape::Cylinder { radius, half_height } => {
+            // Parry's cylinders stand along y.
+            let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+            pose *= Isometry3::from_parts(nalgebra::Translation3::identity(), upright);
+            SharedShape::cylinder(half_height, radius)
+        }
+        Shape::Sphere { radius } => SharedShape::ball(radius),
+        Shape::Plane { normal } => SharedShape::halfspace(DVec3::new(normal.x, normal.y, normal.z)),
+    };
+    (pose.into(), shape)
+}

@@ -1,0 +1,356 @@
+//! What a kind of multirotor is made of, read from TOML.
+//!
+//! The built-in kinds are the files of `vehicles/`; a scenario may bring its own.
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+use thiserror::Error;
+
+/// Standard gravity, m/s^2.
+pub const GRAVITY_M_S2: f64 = 9.806_65;
+
+const BUILT_IN: [(&str, &str); 2] = [
+    ("x500", include_str!("../vehicles/x500.toml")),
+    ("crazyflie", include_str!("../vehicles/crazyflie.toml")),
+];
+
+/// A quadrotor in X configuration, its limits and its sensors.
+///
+/// Masses and lengths are those of the real thing; `max_*` are what the built-in autopilot may
+/// demand of it, well inside what the rotors could give.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VehicleModel {
+    /// Name of the kind.
+    pub name: String,
+    /// Take-off mass, kg.
+    pub mass_kg: f64,
+    /// Centre to each rotor axis, m; the rotors stand at 45 degrees to the body axes.
+    pub arm_m: f64,
+    /// Principal moments of inertia about body x, y, z, kg m^2.
+    pub inertia: [f64; 3],
+    /// Thrust of one rotor at full command, N.
+    pub max_thrust_n: f64,
+    /// Reaction torque about the rotor axis per newton of thrust, m.
+    pub torque_per_thrust_m: f64,
+    /// Time constant of a rotor's first-order answer to its command, s.
+    pub rotor_time_constant_s: f64,
+    /// Drag force per speed through the air, N s/m.
+    pub linear_drag: f64,
+    /// Drag force per squared speed through the air, N s^2/m^2.
+    pub quadratic_drag: f64,
+    /// Radius of the sphere that counts as the vehicle in collisions, m.
+    #[serde(default = "default_hull_radius_m")]
+    pub hull_radius_m: f64,
+    /// Height of the centre above the ground when the vehicle stands, m.
+    pub leg_height_m: f64,
+    /// Largest tilt the autopilot demands, rad.
+    pub max_tilt_rad: f64,
+    /// Largest horizontal speed the autopilot demands, m/s.
+    pub max_speed_m_s: f64,
+    /// Largest horizontal acceleration the autopilot demands, m/s^2.
+    pub max_accel_m_s2: f64,
+    /// Largest rate of climb the autopilot demands, m/s.
+    pub max_climb_m_s: f64,
+    /// Largest rate of descent the autopilot demands, m/s, positive.
+    pub max_descent_m_s: f64,
+    /// Energy store.
+    pub battery: BatteryModel,
+    /// Planar laser scanner with its range finders up and down.
+    pub lidar: LidarModel,
+    /// Satellite receiver.
+    pub gps: GpsModel,
+    /// Accelerometer and gyroscope.
+    pub imu: ImuModel,
+    /// Barometer.
+    pub baro: BaroModel,
+    /// Heading from the magnetic field.
+    pub compass: CompassModel,
+    /// Range finder that looks down, for the autopilot.
+    pub rangefinder: RangefinderModel,
+}
+
+fn default_hull_radius_m() -> f64 {
+    0.25
+}
+
+/// An energy store that empties with thrust: `P = hover_power (T / T_hover)^1.5`, the momentum
+/// theory of a hovering rotor.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BatteryModel {
+    /// Usable energy when full, Wh.
+    pub capacity_wh: f64,
+    /// Electrical power in hover, W.
+    pub hover_power_w: f64,
+    /// Power that flows always, W.
+    pub idle_power_w: f64,
+    /// Open-circuit voltage when full, V.
+    pub full_v: f64,
+    /// Open-circuit voltage when empty, V.
+    pub empty_v: f64,
+}
+
+/// A planar laser scanner in the body's xy plane, one full turn.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LidarModel {
+    /// Rays in a turn.
+    pub rays: u32,
+    /// Largest range, m.
+    pub range_m: f64,
+    /// Standard deviation of a range, m.
+    pub sigma_m: f64,
+    /// Scans per second; must divide the simulation's 250 steps per second.
+    pub rate_hz: f64,
+    /// Largest range of the finders that look up and down, m.
+    pub vertical_range_m: f64,
+    /// Full opening of the cone of the finders that look up and down, rad.
+    pub vertical_cone_rad: f64,
+}
+
+/// A satellite receiver with white noise on position and velocity.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GpsModel {
+    /// Standard deviation east and north, m.
+    pub sigma_horizontal_m: f64,
+    /// Standard deviation of height, m.
+    pub sigma_vertical_m: f64,
+    /// Standard deviation of each velocity axis, m/s.
+    pub sigma_velocity_m_s: f64,
+    /// Fixes per second; must divide 250.
+    pub rate_hz: f64,
+}
+
+/// An inertial unit with white noise and a constant bias drawn at power-on.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImuModel {
+    /// Standard deviation of each angular rate sample, rad/s.
+    pub gyro_sigma_rad_s: f64,
+    /// Standard deviation of the constant gyroscope bias, rad/s.
+    pub gyro_bias_rad_s: f64,
+    /// Standard deviation of each specific force sample, m/s^2.
+    pub accel_sigma_m_s2: f64,
+    /// Standard deviation of the constant accelerometer bias, m/s^2.
+    pub accel_bias_m_s2: f64,
+}
+
+/// A barometer with white noise and a constant offset drawn at power-on.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BaroModel {
+    /// Standard deviation of a sample, m.
+    pub sigma_m: f64,
+    /// Standard deviation of the constant offset, m.
+    pub offset_m: f64,
+    /// Samples per second; must divide 250.
+    pub rate_hz: f64,
+}
+
+/// A heading sensor with white noise.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CompassModel {
+    /// Standard deviation of a sample, rad.
+    pub sigma_rad: f64,
+    /// Samples per second; must divide 250.
+    pub rate_hz: f64,
+}
+
+/// A single-beam range finder along body -z.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RangefinderModel {
+    /// Largest range, m.
+    pub range_m: f64,
+    /// Standard deviation of a range, m.
+    pub sigma_m: f64,
+    /// Samples per second; must divide 250.
+    pub rate_hz: f64,
+}
+
+/// Why a vehicle file was refused.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum VehicleError {
+    /// Not TOML, a missing or unknown field, or a value of the wrong type.
+    #[error("{source_name}:{line}:{column}: {message}")]
+    Syntax {
+        /// The file.
+        source_name: String,
+        /// Line from 1.
+        line: usize,
+        /// Column from 1.
+        column: usize,
+        /// What the parser expected.
+        message: String,
+    },
+    /// A number outside of its range.
+    #[error("{source_name}: field `{field}` is {found}; expected {expected}")]
+    Range {
+        /// The file.
+        source_name: String,
+        /// Dotted name of the field.
+        field: &'static str,
+        /// Its value.
+        found: f64,
+        /// What is allowed.
+        expected: &'static str,
+    },
+    /// No built-in vehicle has this name.
+    #[error("no built-in vehicle `{name}`; there are: {known}")]
+    Unknown {
+        /// The name asked for.
+        name: String,
+        /// The names that exist.
+        known: String,
+    },
+}
+
+impl VehicleModel {
+    /// Reads a vehicle file; `source_name` is what messages call it.
+    ///
+    /// # Errors
+    /// [`VehicleError::Syntax`] with line and column, or [`VehicleError::Range`] with the field.
+    pub fn from_toml(text: &str, source_name: &str) -> Result<Self, VehicleError> {
+        let model: Self = toml::from_str(text).map_err(|error| {
+            let (line, column) = line_and_column(text, error.span().map_or(0, |span| span.start));
+            VehicleError::Syntax {
+                source_name: source_name.to_owned(),
+                line,
+                column,
+                message: error.message().to_owned(),
+            }
+        })?;
+        model.check(source_name)?;
+        Ok(model)
+    }
+
+    /// The built-in vehicle of that name: `x500` (2 kg) or `crazyflie` (27 g).
+    ///
+    /// # Errors
+    /// [`VehicleError::Unknown`], which lists the names that exist.
+    pub fn built_in(name: &str) -> Result<Self, VehicleError> {
+        match BUILT_IN.iter().find(|(known, _)| *known == name) {
+            Some((known, text)) => Self::from_toml(text, &format!("vehicles/{known}.toml")),
+            None => Err(VehicleError::Unknown {
+                name: name.to_owned(),
+                known: BUILT_IN.map(|(known, _)| known).join(", "),
+            }),
+        }
+    }
+
+    /// Names of the built-in vehicles.
+    pub fn built_in_names() -> impl Iterator<Item = &'static str> {
+        BUILT_IN.iter().map(|(name, _)| *name)
+    }
+
+    /// Where each rotor stands in the body frame (FLU, m), in the order of
+    /// [`MotorCommands`](crate::sensors::MotorCommands).
+    pub fn rotor_positions(&self) -> [Vector3<f64>; 4] {
+        let reach = self.arm_m * std::f64::consts::FRAC_1_SQRT_2;
+        [
+            Vector3::new(reach, -reach, 0.0),
+            Vector3::new(-reach, reach, 0.0),
+            Vector3::new(reach, reach, 0.0),
+            Vector3::new(-reach, -reach, 0.0),
+        ]
+    }
+
+    /// Share of full thrust (0..1) that carries the weight.
+    pub fn hover_share(&self) -> f64 {
+        self.mass_kg * GRAVITY_M_S2 / (4.0 * self.max_thrust_n)
+    }
+
+    fn check(&self, source_name: &str) -> Result<(), VehicleError> {
+        let [ixx, iyy, izz] = self.inertia;
+        let positive = [
+            ("mass_kg", self.mass_kg),
+            ("arm_m", self.arm_m),
+            ("inertia[0]", ixx),
+            ("inertia[1]", iyy),
+            ("inertia[2]", izz),
+            ("max_thrust_n", self.max_thrust_n),
+            ("torque_per_thrust_m", self.torque_per_thrust_m),
+            ("rotor_time_constant_s", self.rotor_time_constant_s),
+            ("hull_radius_m", self.hull_radius_m),
+            ("leg_height_m", self.leg_height_m),
+            ("max_tilt_rad", self.max_tilt_rad),
+            ("max_speed_m_s", self.max_speed_m_s),
+            ("max_accel_m_s2", self.max_accel_m_s2),
+            ("max_climb_m_s", self.max_climb_m_s),
+            ("max_descent_m_s", self.max_descent_m_s),
+            ("battery.capacity_wh", self.battery.capacity_wh),
+            ("battery.hover_power_w", self.battery.hover_power_w),
+            ("battery.empty_v", self.battery.empty_v),
+            ("lidar.range_m", self.lidar.range_m),
+            ("lidar.vertical_range_m", self.lidar.vertical_range_m),
+            ("rangefinder.range_m", self.rangefinder.range_m),
+        ];
+        let not_negative = [
+            ("linear_drag", self.linear_drag),
+            ("quadratic_drag", self.quadratic_drag),
+            ("battery.idle_power_w", self.battery.idle_power_w),
+            ("lidar.sigma_m", self.lidar.sigma_m),
+            ("gps.sigma_horizontal_m", self.gps.sigma_horizontal_m),
+            ("gps.sigma_vertical_m", self.gps.sigma_vertical_m),
+            ("gps.sigma_velocity_m_s", self.gps.sigma_velocity_m_s),
+            ("imu.gyro_sigma_rad_s", self.imu.gyro_sigma_rad_s),
+            ("imu.gyro_bias_rad_s", self.imu.gyro_bias_rad_s),
+            ("imu.accel_sigma_m_s2", self.imu.accel_sigma_m_s2),
+            ("imu.accel_bias_m_s2", self.imu.accel_bias_m_s2),
+            ("baro.sigma_m", self.baro.sigma_m),
+            ("baro.offset_m", self.baro.offset_m),
+            ("compass.sigma_rad", self.compass.sigma_rad),
+            ("rangefinder.sigma_m", self.rangefinder.sigma_m),
+        ];
+        let rates = [
+            ("lidar.rate_hz", self.lidar.rate_hz),
+            ("gps.rate_hz", self.gps.rate_hz),
+            ("baro.rate_hz", self.baro.rate_hz),
+            ("compass.rate_hz", self.compass.rate_hz),
+            ("rangefinder.rate_hz", self.rangefinder.rate_hz),
+        ];
+        let range = |field, found: f64, sound: bool, expected| {
+            if sound && found.is_finite() {
+                return Ok(());
+            }
+            Err(VehicleError::Range { source_name: source_name.to_owned(), field, found, expected })
+        };
+        for (field, found) in positive {
+            range(field, found, found > 0.0, "a number above 0")?;
+        }
+        for (field, found) in not_negative {
+            range(field, found, found >= 0.0, "0 or more")?;
+        }
+        for (field, found) in rates {
+            let divides = found > 0.0 && (250.0 / found).fract() == 0.0;
+            range(field, found, divides, "a rate that divides 250, such as 10")?;
+        }
+        let rays = self.lidar.rays;
+        range("lidar.rays", f64::from(rays), (4..=10_000).contains(&rays), "4 to 10000")?;
+        let cone = self.lidar.vertical_cone_rad;
+        range("lidar.vertical_cone_rad", cone, (0.0..=3.0).contains(&cone), "an angle of 0 to 3 rad")?;
+        range(
+            "battery.full_v",
+            self.battery.full_v,
+            self.battery.full_v >= self.battery.empty_v,
+            "at least battery.empty_v",
+        )?;
+        range(
+            "max_thrust_n",
+            self.max_thrust_n,
+            self.hover_share() < 0.9,
+            "four rotors that lift the mass with a tenth to spare",
+        )
+    }
+}
+
+/// Line and column, both from 1, of a byte offset.
+fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
+    let before = text.get(..offset).unwrap_or(text);
+    let line = before.matches('\n').count() + 1;
+    let column = before.rsplit('\n').next().map_or(0, str::len) + 1;
+    (line, column)
+}
