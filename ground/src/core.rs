@@ -25,6 +25,8 @@ pub struct GroundConfig {
     pub orders: Vec<(Duration, Order)>,
     /// Whether the b-threads are loaded; without them the station listens and asks for nothing.
     pub loaded: bool,
+    /// Whether nobody sets out before everybody is in the air.
+    pub muster: bool,
     /// Lease of the station's bids.
     pub lease: Duration,
     /// Seed of the program's tie-breaks.
@@ -36,7 +38,7 @@ impl GroundConfig {
     #[must_use]
     pub fn new(fleet: Fleet, name: NodeName, vehicles: Vec<NodeName>) -> Self {
         let lease = Duration::from_secs(1);
-        Self { fleet, name, vehicles, incarnation: 1, orders: Vec::new(), loaded: true, lease, seed: 0 }
+        Self { fleet, name, vehicles, incarnation: 1, orders: Vec::new(), loaded: true, muster: false, lease, seed: 0 }
     }
 }
 

@@ -5,6 +5,7 @@
 mod delivery;
 mod hold;
 mod launch;
+mod muster;
 mod watch;
 
 use skein_bp::Program;
@@ -13,6 +14,7 @@ use skein_wire::vocabulary::TAKEOFF;
 pub use delivery::Delivery;
 pub use hold::Hold;
 pub use launch::Launch;
+pub use muster::Muster;
 pub use watch::{MissionOutcome, Watch};
 
 use crate::GroundConfig;
@@ -21,6 +23,9 @@ use crate::GroundConfig;
 pub fn load(program: &mut Program, config: &GroundConfig) {
     let (ground, vehicles) = (&config.name, &config.vehicles);
     program.add(TAKEOFF, Launch::new(ground.clone(), vehicles.clone()));
+    if config.muster {
+        program.add("muster", Muster::new(ground.clone(), vehicles.iter().cloned()));
+    }
     program.add("hold", Hold::new(ground.clone(), vehicles.clone()));
     program.add(Watch::NAME, Watch::new(ground.clone(), vehicles.iter().cloned()));
     for vehicle in vehicles {

@@ -11,7 +11,7 @@ use skein_wire::Fleet;
 use skein_world::{SimulationConfig, VehicleSetup};
 
 use crate::cli;
-use crate::scenario::{self, OrderKind, Scenario};
+use crate::scenario::{self, OrderKind, Scenario, VehiclePlan};
 
 /// The fleet's name on one host.
 pub const FLEET: &str = "sim";
@@ -21,6 +21,9 @@ const LEASE: Duration = Duration::from_secs(1);
 const RETURN_ALTITUDE_M: f64 = 3.0;
 /// Vehicles return at so many heights, this far apart, m.
 const RETURN_LEVELS: (usize, f64) = (4, 1.0);
+
+/// Who lands nearer than this to where another stands needs it gone, m.
+const ROOM_TO_LAND_M: f64 = 1.5;
 
 /// The ground station's node name.
 pub static GROUND: LazyLock<NodeName> = LazyLock::new(|| node_name("ground", "main"));
@@ -97,6 +100,15 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
         .collect()
 }
 
+/// Whether a vehicle's goal is where another stands before it takes off.
+fn swaps_places(scenario: &Scenario) -> bool {
+    let vehicles = &scenario.vehicles;
+    vehicles.iter().enumerate().any(|(index, one)| {
+        let near = |other: &VehiclePlan| (one.goal() - other.start).xy().norm() < ROOM_TO_LAND_M;
+        vehicles.iter().enumerate().any(|(other_index, other)| other_index != index && near(other))
+    })
+}
+
 /// The ground station of a scenario, with its operator's orders.
 #[must_use]
 pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Controller) -> GroundConfig {
@@ -117,6 +129,7 @@ pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Control
     GroundConfig {
         orders: orders.collect(),
         loaded: controller == cli::Controller::Bp,
+        muster: swaps_places(scenario),
         lease: LEASE,
         seed: scenario.seed,
         ..GroundConfig::new(fleet, GROUND.clone(), vehicles)
