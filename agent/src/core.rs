@@ -5,7 +5,7 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_bp::{Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
-use skein_mav::{Companion, CompanionConfig, SetPoint};
+use skein_mav::{Companion, CompanionConfig, Landed, SetPoint};
 use skein_planning::map::MapError;
 use skein_wire::{Fleet, Link, NodeLink, State, vocabulary};
 use skein_wire::vocabulary::{
@@ -30,6 +30,8 @@ use crate::{
 
 /// Standard deviation of the position that a vehicle tells others, m.
 const POSITION_SIGMA_M: f64 = 0.05;
+/// The map reaches this far above the highest waypoint, m: as far as a path may climb over something, and more.
+const ABOVE_WAYPOINTS_M: f64 = 4.0;
 /// A navigation cycle and a state message to the others begin this often.
 const CYCLE_PERIOD: Duration = Duration::from_millis(100);
 
@@ -153,7 +155,7 @@ impl AgentCore {
             node: NodeLink::new(Node::new(node_config, program), fleet),
             name: own_name,
             neighbours: Neighbours::default(),
-            perception: Perception::new(&config.fence, home)?,
+            perception: Perception::new(&config.fence, home, ceiling_m(&config))?,
             watches: Watches::new(me.clone()),
             failsafes: Failsafes::default(),
             flight: Flight::new(me.clone(), config.takeoff_height_m),
@@ -182,6 +184,10 @@ impl AgentCore {
     /// Takes in a lidar scan.
     pub fn sense(&mut self, now: Duration, scan: &Scan) {
         let Some(pose) = self.pose_at(scan.stamp) else { return };
+        // From the ground there is little to see, and much of it is the ground.
+        if !self.is_airborne() {
+            return;
+        }
         let others: Vec<_> = self.neighbours.at(now).map(|neighbour| neighbour.position()).collect();
         self.perception.take_in(scan, &pose, &others);
     }
@@ -379,6 +385,11 @@ impl AgentCore {
         })
     }
 
+    fn is_airborne(&self) -> bool {
+        let telemetry = self.companion.telemetry();
+        telemetry.armed && telemetry.landed != Landed::OnGround
+    }
+
     /// One line about this vehicle.
     #[must_use]
     pub fn status(&self, now: Duration) -> Status {
@@ -438,6 +449,13 @@ impl AgentCore {
     pub fn name(&self) -> &NodeName {
         &self.name
     }
+}
+
+/// Height in the world above which this mission has nothing to fly around, metres.
+fn ceiling_m(config: &AgentConfig) -> f64 {
+    let waypoints = config.waypoints.iter().map(|[_, _, z]| *z);
+    let heights = waypoints.chain([config.return_altitude_m, config.home[2] + config.takeoff_height_m]);
+    heights.fold(0.0, f64::max) + ABOVE_WAYPOINTS_M
 }
 
 /// What no remote b-thread can block, and only the operator's gateway can request.

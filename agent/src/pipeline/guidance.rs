@@ -55,6 +55,8 @@ const PLANAR_BAND_M: f64 = 0.4;
 const OBSTACLE_MARGIN_M: f64 = 0.1;
 /// Margins between hull and obstacles that are tried in turn when there is no path with the envelope's own, m.
 const TIGHT_MARGINS_M: [f64; 2] = [0.1, 0.03];
+/// As the height band of a level search: search all heights.
+const CLIMBING: f64 = -1.0;
 /// How far ahead the way is looked at for the speed cap, m.
 const SENSED_AHEAD_M: f64 = 12.0;
 /// Standard deviation of the vehicle's own position, m.
@@ -302,19 +304,26 @@ impl Guidance {
         }
     }
 
-    /// The path with the widest of the margins that allow one, and the clearance it keeps.
+    /// The path with the widest of the margins that allow one, and the clearance it keeps: level if there is such a path, else
+    /// over or under what is in the way.
     fn search(&mut self, map: &mut ClearanceMap, request: &Request<'_>) -> Result<(Path, f64), PlanError> {
-        let margins = std::iter::once(self.envelope.margin_m).chain(TIGHT_MARGINS_M);
-        let mut last = None;
-        for clearance_m in margins.map(|margin_m| self.envelope.hull_m + margin_m) {
-            let config = AstarConfig { clearance_m, ..AstarConfig::default() };
+        let margins = || std::iter::once(self.envelope.margin_m).chain(TIGHT_MARGINS_M);
+        let planar = AstarConfig::default().planar_band_m;
+        let tries = [planar, CLIMBING].into_iter().flat_map(|band| margins().map(move |margin_m| (band, margin_m)));
+        let mut first_error = None;
+        for (planar_band_m, margin_m) in tries {
+            let clearance_m = self.envelope.hull_m + margin_m;
+            let config = AstarConfig { clearance_m, planar_band_m, ..AstarConfig::default() };
             match astar::plan(map, request, &config, &mut self.scratch) {
                 Ok(plan) => return Ok((simplify(map, &plan.path, clearance_m), clearance_m)),
-                Err(PlanError::BudgetExhausted { partial, .. }) => return Ok((partial, clearance_m)),
-                Err(error) => last = last.or(Some(error)),
+                // Far away: begin with the part of the way that leads nearest to the goal.
+                Err(PlanError::BudgetExhausted { partial, .. }) if planar_band_m > 0.0 => {
+                    return Ok((partial, clearance_m));
+                }
+                Err(error) => first_error = first_error.or(Some(error)),
             }
         }
-        Err(last.unwrap_or(PlanError::Unreachable { expanded: 0 }))
+        Err(first_error.unwrap_or(PlanError::Unreachable { expanded: 0 }))
     }
 
     /// Looks along the path; once in each navigation cycle.

@@ -13,8 +13,12 @@ const RESOLUTION_M: f64 = 0.2;
 const MAP_RANGE_M: f64 = 12.0;
 /// Clearance is not told apart beyond this, m.
 const CLEARANCE_RANGE_M: f64 = 2.5;
-/// The window is at most this wide and high, m; larger missions roll it along.
-const WINDOW_M: [f64; 3] = [120.0, 120.0, 30.0];
+/// The window is at most this wide, m.
+const WIDEST_WINDOW_M: f64 = 120.0;
+/// The window is at most this high, m.
+const TALLEST_WINDOW_M: f64 = 40.0;
+/// The window begins this far below the take-off place, m.
+const BELOW_HOME_M: f64 = 1.0;
 /// Returns from lower than this above the take-off place are the ground.
 const GROUND_M: f64 = 0.4;
 /// Obstacle points this near are told to the safety filter, m.
@@ -60,21 +64,29 @@ pub struct Perception {
     ends: Vec<RayEnd>,
     near: Vec<Vector3<f64>>,
     ground_m: f64,
+    rolls: bool,
+    /// Which half of the far rays the newest scan left out.
+    odd: bool,
 }
 
 impl Perception {
-    /// An empty map of the fenced space around `home`, metres ENU.
+    /// An empty map of the space from `home` up to `ceiling_m` inside the fence, metres ENU. A fence too wide for
+    /// one map is covered by a window that rolls along with the vehicle.
     ///
     /// # Errors
     /// [`MapError`] when the fence is no box in space.
-    pub fn new(fence: &Fence, home: Vector3<f64>) -> Result<Self, MapError> {
-        let size: [f64; 3] = std::array::from_fn(|axis| {
-            (fence.max[axis] - fence.min[axis] + 4.0 * RESOLUTION_M).min(WINDOW_M[axis])
-        });
-        let centre = Vector3::from_fn(|axis, _| {
-            let (min, max, half) = (fence.min[axis], fence.max[axis], size[axis] / 2.0);
-            if max - min + 4.0 * RESOLUTION_M <= WINDOW_M[axis] { (min + max) / 2.0 } else { home[axis].max(min + half) }
-        });
+    pub fn new(fence: &Fence, home: Vector3<f64>, ceiling_m: f64) -> Result<Self, MapError> {
+        let floor_m = home.z - BELOW_HOME_M;
+        let height_m = (ceiling_m.min(fence.max[2]) - floor_m).min(TALLEST_WINDOW_M);
+        let width_m = [0, 1].map(|axis| fence.max[axis] - fence.min[axis] + 4.0 * RESOLUTION_M);
+        let rolls = width_m.iter().any(|width| *width > WIDEST_WINDOW_M);
+        let size = [width_m[0].min(WIDEST_WINDOW_M), width_m[1].min(WIDEST_WINDOW_M), height_m];
+        let middle = |axis: usize| (fence.min[axis] + fence.max[axis]) / 2.0;
+        let middle_m = floor_m + height_m / 2.0;
+        let centre = match rolls {
+            true => Vector3::new(home.x, home.y, middle_m),
+            false => Vector3::new(middle(0), middle(1), middle_m),
+        };
         let config = VoxelMapConfig {
             resolution_m: RESOLUTION_M,
             size_m: size,
@@ -88,6 +100,8 @@ impl Perception {
             ends: Vec::new(),
             near: Vec::new(),
             ground_m: config.ground_m,
+            rolls,
+            odd: false,
         })
     }
 
@@ -120,10 +134,15 @@ impl Perception {
         self.ends.clear();
         let mut near = Sectors::new(pose.position);
         let to_world = pose.attitude.to_rotation_matrix();
+        self.odd = !self.odd;
         for (ray, &range) in (0_u32..).zip(&scan.ranges_m) {
             let range = f64::from(range);
             let hit = range.is_finite() && range <= scan.max_range_m;
             if hit && range < OWN_FRAME_M {
+                continue;
+            }
+            // Free space is wider than the rays are dense: of rays that end beyond the map every other is enough.
+            if (!hit || range > MAP_RANGE_M) && (ray % 2 == 1) == self.odd {
                 continue;
             }
             let (sin, cos) = (scan.angle_min + f64::from(ray) * scan.angle_step).sin_cos();
@@ -152,7 +171,9 @@ impl Perception {
             }
         }
         self.near = near.points().collect();
-        self.map.recentre(&pose.position);
+        if self.rolls {
+            self.map.recentre(&pose.position);
+        }
         self.map.integrate(pose.position, &self.ends);
     }
 }

@@ -501,7 +501,9 @@ impl Node {
         if !self.hear(&presence.node, presence.incarnation) {
             return false;
         }
-        self.peers.set_lease(&presence.node, Duration::from_millis(presence.lease_ms));
+        let lease = Duration::from_millis(presence.lease_ms);
+        let longest = self.config.longest_lease.max(self.config.lease);
+        self.peers.set_lease(&presence.node, lease.clamp(LEAST_LEASE, longest));
         // Whoever started within a lease of this node counts as having started with it.
         let from_start = presence.up <= self.up() + self.config.lease;
         let mut heard = VecDeque::new();
@@ -616,6 +618,11 @@ impl Node {
     /// Tells the program what has occurred elsewhere.
     fn apply(&mut self, occurrence: Occurrence) -> Result<(), NodeError> {
         let Occurrence { home, seq, event, requests_served, .. } = occurrence;
+        if self.home_of(&event) != Home::Elsewhere(home.clone()) {
+            // A home decides on its own events only.
+            self.stats.ignored += 1;
+            return Ok(());
+        }
         for request in &requests_served {
             let ours = request.node == self.config.name;
             let wanted = request.incarnation == self.config.incarnation

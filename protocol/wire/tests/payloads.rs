@@ -83,6 +83,8 @@ prop_compose! {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
     #[test]
     fn every_message_survives_the_way_over_the_wire(message in message()) {
         let payload = Payload::Message(message);
