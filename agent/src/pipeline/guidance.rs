@@ -58,7 +58,7 @@ const TIGHT_MARGINS_M: [f64; 2] = [0.1, 0.03];
 /// As the height band of a level search: search all heights.
 const CLIMBING: f64 = -1.0;
 /// How far ahead the way is looked at for the speed cap, m.
-const SENSED_AHEAD_M: f64 = 12.0;
+const SENSED_AHEAD_M: f64 = 9.0;
 /// Standard deviation of the vehicle's own position, m.
 const POSITION_SIGMA_M: f64 = 0.05;
 /// A hovering vehicle that others have pushed this far does not come back, m.

@@ -10,7 +10,9 @@ use crate::config::Fence;
 /// Edge of a voxel, m.
 const RESOLUTION_M: f64 = 0.2;
 /// Rays are followed this far, m: further than any vehicle here needs to stop.
-const MAP_RANGE_M: f64 = 12.0;
+const MAP_RANGE_M: f64 = 10.0;
+/// Of rays that end beyond the map, one in so many is followed in each scan; the next scan follows others.
+const FAR_RAYS: u32 = 3;
 /// Clearance is not told apart beyond this, m.
 const CLEARANCE_RANGE_M: f64 = 2.5;
 /// The window is at most this wide, m.
@@ -65,8 +67,8 @@ pub struct Perception {
     near: Vec<Vector3<f64>>,
     ground_m: f64,
     rolls: bool,
-    /// Which half of the far rays the newest scan left out.
-    odd: bool,
+    /// Which of the far rays the newest scan followed.
+    far_ray: u32,
 }
 
 impl Perception {
@@ -101,7 +103,7 @@ impl Perception {
             near: Vec::new(),
             ground_m: config.ground_m,
             rolls,
-            odd: false,
+            far_ray: 0,
         })
     }
 
@@ -134,15 +136,15 @@ impl Perception {
         self.ends.clear();
         let mut near = Sectors::new(pose.position);
         let to_world = pose.attitude.to_rotation_matrix();
-        self.odd = !self.odd;
+        self.far_ray = (self.far_ray + 1) % FAR_RAYS;
         for (ray, &range) in (0_u32..).zip(&scan.ranges_m) {
             let range = f64::from(range);
             let hit = range.is_finite() && range <= scan.max_range_m;
             if hit && range < OWN_FRAME_M {
                 continue;
             }
-            // Free space is wider than the rays are dense: of rays that end beyond the map every other is enough.
-            if (!hit || range > MAP_RANGE_M) && (ray % 2 == 1) == self.odd {
+            // The voxels are wider than the rays are far apart.
+            if (!hit || range > MAP_RANGE_M) && ray % FAR_RAYS != self.far_ray {
                 continue;
             }
             let (sin, cos) = (scan.angle_min + f64::from(ray) * scan.angle_step).sin_cos();
