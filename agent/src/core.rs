@@ -215,7 +215,7 @@ impl AgentCore {
         self.watch(now, &neighbours);
         if now >= self.next_cycle {
             self.next_cycle = now + CYCLE_PERIOD;
-            self.begin_cycle(now, link);
+            self.begin_cycle(now, &neighbours, link);
         }
         self.decide(now, &neighbours);
         self.steer(now, &neighbours);
@@ -252,10 +252,10 @@ impl AgentCore {
     }
 
     /// A navigation cycle: looks along the path, and tells the others where this vehicle is.
-    fn begin_cycle(&mut self, now: Duration, link: &mut dyn Link) {
+    fn begin_cycle(&mut self, now: Duration, neighbours: &[Neighbour], link: &mut dyn Link) {
         if let (FlightPhase::Flying, Some(motion)) = (self.flight.phase(), self.motion()) {
             let map = self.perception.map();
-            for report in self.guidance.look_ahead(now, &motion, map) {
+            for report in self.guidance.look_ahead(now, &motion, map, neighbours) {
                 self.node.node_mut().enqueue(report.into_event(&self.me));
             }
         }

@@ -38,7 +38,17 @@ impl GroundConfig {
     #[must_use]
     pub fn new(fleet: Fleet, name: NodeName, vehicles: Vec<NodeName>) -> Self {
         let lease = Duration::from_secs(1);
-        Self { fleet, name, vehicles, incarnation: 1, orders: Vec::new(), loaded: true, muster: false, lease, seed: 0 }
+        Self {
+            fleet,
+            name,
+            vehicles,
+            incarnation: 1,
+            orders: Vec::new(),
+            loaded: true,
+            muster: false,
+            lease,
+            seed: 0,
+        }
     }
 }
 

@@ -162,10 +162,10 @@ pub struct VehicleSummary {
     pub flight_time_s: f64,
     /// Way flown.
     pub path_length_m: f64,
-    /// Least distance to another vehicle's centre while either was airborne.
-    pub min_separation_m: Option<f64>,
-    /// Least distance from its hull to an obstacle while airborne.
-    pub min_clearance_m: Option<f64>,
+    /// Set-points made from fresh inputs, and the greatest age of an input to one of them, which must not exceed 200 ms.
+    pub set_points: u64,
+    /// See `set_points`.
+    pub oldest_input_ms: f64,
     /// Share of the battery's energy left, 0 to 1.
     pub battery: f64,
 }
@@ -225,8 +225,8 @@ impl Summary {
             "outcome",
             "flight",
             "path",
-            "nearest vehicle",
-            "nearest obstacle",
+            "set-points",
+            "oldest input",
             "battery",
             "reason",
         ];
@@ -237,8 +237,8 @@ impl Summary {
                 vehicle.outcome.as_str().to_owned(),
                 format!("{:.1} s", vehicle.flight_time_s),
                 format!("{:.1} m", vehicle.path_length_m),
-                metres(vehicle.min_separation_m),
-                metres(vehicle.min_clearance_m),
+                vehicle.set_points.to_string(),
+                format!("{:.0} ms", vehicle.oldest_input_ms),
                 format!("{:.0} %", vehicle.battery * 100.0),
                 vehicle.reason.clone().unwrap_or_default(),
             ]);
@@ -283,8 +283,8 @@ mod tests {
                 reason: Some("no path".into()),
                 flight_time_s: 40.0,
                 path_length_m: 71.5,
-                min_separation_m: None,
-                min_clearance_m: Some(0.42),
+                set_points: 1830,
+                oldest_input_ms: 120.0,
                 battery: 0.875,
             }],
         }

@@ -33,10 +33,12 @@ impl Mission {
     /// A mission over `waypoints` in metres ENU, the last being where the vehicle lands.
     #[must_use]
     pub fn new(me: Me, waypoints: &[[f64; 3]]) -> Self {
-        let waypoints = (0_i64..)
-            .zip(waypoints)
-            .map(|(leg, &[x, y, z])| me.event(GOTO).with("leg", leg).with("x", x).with("y", y).with("z", z))
-            .collect();
+        let last = waypoints.len().saturating_sub(1);
+        let goto = |(leg, &[x, y, z]): (usize, &[f64; 3])| {
+            let number = i64::try_from(leg).unwrap_or(i64::MAX);
+            me.event(GOTO).with("leg", number).with("lands", leg == last).with("x", x).with("y", y).with("z", z)
+        };
+        let waypoints = waypoints.iter().enumerate().map(goto).collect();
         Self { me, waypoints, phase: Phase::Grounded }
     }
 

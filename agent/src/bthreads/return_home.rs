@@ -29,7 +29,7 @@ impl ReturnHome {
     /// `home` is the point above the take-off place, metres ENU; its height is the vehicle's own return altitude.
     #[must_use]
     pub fn new(me: Me, [x, y, z]: [f64; 3]) -> Self {
-        let home = me.event(GOTO).with("leg", HOME_LEG).with("x", x).with("y", y).with("z", z);
+        let home = me.event(GOTO).with("leg", HOME_LEG).with("lands", true).with("x", x).with("y", y).with("z", z);
         Self { me, home, phase: Phase::Away }
     }
 }

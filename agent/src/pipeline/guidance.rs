@@ -128,6 +128,7 @@ impl Report {
 struct Leg {
     number: i64,
     target: Vector3<f64>,
+    lands: bool,
     arrived: bool,
 }
 
@@ -207,7 +208,8 @@ impl Guidance {
         else {
             return;
         };
-        self.leg = Some(Leg { number, target: Vector3::new(x, y, z), arrived: false });
+        let lands = goto.bool("lands").unwrap_or(true);
+        self.leg = Some(Leg { number, target: Vector3::new(x, y, z), lands, arrived: false });
         self.following = None;
     }
 
@@ -327,22 +329,35 @@ impl Guidance {
     }
 
     /// Looks along the path; once in each navigation cycle.
-    pub fn look_ahead(&mut self, now: Duration, motion: &Motion, map: &ClearanceMap) -> Vec<Report> {
+    pub fn look_ahead(
+        &mut self,
+        now: Duration,
+        motion: &Motion,
+        map: &ClearanceMap,
+        neighbours: &[Neighbour],
+    ) -> Vec<Report> {
         let mut reports = Vec::new();
         let has_leave = now <= self.leave_until;
-        reports.extend(self.check_arrival(motion));
+        reports.extend(self.check_arrival(motion, neighbours));
         reports.extend(self.check_path(motion, map));
         reports.extend(self.check_passage(motion, map));
         reports.extend(self.check_progress(now, has_leave));
         reports
     }
 
-    fn check_arrival(&mut self, motion: &Motion) -> Option<Report> {
-        let following = self.following.as_ref()?;
+    fn check_arrival(&mut self, motion: &Motion, neighbours: &[Neighbour]) -> Option<Report> {
         let leg = self.leg.as_mut()?;
         let offset = leg.target - motion.position;
-        let is_last_stretch = following.path.length_m() - following.station_m < 2.0 * PASSING_M;
-        let within_m = if leg.number < 0 || is_last_stretch { ARRIVAL_M } else { PASSING_M };
+        let room_m = 2.0 * self.envelope.separation_m;
+        let is_taken = neighbours
+            .iter()
+            .any(|neighbour| neighbour.armed && (neighbour.position() - leg.target).norm() < self.envelope.separation_m);
+        let within_m = match (leg.lands, is_taken) {
+            (true, _) => ARRIVAL_M,
+            (false, false) => PASSING_M,
+            // A place in the air that another vehicle has is passed at a distance, not fought over.
+            (false, true) => room_m,
+        };
         let arrived = offset.xy().norm() < within_m && offset.z.abs() < 0.5;
         (arrived && !std::mem::replace(&mut leg.arrived, true)).then_some(Report::Arrived { leg: leg.number })
     }

@@ -8,8 +8,8 @@ use proptest::prelude::*;
 use skein_bp::script::{Op, Script};
 use skein_bp::{Bid, Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{
-    BidAck, BidRecord, Message, Node, NodeConfig, NodeName, Occurrence, OnLoss, Presence, Recipient, RemoteBid,
-    Repair, ServedRequest,
+    BidAck, BidRecord, Message, Node, NodeConfig, NodeName, Occurrence, OnLoss, Presence, Recipient,
+    RemoteBid, Repair, ServedRequest,
 };
 
 fn name(text: &str) -> NodeName {
@@ -34,12 +34,26 @@ fn node() -> Node {
 
 fn occurrence(home: &str, seq: u64, event: &str) -> Message {
     let (home, event) = (name(home), Event::new(event));
-    Message::Occurrence(Occurrence { home, incarnation: 1, seq, event, requests_served: vec![], at: Duration::ZERO })
+    Message::Occurrence(Occurrence {
+        home,
+        incarnation: 1,
+        seq,
+        event,
+        requests_served: vec![],
+        at: Duration::ZERO,
+    })
 }
 
 fn presence(node: &str, latest_seq: u64) -> Message {
     let up = Duration::ZERO;
-    Message::Presence(Presence { node: name(node), incarnation: 1, up, latest_seq, oldest_seq: 1, lease_ms: 1000 })
+    Message::Presence(Presence {
+        node: name(node),
+        incarnation: 1,
+        up,
+        latest_seq,
+        oldest_seq: 1,
+        lease_ms: 1000,
+    })
 }
 
 /// The names of what has happened, but for the node's own facts.
@@ -65,7 +79,14 @@ fn strangers_and_lives_that_are_over_are_not_heard() {
     node.handle(Duration::ZERO, presence("uav/9", 0));
     node.handle(Duration::ZERO, occurrence("uav/9", 1, "uav/9/step"));
     node.handle(Duration::ZERO, presence("uav/2", 0));
-    let young = Presence { node: name("uav/3"), incarnation: 7, up: Duration::ZERO, latest_seq: 0, oldest_seq: 1, lease_ms: 1000 };
+    let young = Presence {
+        node: name("uav/3"),
+        incarnation: 7,
+        up: Duration::ZERO,
+        latest_seq: 0,
+        oldest_seq: 1,
+        lease_ms: 1000,
+    };
     node.handle(Duration::ZERO, Message::Presence(young));
     node.handle(Duration::ZERO, occurrence("uav/3", 1, "uav/3/step"));
     assert_eq!(heard(&mut node), Vec::<String>::new());
@@ -78,16 +99,19 @@ fn an_acknowledgement_of_what_was_never_sent_confirms_nothing() {
     for home in ["uav/2", "uav/3"] {
         node.handle(Duration::ZERO, presence(home, 0));
         for (epoch, sent_at) in [(99, Duration::ZERO), (1, Duration::from_secs(99))] {
-            node.handle(Duration::ZERO, Message::Ack(BidAck {
-                home: name(home),
-                home_incarnation: 1,
-                node: name("uav/1"),
-                incarnation: 3,
-                epoch,
-                sent_at,
-                latest_seq: 0,
-                refused: vec![],
-            }));
+            node.handle(
+                Duration::ZERO,
+                Message::Ack(BidAck {
+                    home: name(home),
+                    home_incarnation: 1,
+                    node: name("uav/1"),
+                    incarnation: 3,
+                    epoch,
+                    sent_at,
+                    latest_seq: 0,
+                    refused: vec![],
+                }),
+            );
         }
     }
     node.step(Duration::from_millis(20)).unwrap();
@@ -131,7 +155,8 @@ fn a_record_that_asks_for_too_much_is_cut_down_and_the_rest_is_told() {
         })
         .collect();
     assert_eq!(acks.len(), 1);
-    let reasons: Vec<_> = acks[0].refused.iter().map(|refusal| (&*refusal.bthread, refusal.reason.as_str())).collect();
+    let reasons: Vec<_> =
+        acks[0].refused.iter().map(|refusal| (&*refusal.bthread, refusal.reason.as_str())).collect();
     assert_eq!(reasons[..3], [("b0", "safety"), ("b1", "not_home"), ("b2", "hold_unsupported")]);
     assert_eq!(reasons.len(), 3 + 300 - 256);
     assert!(reasons[3..].iter().all(|(_, reason)| *reason == "quota"));

@@ -32,7 +32,7 @@ pub fn order(node: impl std::fmt::Display, what: &str) -> Event {
 
 /// Arm, then climb to the take-off height. Requested by the ground, one vehicle after another.
 pub const TAKEOFF: &str = "takeoff";
-/// Fly to a waypoint: data `leg` (int) and `x`, `y`, `z`.
+/// Fly to a waypoint: data `leg` (int), `x`, `y`, `z`, and whether the vehicle `lands` there.
 pub const GOTO: &str = "goto";
 /// Compute a path to the current waypoint: data `why` (text).
 pub const PLAN: &str = "plan";

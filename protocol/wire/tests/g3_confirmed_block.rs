@@ -149,6 +149,22 @@ fn a_guarded_event_respects_a_confirmed_block_across_a_restart_of_its_home() {
 }
 
 #[test]
+fn a_block_that_comes_with_a_request_stays_when_the_request_is_served() {
+    for seed in 0..10 {
+        let mut swarm = Swarm::new(&["uav/1", HOLDER], NetworkConfig { loss: 0.0, ..hostile() }, seed);
+        swarm.start("uav/1", 1, stepper("uav/1", seed));
+        let mut holder = program(seed);
+        holder.add("move", Always(skein_bp::Bid::new().request("uav/1/turn").block("uav/1/step")));
+        swarm.start(HOLDER, 1, holder);
+        swarm.run(Duration::from_secs(10));
+        let confirmed = swarm.saw(HOLDER, "ground/main/confirmed").next().unwrap().at;
+        let turns = swarm.occurred("uav/1", "uav/1/turn").filter(|seen| seen.at > confirmed).count();
+        assert!(turns > 5, "only {turns} turns: the test says nothing");
+        assert!(swarm.occurred("uav/1", "uav/1/step").all(|seen| seen.at <= confirmed), "seed {seed}");
+    }
+}
+
+#[test]
 fn a_silent_member_keeps_a_wildcard_block_unconfirmed() {
     let mut swarm = Swarm::new(&ALL, NetworkConfig::default(), 1);
     for home in &HOMES[..2] {

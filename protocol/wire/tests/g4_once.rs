@@ -10,7 +10,7 @@ use std::time::Duration;
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_wire::NetworkConfig;
-use swarm::{Requester, Swarm, hostile, name, program};
+use swarm::{LEASE, Requester, Swarm, TICK, hostile, name, program};
 
 /// How often each numbered event has occurred at its home, over all lives of the home.
 fn times_occurred(swarm: &Swarm, event: &str) -> BTreeMap<i64, usize> {
@@ -119,6 +119,42 @@ fn a_restarted_requester_begins_anew_and_its_old_requests_are_dropped() {
             assert!(last < first, "a request of a life that was over was served");
         }
     }
+}
+
+#[test]
+fn a_requester_that_has_missed_its_own_occurrence_is_not_served_again() {
+    let mut swarm = Swarm::new(&["uav/1", "ground/main"], NetworkConfig::default(), 1);
+    let mut home = program(1);
+    let gate = swarm::Blocker {
+        blocking: true,
+        until: Duration::from_secs(1),
+        ..swarm::Blocker::new("uav/1/do", TICK, LEASE * 9)
+    };
+    home.add("gate", gate);
+    home.add("talk", Requester::new("uav/1/word", 100, TICK));
+    let config = skein_dbp::NodeConfig {
+        history: 8,
+        lease: 5 * LEASE,
+        longest_lease: 5 * LEASE,
+        ..swarm.config("uav/1", 1)
+    };
+    swarm.start_with(config, home);
+    let mut ground = program(1);
+    ground.add("ask", Requester::new("uav/1/do", 1, Duration::ZERO));
+    let config = skein_dbp::NodeConfig {
+        lease: 5 * LEASE,
+        longest_lease: 5 * LEASE,
+        ..swarm.config("ground/main", 1)
+    };
+    swarm.start_with(config, ground);
+    swarm.run(Duration::from_millis(900));
+    swarm.network.partition(&[&[name("uav/1")]]);
+    swarm.run(Duration::from_secs(3));
+    swarm.network.heal();
+    swarm.run(Duration::from_secs(3));
+    assert_eq!(swarm.saw("ground/main", "ground/main/gap").count(), 1);
+    assert_eq!(swarm.saw("ground/main", "uav/1/do").count(), 0, "it was not missed: the test says nothing");
+    assert_eq!(swarm.occurred("uav/1", "uav/1/do").count(), 1);
 }
 
 /// Asks, and goes its own way when that takes too long.

@@ -104,14 +104,15 @@ fn vehicle(swarm: &Swarm, index: usize) -> VehicleSummary {
         None if flew => (summary::Outcome::LandedEarly, Some("it landed before its goal".to_owned())),
         None => (summary::Outcome::Grounded, Some("it never took off".to_owned())),
     };
+    let set_points = agent.map(skein_agent::AgentCore::set_points).unwrap_or_default();
     VehicleSummary {
         id: agent.map(|agent| agent.name().to_string()).unwrap_or_default(),
         outcome,
         reason,
         flight_time_s: truth.map_or(0.0, |vehicle| vehicle.flight_time.as_secs_f64()),
         path_length_m: truth.map_or(0.0, |vehicle| vehicle.path_length_m),
-        min_separation_m: None,
-        min_clearance_m: None,
+        set_points: set_points.commands,
+        oldest_input_ms: set_points.oldest_input.as_secs_f64() * 1000.0,
         battery: truth.map_or(0.0, |vehicle| vehicle.battery.fraction),
     }
 }
