@@ -1,11 +1,12 @@
 //! `skein-sim`: see `skein-sim --help`.
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Parser as _;
 use serde_json::json;
 use skein_sim::cli::{Cli, Command, Exit};
-use skein_sim::scenario::Scenario;
+use skein_sim::scenario::{Scenario, ScenarioError};
 use skein_sim::{check, fly, serve};
 
 fn main() -> ExitCode {
@@ -44,14 +45,28 @@ fn run(cli: &Cli) -> anyhow::Result<Exit> {
             list(cli.json);
             Ok(Exit::Done)
         }
-        Command::Check { file } => {
-            let report = check::check(file)?;
-            if cli.json {
-                println!("{}", serde_json::to_string(&report)?);
+        Command::Check { file } => check(file, cli.json),
+    }
+}
+
+/// An unsound file is an answer, and the check has failed; a file that cannot be read is wrong input.
+fn check(file: &Path, as_json: bool) -> anyhow::Result<Exit> {
+    match check::check(file) {
+        Ok(findings) => {
+            if as_json {
+                println!("{}", serde_json::to_string(&findings)?);
             } else {
-                print!("{report}");
+                println!("{findings}");
             }
             Ok(Exit::Done)
+        }
+        Err(error @ ScenarioError::Unreadable { .. }) => Err(error.into()),
+        Err(error) => {
+            if as_json {
+                println!("{}", json!({ "file": file, "error": error.to_string() }));
+            }
+            eprintln!("skein-sim: {error}");
+            Ok(Exit::Failed)
         }
     }
 }

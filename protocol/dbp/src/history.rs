@@ -42,8 +42,8 @@ impl History {
 
     /// All occurrences after number `seq`; none if some of them are no longer kept.
     pub(crate) fn after(&self, seq: u64) -> Option<impl Iterator<Item = &Occurrence>> {
-        (seq + 1 >= self.oldest_seq())
-            .then(|| self.kept.iter().filter(move |occurrence| occurrence.seq > seq))
+        let skipped = seq.saturating_add(1).checked_sub(self.oldest_seq())?;
+        Some(self.kept.iter().skip(usize::try_from(skipped).unwrap_or(usize::MAX)))
     }
 
     /// Those kept of the numbers `from..=to`.

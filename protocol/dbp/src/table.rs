@@ -128,25 +128,17 @@ impl BidTable {
             Ordering::Equal => return (if bidder.live { TakenIn::Yes } else { TakenIn::No }, Vec::new()),
             Ordering::Greater => {}
         }
-        bidder.heard_at = now;
-        bidder.live = true;
+        bidder.renew(now, record);
         bidder.knows_this_life |= for_this_life;
-        bidder.epoch = record.epoch;
-        bidder.sent_at = record.sent_at;
-        bidder.lease = Duration::from_millis(record.lease_ms);
-        bidder.refused.clear();
         let mut taken = BTreeMap::new();
         for (index, bid) in record.bids.iter().enumerate() {
-            match self.rights.judge(bid, index, bidder.lease) {
-                (Some(mut honoured), reasons) => {
-                    let unserved = bidder.served.get(&bid.bthread).is_none_or(|served| bid.sync > *served);
-                    let resumed = since.iter().any(|event| bid.requests.contains(event));
-                    honoured.open = for_this_life && unserved && !resumed && !honoured.requests.is_empty();
-                    taken.insert(bid.bthread.clone(), honoured);
-                    bidder.refuse(bid, reasons);
-                }
-                (None, reasons) => bidder.refuse(bid, reasons),
-            }
+            let (honoured, reasons) = self.rights.judge(bid, index, bidder.lease);
+            bidder.refuse(bid, reasons);
+            let Some(mut honoured) = honoured else { continue };
+            // What has occurred since the bidder stated this resumes its b-thread, which asks no more (G4).
+            let resumed = since.iter().any(|event| bid.requests.contains(event));
+            honoured.open &= for_this_life && !bidder.has_been_served(bid) && !resumed;
+            taken.insert(bid.bthread.clone(), honoured);
         }
         bidder.served.retain(|bthread, _| taken.contains_key(bthread));
         let before = std::mem::replace(&mut bidder.bids, taken);
@@ -246,6 +238,20 @@ impl BidTable {
 }
 
 impl Bidder {
+    /// Takes over a newer copy's number, age and lease.
+    fn renew(&mut self, now: Duration, record: &BidRecord) {
+        self.epoch = record.epoch;
+        self.sent_at = record.sent_at;
+        self.heard_at = now;
+        self.lease = Duration::from_millis(record.lease_ms);
+        self.live = true;
+        self.refused.clear();
+    }
+
+    fn has_been_served(&self, bid: &RemoteBid) -> bool {
+        self.served.get(&bid.bthread).is_some_and(|served| bid.sync <= *served)
+    }
+
     fn refuse(&mut self, bid: &RemoteBid, reasons: Vec<RefusalReason>) {
         let refusals = reasons.into_iter().map(|reason| Refusal {
             bthread: bid.bthread.clone(),
@@ -276,17 +282,13 @@ impl Rights {
         }
         reasons.sort_unstable();
         reasons.dedup();
-        let requests = bid.requests.iter().filter(|event| self.denial(event).is_none()).cloned().collect();
+        let allowed = bid.requests.iter().filter(|event| self.denial(event).is_none());
+        let requests: Vec<Event> = allowed.cloned().collect();
+        let open = !requests.is_empty();
         let priority =
-            bid.priority.map(|priority| priority.clamp(*self.priority.start(), *self.priority.end()));
+            bid.priority.map(|priority| priority.max(*self.priority.start()).min(*self.priority.end()));
         (
-            Some(TakenBid {
-                sync: bid.sync,
-                requests,
-                block: self.honoured_block(bid),
-                priority,
-                open: false,
-            }),
+            Some(TakenBid { sync: bid.sync, requests, block: self.honoured_block(bid), priority, open }),
             reasons,
         )
     }

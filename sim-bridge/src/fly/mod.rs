@@ -20,7 +20,7 @@ use skein_wire::{Fleet, Network, NetworkConfig};
 
 pub use self::{
     recording::Recording,
-    setup::{GROUND, agent_configs, ground_config, simulation_config, vehicle_name},
+    setup::{FLEET, GROUND, agent_configs, ground_config, simulation_config, vehicle_name},
     swarm::{Happenings, Links, Swarm},
 };
 use crate::{

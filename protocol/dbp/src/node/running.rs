@@ -1,0 +1,201 @@
+//! Going on: what has lapsed, what has happened elsewhere, and what the program selects.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use skein_bp::{Origin, Selection};
+
+use crate::facts::{self, tell};
+use crate::held_blocks::BlockNews;
+use crate::node::{Delivery, Happened, Home, MOST_ROUNDS, Node, NodeError, RESTART_GUARD, confirmation};
+use crate::stalls::StallNews;
+use crate::{Message, Occurrence, Recipient};
+
+impl Node {
+    pub(super) fn let_go_of_the_lapsed(&mut self) {
+        let lapsed = self.table.expire(self.now);
+        self.change_proxies(lapsed);
+        for node in self.peers.take_lost(self.now) {
+            self.fact(facts::PEER_LOST, |fact| fact.with("node", node.as_str()));
+        }
+        if self.guarding
+            && (self.now >= self.guard_ends() || self.peers.names().all(|member| self.table.knows(member)))
+        {
+            self.guarding = false;
+            self.program.remove_proxy(RESTART_GUARD);
+        }
+    }
+
+    pub(super) fn guard_ends(&self) -> Duration {
+        self.started.unwrap_or(self.now) + self.config.longest_lease.max(self.config.lease)
+    }
+
+    /// Lets the program run until it has settled and knows all facts that this brought about.
+    pub(super) fn run(&mut self) -> Result<(), NodeError> {
+        let before = self.selections.len();
+        let mut outcome = Ok(());
+        for _ in 0..MOST_ROUNDS {
+            self.check_held_blocks();
+            if let Err(error) = self.run_program(before) {
+                outcome = Err(error);
+            }
+            if let Err(error) = self.state_bids() {
+                outcome = outcome.and(Err(error));
+            }
+            self.check_held_blocks();
+            self.check_stalls();
+            if self.deliveries.is_empty() || outcome.is_err() {
+                break;
+            }
+        }
+        outcome
+    }
+
+    fn run_program(&mut self, before: usize) -> Result<(), NodeError> {
+        while let Some(delivery) = self.deliveries.pop_front() {
+            match delivery {
+                Delivery::Fact(_, Some((bthread, sync))) if self.sync_of(&bthread) != Some(sync) => {}
+                Delivery::Fact(event, _) => {
+                    self.program.occurred(event);
+                    if let Some(selection) = self.program.step(self.now)? {
+                        self.publish(selection);
+                    }
+                }
+                Delivery::Occurrence(occurrence) => self.apply(occurrence)?,
+            }
+        }
+        while let Some(selection) = self.program.step(self.now)? {
+            self.publish(selection);
+            let limit = self.config.settle_limit;
+            if self.selections.len() - before > limit {
+                let recent = self
+                    .selections
+                    .iter()
+                    .rev()
+                    .take(limit / 2)
+                    .flat_map(|happened| happened.requested_by.iter().cloned());
+                let bthreads = recent.collect::<BTreeSet<_>>().into_iter().collect();
+                return Err(NodeError::Unsettled { node: self.config.name.clone(), limit, bthreads });
+            }
+        }
+        Ok(())
+    }
+
+    /// Tells the program what has occurred elsewhere.
+    fn apply(&mut self, occurrence: Occurrence) -> Result<(), NodeError> {
+        let Occurrence { home, seq, event, requests_served, .. } = occurrence;
+        if self.home_of(&event) != Home::Elsewhere(home.clone()) {
+            // A home decides on its own events only.
+            self.stats.ignored += 1;
+            return Ok(());
+        }
+        for request in &requests_served {
+            let ours = request.node == self.config.name;
+            let wanted = request.incarnation == self.config.incarnation
+                && self.sync_of(&request.bthread) == Some(request.sync);
+            if ours && !wanted {
+                self.fact(facts::ORPHAN, |fact| {
+                    fact.with("event", event.name())
+                        .with("home", home.as_str())
+                        .with("bthread", request.bthread.as_str())
+                });
+            }
+        }
+        self.program.occurred(event.clone());
+        self.program.step(self.now)?;
+        self.stats.heard += 1;
+        self.stalls_due = true;
+        let requested_by = requests_served
+            .iter()
+            .map(|request| format!("{}#{}", request.node, request.bthread).into())
+            .collect();
+        self.selections.push(Happened {
+            event,
+            home,
+            seq,
+            origin: Origin::Occurred,
+            requested_by,
+            at: self.now,
+        });
+        Ok(())
+    }
+
+    /// Numbers what was selected here and tells it to all.
+    fn publish(&mut self, selection: Selection) {
+        let Selection { event, origin, requested_by, .. } = selection;
+        let (served, proxies) = self.table.serve(&requested_by);
+        self.change_proxies(proxies);
+        self.stalls_due = true;
+        self.stats.occurred += 1;
+        let travels = self.home.contains(&event);
+        let seq = if travels { self.history.next_seq() } else { 0 };
+        if travels {
+            let occurrence = Occurrence {
+                home: self.config.name.clone(),
+                incarnation: self.config.incarnation,
+                seq,
+                event: event.clone(),
+                requests_served: served,
+                at: self.now,
+            };
+            self.history.push(occurrence.clone());
+            self.outgoing.push((Recipient::All, Message::Occurrence(occurrence)));
+        }
+        self.selections.push(Happened {
+            event,
+            home: self.config.name.clone(),
+            seq,
+            origin,
+            requested_by,
+            at: self.now,
+        });
+    }
+
+    fn check_held_blocks(&mut self) {
+        let (outboxes, lease) = (&self.outboxes, self.config.lease);
+        let news = self
+            .held
+            .check(self.now, |home, bthread, sync| outboxes.get(home)?.kept_until(bthread, sync, lease));
+        for news in news {
+            let (fact, bthread, sync) = match news {
+                BlockNews::Confirmed { bthread, sync } => {
+                    (confirmation(&self.config.name, &bthread, sync), bthread, sync)
+                }
+                BlockNews::Lapsed { bthread, sync, home } => {
+                    let fact = tell(&self.config.name, facts::BLOCK_LAPSED);
+                    (fact.with("bthread", bthread.as_str()).with("home", home.as_str()), bthread, sync)
+                }
+            };
+            self.deliveries.push_back(Delivery::Fact(fact, Some((bthread, sync))));
+        }
+    }
+
+    fn check_stalls(&mut self) {
+        if !std::mem::take(&mut self.stalls_due) {
+            return;
+        }
+        let mut stalled: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        if self.table.has_blocks() {
+            let local = self
+                .program
+                .bids()
+                .flat_map(|(_, bid, _)| bid.requests())
+                .filter(|event| self.home.contains(event));
+            for event in local.chain(self.table.open_requests()) {
+                for by in self.table.blockers_of(event) {
+                    stalled.entry(event.name().into()).or_default().insert(by);
+                }
+            }
+        }
+        for news in self.stalls.update(stalled) {
+            match news {
+                StallNews::Stalled { event, by } => {
+                    self.fact(facts::STALLED, |fact| fact.with("event", event).with("by", by))
+                }
+                StallNews::Unstalled { event } => {
+                    self.fact(facts::UNSTALLED, |fact| fact.with("event", event))
+                }
+            }
+        }
+    }
+}

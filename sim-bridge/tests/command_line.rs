@@ -1,0 +1,120 @@
+//! The program as a user meets it: exit codes, and errors that name what is wrong.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+fn skein_sim(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_skein-sim")).args(arguments).output().expect("the program starts")
+}
+
+/// Exits with 2 and an error that has all of these words.
+fn assert_refused(arguments: &[&str], words: &[&str]) {
+    let output = skein_sim(arguments);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+    for word in words {
+        assert!(error.contains(word), "{arguments:?}: `{word}` is not in: {error}");
+    }
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> String {
+    let file = folder.join(name);
+    std::fs::write(&file, text).expect("the folder can be written to");
+    file.to_string_lossy().into_owned()
+}
+
+#[test]
+fn an_unknown_scenario_is_answered_with_the_known_ones() {
+    assert_refused(&["fly", "florest"], &["florest", "forest", "antipodal", "window", "open"]);
+}
+
+#[test]
+fn no_vehicles_is_no_swarm() {
+    assert_refused(&["fly", "open", "--vehicles", "0"], &["no vehicles", "at least 1"]);
+}
+
+#[test]
+fn malformed_files_are_refused_by_file_and_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scenario = write(folder.path(), "bad.toml", "name = \"bad\"\ncruise_speed_m_s = \"fast\"\n");
+    assert_refused(&["fly", &scenario], &["bad.toml:2", "cruise_speed_m_s"]);
+    let world = write(folder.path(), "bad.world", "<sdf version='1.6'>\n<world name='w'>\n<!-- <model>\n</world></sdf>\n");
+    assert_refused(&["fly", "open", "--world", &world], &["bad.world:3"]);
+    let plan = write(folder.path(), "bad.plan", "{\n\"fileType\": \"Plan\",\n\"mission\": oops\n}");
+    assert_refused(&["fly", "open", "--mission", &plan], &["bad.plan:3"]);
+}
+
+#[test]
+fn a_start_inside_an_obstacle_is_refused_by_both_names() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = "[[vehicle]]\nstart_m = [0.0, 0.0]\nwaypoints_m = [[9.0, 0.0, 3.0]]\n\
+                [[obstacle]]\nname = \"hut\"\ncentre_m = [0.0, 0.0, 1.0]\nbox_m = [2.0, 2.0, 2.0]\n";
+    let scenario = write(folder.path(), "inside.toml", text);
+    assert_refused(&["fly", &scenario, "--clock", "lockstep"], &["vehicle 1", "hut"]);
+}
+
+#[test]
+fn an_unwritable_output_folder_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = write(folder.path(), "in-the-way", "a file, not a folder");
+    let out = format!("{file}/run");
+    assert_refused(&["fly", "open", "--clock", "lockstep", "--out", &out], &["in-the-way", "--out"]);
+}
+
+#[test]
+fn missing_gazebo_models_are_warned_of_by_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = "<sdf version='1.6'><world name='w'>\n<include><uri>model://pine_tree</uri></include>\n</world></sdf>";
+    let world = write(folder.path(), "trees.world", text);
+    let output = skein_sim(&["check", &world]);
+    assert_eq!(output.status.code(), Some(0));
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("pine_tree"), "{said}");
+}
+
+#[test]
+fn json_is_one_object_on_standard_output_on_failure_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().to_string_lossy().into_owned();
+    let failing = ["fly", "open", "--clock", "lockstep", "--headless", "--controller", "none", "--json", "--out", &out];
+    let output = skein_sim(&failing);
+    assert_eq!(output.status.code(), Some(1));
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    assert_eq!(summary["succeeded"], false);
+    assert!(summary["reason"].is_string());
+    let output = skein_sim(&["fly", "florest", "--json"]);
+    assert_eq!(output.status.code(), Some(2));
+    let error: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    assert!(error["error"].as_str().is_some_and(|error| error.contains("florest")));
+}
+
+#[test]
+fn ctrl_c_lands_everyone_and_finishes_the_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut program = Command::new(env!("CARGO_BIN_EXE_skein-sim"))
+        .args(["fly", "open", "--clock", "real", "--speed", "2", "--headless", "--out"])
+        .arg(folder.path())
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    // The recording exists from the start of the run; a little later the first vehicle is in the air.
+    let recording = folder.path().join("mission.mcap");
+    let began = Instant::now();
+    while std::fs::metadata(&recording).map_or(0, |file| file.len()) < 200_000 {
+        assert!(began.elapsed() < Duration::from_secs(60), "no recording grows");
+        std::thread::yield_now();
+    }
+    let interrupted = Command::new("kill").args(["-INT", &program.id().to_string()]).status().expect("kill runs");
+    assert!(interrupted.success());
+    let status = program.wait().expect("the program ends");
+    assert_eq!(status.code(), Some(1));
+    let summary = std::fs::read_to_string(folder.path().join("summary.json")).expect("a summary");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("a whole summary");
+    assert_eq!(summary["reason"], "interrupted");
+    for vehicle in summary["per_vehicle"].as_array().expect("vehicles") {
+        assert_ne!(vehicle["outcome"], "airborne", "{vehicle}");
+    }
+    let bytes = std::fs::read(recording).expect("a recording");
+    assert!(bytes.ends_with(b"\x89MCAP0\r\n"), "the recording ends as MCAP files do");
+}

@@ -1,0 +1,108 @@
+//! What b-threads of one node do to those of another, judged by how the vehicles move.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use skein_ground::{Order, Who};
+use skein_tests::Lockstep;
+use skein_wire::vocabulary::{ENTER, LEAVE, TAKEOFF};
+
+fn seconds(seconds: f64) -> Duration {
+    Duration::from_secs_f64(seconds)
+}
+
+fn fastest_m_s(lockstep: &Lockstep) -> f64 {
+    let vehicle = |index| lockstep.swarm.simulation().vehicle(index);
+    let speeds = (0..lockstep.scenario.vehicles.len()).filter_map(vehicle).map(|state| state.motion.velocity.xy().norm());
+    speeds.fold(0.0, f64::max)
+}
+
+#[test]
+fn vehicles_take_off_one_after_another_at_the_grounds_request() {
+    let mut lockstep = Lockstep::new("open", None, 1);
+    let mut launched = Vec::new();
+    while launched.len() < 4 && lockstep.swarm.now() < seconds(60.0) {
+        for selection in lockstep.step().selections {
+            if selection.event.kind() == TAKEOFF {
+                let airborne = lockstep.swarm.simulation().vehicle(launched.len().saturating_sub(1));
+                assert!(launched.is_empty() || airborne.is_some_and(|state| state.airborne), "the one before is up");
+                assert!(selection.requested_by.iter().any(|bthread| bthread.starts_with("ground/main#")));
+                launched.push(selection.home.to_string());
+            }
+        }
+    }
+    assert_eq!(launched, ["uav/1", "uav/2", "uav/3", "uav/4"]);
+}
+
+#[test]
+fn a_hold_stops_everyone_and_a_resume_lets_them_arrive() {
+    let mut lockstep = Lockstep::new("open", None, 1);
+    lockstep.run_until(seconds(14.0));
+    assert!(fastest_m_s(&lockstep) > 1.0, "they fly");
+    lockstep.swarm.order(&Order::Hold(Who::All));
+    lockstep.run_until(seconds(18.0));
+    for _ in 0..500 {
+        lockstep.step();
+        assert!(fastest_m_s(&lockstep) < 0.6, "held, at {:?}", lockstep.swarm.now());
+    }
+    lockstep.swarm.order(&Order::Resume(Who::All));
+    lockstep.run_until(seconds(120.0));
+    assert!(lockstep.swarm.outcomes().all(|outcome| outcome == Some(&skein_agent::Outcome::Complete)));
+}
+
+#[test]
+fn a_hold_lapses_with_the_ground_station_that_wanted_it() {
+    let mut lockstep = Lockstep::new("open", None, 1);
+    lockstep.run_until(seconds(14.0));
+    lockstep.swarm.order(&Order::Hold(Who::All));
+    lockstep.run_until(seconds(18.0));
+    lockstep.network.leave(&lockstep.nodes[4]);
+    lockstep.run_until(seconds(120.0));
+    assert!(lockstep.swarm.outcomes().all(|outcome| outcome == Some(&skein_agent::Outcome::Complete)));
+}
+
+#[test]
+fn an_order_to_land_brings_everyone_down_at_once() {
+    let mut lockstep = Lockstep::new("forest", None, 2);
+    lockstep.run_until(seconds(20.0));
+    lockstep.swarm.order(&Order::Land(Who::All));
+    lockstep.run_until(seconds(35.0));
+    assert!(lockstep.swarm.is_grounded());
+    assert_eq!(lockstep.swarm.truth().collisions_vehicle, 0);
+}
+
+#[test]
+fn an_order_to_return_brings_a_vehicle_home() {
+    let mut lockstep = Lockstep::new("open", None, 2);
+    lockstep.run_until(seconds(14.0));
+    lockstep.swarm.order(&Order::Return(Who::Vehicle(lockstep.nodes[0].clone())));
+    lockstep.run_until(seconds(120.0));
+    assert!(lockstep.swarm.is_grounded());
+    let place = lockstep.swarm.simulation().vehicle(0).unwrap().motion.position;
+    let home = lockstep.scenario.vehicles[0].start;
+    assert!((place - home).xy().norm() < 1.0, "landed at {place}, home is {home}");
+}
+
+#[test]
+fn a_narrow_passage_never_has_two_holders() {
+    for seed in 1..=4 {
+        let mut lockstep = Lockstep::new("window", None, seed);
+        let mut holders = BTreeSet::new();
+        let mut entries = 0;
+        while !(lockstep.swarm.is_over() && lockstep.swarm.is_grounded()) {
+            for selection in lockstep.step().selections {
+                match selection.event.kind() {
+                    ENTER => {
+                        entries += 1;
+                        holders.insert(selection.home.clone());
+                    }
+                    LEAVE => drop(holders.remove(&selection.home)),
+                    _ => {}
+                }
+                assert!(holders.len() <= 1, "seed {seed}: {holders:?} at {:?}", lockstep.swarm.now());
+            }
+            assert!(lockstep.swarm.now() < seconds(240.0), "seed {seed}: they do not get through");
+        }
+        assert!(entries >= 6, "seed {seed}: {entries} entries for six vehicles");
+    }
+}
