@@ -2,15 +2,15 @@
 
 use std::time::Duration;
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use skein_bp::{Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_mav::{Companion, CompanionConfig, Landed, SetPoint};
 use skein_planning::map::MapError;
-use skein_wire::{Fleet, Link, NodeLink, State, vocabulary};
 use skein_wire::vocabulary::{
     ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, LAND, LANDED, ORDER, PLAN, RETURN,
 };
+use skein_wire::{Fleet, Link, NodeLink, State, vocabulary};
 
 use crate::{
     bthreads,
@@ -18,13 +18,13 @@ use crate::{
     failsafes::Failsafes,
     flight::{Flight, FlightPhase},
     me::Me,
-    precedence,
     neighbours::{Neighbour, Neighbours},
     pipeline::{
         guidance::{Guidance, Motion, Surroundings},
         perception::{Perception, Pose, Scan},
         set_point::{KeepAlive, keep_alive, oldest_age},
     },
+    precedence,
     watches::Watches,
 };
 
@@ -32,6 +32,10 @@ use crate::{
 const POSITION_SIGMA_M: f64 = 0.05;
 /// The map reaches this far above the highest waypoint, m: as far as a path may climb over something, and more.
 const ABOVE_WAYPOINTS_M: f64 = 4.0;
+/// A path may pass under something, this far below the lowest waypoint, m.
+const BELOW_WAYPOINTS_M: f64 = 1.0;
+/// No path is lower than this above the take-off place, m.
+const LEAST_HEIGHT_M: f64 = 0.6;
 /// A navigation cycle and a state message to the others begin this often.
 const CYCLE_PERIOD: Duration = Duration::from_millis(100);
 
@@ -155,7 +159,7 @@ impl AgentCore {
             node: NodeLink::new(Node::new(node_config, program), fleet),
             name: own_name,
             neighbours: Neighbours::default(),
-            perception: Perception::new(&config.fence, home, ceiling_m(&config))?,
+            perception: Perception::new(&config.fence, home, heights(&config))?,
             watches: Watches::new(me.clone()),
             failsafes: Failsafes::default(),
             flight: Flight::new(me.clone(), config.takeoff_height_m),
@@ -196,10 +200,13 @@ impl AgentCore {
     fn pose_at(&self, at: Duration) -> Option<Pose> {
         let telemetry = self.companion.telemetry();
         let (position, velocity) = (telemetry.position?, telemetry.velocity?);
-        let lead_s = at.as_secs_f64() - position.stamp.as_secs_f64();
+        let (attitude, rate) = (telemetry.attitude?, telemetry.angular_rate?);
+        let lead_s = |stamp: Duration| (at.as_secs_f64() - stamp.as_secs_f64()).clamp(-0.2, 0.2);
+        // A degree of tilt is a hand's breadth at the far wall of a room.
+        let turned = UnitQuaternion::from_scaled_axis(rate.value * lead_s(attitude.stamp));
         Some(Pose {
-            position: position.value + velocity.value * lead_s.clamp(-0.2, 0.2),
-            attitude: telemetry.attitude?.value,
+            position: position.value + velocity.value * lead_s(position.stamp),
+            attitude: attitude.value * turned,
         })
     }
 
@@ -451,11 +458,13 @@ impl AgentCore {
     }
 }
 
-/// Height in the world above which this mission has nothing to fly around, metres.
-fn ceiling_m(config: &AgentConfig) -> f64 {
+/// The least and the greatest height in the world at which this mission may fly, metres.
+fn heights(config: &AgentConfig) -> [f64; 2] {
+    let [_, _, home_m] = config.home;
     let waypoints = config.waypoints.iter().map(|[_, _, z]| *z);
-    let heights = waypoints.chain([config.return_altitude_m, config.home[2] + config.takeoff_height_m]);
-    heights.fold(0.0, f64::max) + ABOVE_WAYPOINTS_M
+    let heights = || waypoints.clone().chain([config.return_altitude_m, home_m + config.takeoff_height_m]);
+    let lowest_m = heights().fold(f64::INFINITY, f64::min) - BELOW_WAYPOINTS_M;
+    [lowest_m.max(home_m + LEAST_HEIGHT_M), heights().fold(0.0, f64::max) + ABOVE_WAYPOINTS_M]
 }
 
 /// What no remote b-thread can block, and only the operator's gateway can request.

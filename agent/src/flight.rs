@@ -111,7 +111,9 @@ impl Flight {
                 None
             }
             MavEvent::CommandAcked { result: CommandResult::Accepted, .. } => None,
-            MavEvent::CommandAcked { command, result } => Some(self.command_failed(*command, &result.to_string())),
+            MavEvent::CommandAcked { command, result } => {
+                Some(self.command_failed(*command, &result.to_string()))
+            }
             MavEvent::CommandTimedOut { command } => Some(self.command_failed(*command, "no answer")),
             MavEvent::ModeChanged { to, .. } if self.is_foreign(*to) => {
                 // Control ends with the mode change itself; the b-threads hear of it afterwards.
@@ -129,7 +131,9 @@ impl Flight {
             FlightPhase::Engaging { .. } | FlightPhase::Climbing => {
                 !matches!(mode, FlightMode::Offboard | FlightMode::Takeoff | FlightMode::Hold)
             }
-            FlightPhase::Landing => !matches!(mode, FlightMode::Land | FlightMode::Offboard | FlightMode::Hold),
+            FlightPhase::Landing => {
+                !matches!(mode, FlightMode::Land | FlightMode::Offboard | FlightMode::Hold)
+            }
             FlightPhase::Grounded | FlightPhase::Arming | FlightPhase::Taken | FlightPhase::Adopted => false,
         }
     }
@@ -159,7 +163,9 @@ impl Flight {
         }
         self.left_ground |= landed == Landed::InAir;
         match self.phase {
-            FlightPhase::Climbing if height_m >= self.takeoff_height_m - TAKEOFF_TOLERANCE_M => self.engage(now),
+            FlightPhase::Climbing if height_m >= self.takeoff_height_m - TAKEOFF_TOLERANCE_M => {
+                self.engage(now)
+            }
             FlightPhase::Engaging { since, asked: false } if now >= since + SET_POINTS_BEFORE_OFFBOARD => {
                 companion.command(now, Command::Offboard);
                 self.phase = FlightPhase::Engaging { since, asked: true };

@@ -45,9 +45,10 @@ impl Neighbour {
 impl Neighbours {
     /// Takes in a state message that arrived at `now`; one older than the last is dropped.
     pub fn hear(&mut self, now: Duration, state: State) {
-        let newest = self.last.get(&state.node).is_none_or(|last| {
-            (state.incarnation, state.time) > (last.state.incarnation, last.state.time)
-        });
+        let newest = self
+            .last
+            .get(&state.node)
+            .is_none_or(|last| (state.incarnation, state.time) > (last.state.incarnation, last.state.time));
         if newest {
             self.last.insert(state.node.clone(), Heard { state, at: now });
         }

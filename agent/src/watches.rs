@@ -75,7 +75,12 @@ impl Watches {
     }
 
     /// Preflight: the autopilot is heard, ready to arm, charged, and its failsafes are sound.
-    pub fn preflight(&mut self, now: Duration, telemetry: &Telemetry, failsafes_sound: bool) -> Option<Event> {
+    pub fn preflight(
+        &mut self,
+        now: Duration,
+        telemetry: &Telemetry,
+        failsafes_sound: bool,
+    ) -> Option<Event> {
         let charged = telemetry.battery.is_some_and(|battery| battery.value.fraction >= BATTERY_TO_START);
         let ready = telemetry.connected
             && telemetry.ready_to_arm
@@ -112,7 +117,8 @@ impl Watches {
     /// Geofence: the vehicle is outside.
     pub fn fence(&mut self, position: Vector3<f64>, fence: &Fence) -> Option<Event> {
         let outside = (0..3).any(|axis| {
-            position[axis] < fence.min[axis] - FENCE_TOLERANCE_M || position[axis] > fence.max[axis] + FENCE_TOLERANCE_M
+            position[axis] < fence.min[axis] - FENCE_TOLERANCE_M
+                || position[axis] > fence.max[axis] + FENCE_TOLERANCE_M
         });
         self.outside.rises(outside).then(|| self.me.event(FENCE_BREACHED))
     }

@@ -14,7 +14,8 @@ fn main() -> ExitCode {
         .with_writer(std::io::stderr)
         .with_env_filter(
             // Zenoh warns of things that are as they should be on one host; RUST_LOG says otherwise.
-            tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn,zenoh=error".into()),
+            tracing_subscriber::EnvFilter::try_from_default_env()
+                .unwrap_or_else(|_| "warn,zenoh=error".into()),
         )
         .init();
     let cli = Cli::parse();

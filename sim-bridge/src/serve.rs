@@ -51,12 +51,16 @@ pub fn run(args: &cli::Serve, as_json: bool) -> anyhow::Result<()> {
 }
 
 fn announce(ports: &[MavlinkPort], as_json: bool) {
-    let addresses: Vec<String> = ports.iter().map(|port| format!("udp:127.0.0.1:{}", port.listens_on)).collect();
+    let addresses: Vec<String> =
+        ports.iter().map(|port| format!("udp:127.0.0.1:{}", port.listens_on)).collect();
     if as_json {
         println!("{}", json!({ "mavlink": addresses }));
     } else {
         for (number, (address, port)) in (1..).zip(addresses.iter().zip(ports)) {
-            println!("uav/{number}: MAVLink on {address}, to 127.0.0.1:{} until somebody speaks", port.sends_to.port());
+            println!(
+                "uav/{number}: MAVLink on {address}, to 127.0.0.1:{} until somebody speaks",
+                port.sends_to.port()
+            );
         }
     }
 }

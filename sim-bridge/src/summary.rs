@@ -220,16 +220,8 @@ impl Summary {
     fn table(&self) -> Table {
         let mut table = Table::new();
         table.load_style(UTF8_BORDERS_ONLY);
-        let header = [
-            "vehicle",
-            "outcome",
-            "flight",
-            "path",
-            "set-points",
-            "oldest input",
-            "battery",
-            "reason",
-        ];
+        let header =
+            ["vehicle", "outcome", "flight", "path", "set-points", "oldest input", "battery", "reason"];
         table.set_header(header);
         for vehicle in &self.per_vehicle {
             table.add_row([

@@ -39,7 +39,11 @@ fn malformed_files_are_refused_by_file_and_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let scenario = write(folder.path(), "bad.toml", "name = \"bad\"\ncruise_speed_m_s = \"fast\"\n");
     assert_refused(&["fly", &scenario], &["bad.toml:2", "cruise_speed_m_s"]);
-    let world = write(folder.path(), "bad.world", "<sdf version='1.6'>\n<world name='w'>\n<!-- <model>\n</world></sdf>\n");
+    let world = write(
+        folder.path(),
+        "bad.world",
+        "<sdf version='1.6'>\n<world name='w'>\n<!-- <model>\n</world></sdf>\n",
+    );
     assert_refused(&["fly", "open", "--world", &world], &["bad.world:3"]);
     let plan = write(folder.path(), "bad.plan", "{\n\"fileType\": \"Plan\",\n\"mission\": oops\n}");
     assert_refused(&["fly", "open", "--mission", &plan], &["bad.plan:3"]);
@@ -77,7 +81,8 @@ fn missing_gazebo_models_are_warned_of_by_name() {
 fn json_is_one_object_on_standard_output_on_failure_too() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().to_string_lossy().into_owned();
-    let failing = ["fly", "open", "--clock", "lockstep", "--headless", "--controller", "none", "--json", "--out", &out];
+    let failing =
+        ["fly", "open", "--clock", "lockstep", "--headless", "--controller", "none", "--json", "--out", &out];
     let output = skein_sim(&failing);
     assert_eq!(output.status.code(), Some(1));
     let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
@@ -105,7 +110,8 @@ fn ctrl_c_lands_everyone_and_finishes_the_files() {
         assert!(began.elapsed() < Duration::from_secs(60), "no recording grows");
         std::thread::yield_now();
     }
-    let interrupted = Command::new("kill").args(["-INT", &program.id().to_string()]).status().expect("kill runs");
+    let interrupted =
+        Command::new("kill").args(["-INT", &program.id().to_string()]).status().expect("kill runs");
     assert!(interrupted.success());
     let status = program.wait().expect("the program ends");
     assert_eq!(status.code(), Some(1));

@@ -13,7 +13,8 @@ static PORTS: Mutex<()> = Mutex::new(());
 /// The Python that has the packages of `tests/python/requirements.txt`: `SKEIN_PYTHON`, or `python3`.
 fn python_with(package: &str) -> Option<String> {
     let python = std::env::var("SKEIN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let found = Command::new(&python).args(["-c", &format!("import {package}")]).stderr(Stdio::null()).status();
+    let found =
+        Command::new(&python).args(["-c", &format!("import {package}")]).stderr(Stdio::null()).status();
     if found.is_ok_and(|status| status.success()) {
         return Some(python);
     }
@@ -57,8 +58,11 @@ fn pypi_mcap_reads_a_mission() {
         .status()
         .expect("the program starts");
     assert!(flown.success());
-    let read =
-        Command::new(python).arg(script("test_mcap.py")).arg(folder.path().join("mission.mcap")).status().expect("python starts");
+    let read = Command::new(python)
+        .arg(script("test_mcap.py"))
+        .arg(folder.path().join("mission.mcap"))
+        .status()
+        .expect("python starts");
     assert!(read.success());
 }
 

@@ -13,7 +13,9 @@ fn seconds(seconds: f64) -> Duration {
 
 fn fastest_m_s(lockstep: &Lockstep) -> f64 {
     let vehicle = |index| lockstep.swarm.simulation().vehicle(index);
-    let speeds = (0..lockstep.scenario.vehicles.len()).filter_map(vehicle).map(|state| state.motion.velocity.xy().norm());
+    let speeds = (0..lockstep.scenario.vehicles.len())
+        .filter_map(vehicle)
+        .map(|state| state.motion.velocity.xy().norm());
     speeds.fold(0.0, f64::max)
 }
 
@@ -25,7 +27,10 @@ fn vehicles_take_off_one_after_another_at_the_grounds_request() {
         for selection in lockstep.step().selections {
             if selection.event.kind() == TAKEOFF {
                 let airborne = lockstep.swarm.simulation().vehicle(launched.len().saturating_sub(1));
-                assert!(launched.is_empty() || airborne.is_some_and(|state| state.airborne), "the one before is up");
+                assert!(
+                    launched.is_empty() || airborne.is_some_and(|state| state.airborne),
+                    "the one before is up"
+                );
                 assert!(selection.requested_by.iter().any(|bthread| bthread.starts_with("ground/main#")));
                 launched.push(selection.home.to_string());
             }
@@ -74,7 +79,7 @@ fn an_order_to_land_brings_everyone_down_at_once() {
 #[test]
 fn an_order_to_return_brings_a_vehicle_home() {
     let mut lockstep = Lockstep::new("open", None, 2);
-    lockstep.run_until(seconds(14.0));
+    lockstep.run_until(seconds(8.0));
     lockstep.swarm.order(&Order::Return(Who::Vehicle(lockstep.nodes[0].clone())));
     lockstep.run_until(seconds(120.0));
     assert!(lockstep.swarm.is_grounded());

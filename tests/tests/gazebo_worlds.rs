@@ -40,13 +40,24 @@ fn flies(data: &Path, world: &str, points: &[[f64; 3]]) {
     flight.world.missions = vec![file];
     let summary = fly(flight);
     assert_eq!(summary.reason, None, "{world}");
-    assert!(summary.min_separation_m.unwrap_or(f64::INFINITY) >= 1.0, "{world}: {:?}", summary.min_separation_m);
+    assert!(
+        summary.min_separation_m.unwrap_or(f64::INFINITY) >= 1.0,
+        "{world}: {:?}",
+        summary.min_separation_m
+    );
 }
 
 #[test]
 fn weaving_between_boxes() {
     let Some(data) = shared_data() else { return };
-    let weave = [[-6.0, 0.0, 3.0], [-1.0, 4.0, 3.0], [6.2, 4.2, 3.0], [6.3, 1.5, 3.0], [12.0, 1.0, 3.0], [12.0, -5.0, 3.0]];
+    let weave = [
+        [-6.0, 0.0, 3.0],
+        [-1.0, 4.0, 3.0],
+        [6.2, 4.2, 3.0],
+        [6.3, 1.5, 3.0],
+        [12.0, 1.0, 3.0],
+        [12.0, -5.0, 3.0],
+    ];
     flies(&data, "boxes3.world", &weave);
 }
 

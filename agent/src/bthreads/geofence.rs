@@ -25,8 +25,7 @@ impl Geofence {
     /// A fence over the box from `min` to `max`, metres ENU.
     #[must_use]
     pub fn new(me: Me, min: [f64; 3], max: [f64; 3]) -> Self {
-        let outside =
-            EventSet::And(vec![me.any(GOTO), EventSet::Not(Box::new(EventSet::region(min, max)))]);
+        let outside = EventSet::And(vec![me.any(GOTO), EventSet::Not(Box::new(EventSet::region(min, max)))]);
         Self { me, outside, phase: Phase::Inside }
     }
 }

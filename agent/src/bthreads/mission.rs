@@ -36,7 +36,12 @@ impl Mission {
         let last = waypoints.len().saturating_sub(1);
         let goto = |(leg, &[x, y, z]): (usize, &[f64; 3])| {
             let number = i64::try_from(leg).unwrap_or(i64::MAX);
-            me.event(GOTO).with("leg", number).with("lands", leg == last).with("x", x).with("y", y).with("z", z)
+            me.event(GOTO)
+                .with("leg", number)
+                .with("lands", leg == last)
+                .with("x", x)
+                .with("y", y)
+                .with("z", z)
         };
         let waypoints = waypoints.iter().enumerate().map(goto).collect();
         Self { me, waypoints, phase: Phase::Grounded }
@@ -86,7 +91,9 @@ impl BThread for Mission {
             (_, LAND | RETURN) => Phase::Landing { failure: (!flown).then(|| reason(event)) },
             (_, LANDED) => Phase::Down { failure: Some("the autopilot landed by itself".to_owned()) },
             (Phase::Heading { leg }, GOTO) => Phase::Flying { leg: *leg },
-            (Phase::Flying { leg }, ARRIVED) if event.int("leg") == i64::try_from(*leg).ok() => self.towards(leg + 1),
+            (Phase::Flying { leg }, ARRIVED) if event.int("leg") == i64::try_from(*leg).ok() => {
+                self.towards(leg + 1)
+            }
             (phase, _) => phase.clone(),
         };
     }

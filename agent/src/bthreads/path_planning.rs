@@ -52,7 +52,9 @@ impl BThread for PathPlanning {
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         let attempt = match self.phase {
-            Phase::Asking { attempt } | Phase::Computing { attempt } | Phase::Pausing { attempt, .. } => attempt,
+            Phase::Asking { attempt } | Phase::Computing { attempt } | Phase::Pausing { attempt, .. } => {
+                attempt
+            }
             Phase::Idle | Phase::GivingUp { .. } => 1,
         };
         self.phase = match self.me.verb(event) {

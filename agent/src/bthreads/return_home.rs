@@ -29,7 +29,8 @@ impl ReturnHome {
     /// `home` is the point above the take-off place, metres ENU; its height is the vehicle's own return altitude.
     #[must_use]
     pub fn new(me: Me, [x, y, z]: [f64; 3]) -> Self {
-        let home = me.event(GOTO).with("leg", HOME_LEG).with("lands", true).with("x", x).with("y", y).with("z", z);
+        let home =
+            me.event(GOTO).with("leg", HOME_LEG).with("lands", true).with("x", x).with("y", y).with("z", z);
         Self { me, home, phase: Phase::Away }
     }
 }
@@ -50,7 +51,9 @@ impl BThread for ReturnHome {
         self.phase = match (self.phase.clone(), self.me.verb(event)) {
             (Phase::Away, _) => Phase::Turning { why: event.text("why").unwrap_or("return").to_owned() },
             (Phase::Turning { why }, Some(GOTO)) => Phase::Returning { why },
-            (Phase::Returning { why }, Some(ARRIVED)) if event.int("leg") == Some(HOME_LEG) => Phase::Landing { why },
+            (Phase::Returning { why }, Some(ARRIVED)) if event.int("leg") == Some(HOME_LEG) => {
+                Phase::Landing { why }
+            }
             (Phase::Returning { why }, Some(ARRIVED)) => Phase::Returning { why },
             _ => Phase::Away,
         };

@@ -18,8 +18,8 @@ use crate::{me::Me, precedence};
 pub const NAME: &str = "right_of_way";
 /// Two passages nearer than this, per axis, are one: vehicles see the same opening from different sides.
 const SAME_PASSAGE_M: f64 = 3.0;
-/// How long a vehicle that gave way waits before it claims again.
-const PATIENCE: Duration = Duration::from_millis(500);
+/// A vehicle that gave way claims again when it hears that another has left a passage, or after this long.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Claims a passage, enters it when the claim is confirmed, and lets go behind it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -92,7 +92,9 @@ impl BThread for RightOfWay {
                 .block(me.any(ADVANCE))
                 .wait_for(me.any_of(&[STALLED, BLOCK_LAPSED]))
                 .wait_for(gone),
-            Phase::Yielding { until, .. } => bid.block(me.any(ADVANCE)).deadline(*until).wait_for(gone),
+            Phase::Yielding { until, .. } => {
+                bid.block(me.any(ADVANCE)).wait_for(of_every_vehicle(LEAVE)).deadline(*until).wait_for(gone)
+            }
             Phase::Inside { passage } => bid.block(self.others_enter(passage)).wait_for(gone),
         })
     }
@@ -109,9 +111,12 @@ impl BThread for RightOfWay {
             (Phase::Entering { passage }, Some(BLOCK_LAPSED)) if event.text("bthread") == Some(NAME) => {
                 Phase::Claiming { passage }
             }
-            (Phase::Entering { passage }, Some(STALLED)) if self.goes_before_me(event.text("by").unwrap_or_default()) => {
+            (Phase::Entering { passage }, Some(STALLED))
+                if self.goes_before_me(event.text("by").unwrap_or_default()) =>
+            {
                 Phase::Yielding { passage, until: cx.now() + PATIENCE }
             }
+            // Time is up, or a vehicle that is not this one has left.
             (Phase::Yielding { passage, .. }, None) => Phase::Claiming { passage },
             (phase, _) => phase,
         };

@@ -55,8 +55,12 @@ const PLANAR_BAND_M: f64 = 0.4;
 const OBSTACLE_MARGIN_M: f64 = 0.1;
 /// Margins between hull and obstacles that are tried in turn when there is no path with the envelope's own, m.
 const TIGHT_MARGINS_M: [f64; 2] = [0.1, 0.03];
+/// Most voxels that a search at one height expands, so that no plan holds up the set-points for long.
+const LEVEL_BUDGET: usize = 100_000;
+/// Most voxels that a search at all heights expands; each costs more.
+const CLIMBING_BUDGET: usize = 40_000;
 /// As the height band of a level search: search all heights.
-const CLIMBING: f64 = -1.0;
+const ALL_HEIGHTS: f64 = -1.0;
 /// How far ahead the way is looked at for the speed cap, m.
 const SENSED_AHEAD_M: f64 = 9.0;
 /// Standard deviation of the vehicle's own position, m.
@@ -309,17 +313,26 @@ impl Guidance {
     /// The path with the widest of the margins that allow one, and the clearance it keeps: level if there is such a path, else
     /// over or under what is in the way.
     fn search(&mut self, map: &mut ClearanceMap, request: &Request<'_>) -> Result<(Path, f64), PlanError> {
-        let margins = || std::iter::once(self.envelope.margin_m).chain(TIGHT_MARGINS_M);
-        let planar = AstarConfig::default().planar_band_m;
-        let tries = [planar, CLIMBING].into_iter().flat_map(|band| margins().map(move |margin_m| (band, margin_m)));
+        let level = AstarConfig { budget: LEVEL_BUDGET, ..AstarConfig::default() };
+        let climbing =
+            AstarConfig { planar_band_m: ALL_HEIGHTS, budget: CLIMBING_BUDGET, ..AstarConfig::default() };
+        let [tight_m, tightest_m] = TIGHT_MARGINS_M;
+        let wide_m = self.envelope.margin_m;
+        let tries = [
+            (level, wide_m),
+            (level, tight_m),
+            (level, tightest_m),
+            (climbing, wide_m),
+            (climbing, tightest_m),
+        ];
         let mut first_error = None;
-        for (planar_band_m, margin_m) in tries {
+        for (config, margin_m) in tries {
             let clearance_m = self.envelope.hull_m + margin_m;
-            let config = AstarConfig { clearance_m, planar_band_m, ..AstarConfig::default() };
+            let config = AstarConfig { clearance_m, ..config };
             match astar::plan(map, request, &config, &mut self.scratch) {
                 Ok(plan) => return Ok((simplify(map, &plan.path, clearance_m), clearance_m)),
                 // Far away: begin with the part of the way that leads nearest to the goal.
-                Err(PlanError::BudgetExhausted { partial, .. }) if planar_band_m > 0.0 => {
+                Err(PlanError::BudgetExhausted { partial, .. }) if config.planar_band_m > 0.0 => {
                     return Ok((partial, clearance_m));
                 }
                 Err(error) => first_error = first_error.or(Some(error)),
@@ -349,9 +362,9 @@ impl Guidance {
         let leg = self.leg.as_mut()?;
         let offset = leg.target - motion.position;
         let room_m = 2.0 * self.envelope.separation_m;
-        let is_taken = neighbours
-            .iter()
-            .any(|neighbour| neighbour.armed && (neighbour.position() - leg.target).norm() < self.envelope.separation_m);
+        let is_taken = neighbours.iter().any(|neighbour| {
+            neighbour.armed && (neighbour.position() - leg.target).norm() < self.envelope.separation_m
+        });
         let within_m = match (leg.lands, is_taken) {
             (true, _) => ARRIVAL_M,
             (false, false) => PASSING_M,
@@ -410,17 +423,15 @@ impl Guidance {
     }
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles either way.
-    pub fn steer(
-        &mut self,
-        now: Duration,
-        motion: &Motion,
-        surroundings: &Surroundings<'_>,
-    ) -> SetPoint {
-        let wish = self.along_path(now, motion, surroundings.map).unwrap_or_else(|| self.keep_station(motion));
-        let push = repulsion(&motion.position, &wish.velocity, surroundings.neighbours, &RepulsionConfig::default());
+    pub fn steer(&mut self, now: Duration, motion: &Motion, surroundings: &Surroundings<'_>) -> SetPoint {
+        let wish =
+            self.along_path(now, motion, surroundings.map).unwrap_or_else(|| self.keep_station(motion));
+        let push =
+            repulsion(&motion.position, &wish.velocity, surroundings.neighbours, &RepulsionConfig::default());
         let is_level = (wish.height_m - motion.position.z).abs() < PLANAR_BAND_M;
         let mut desired = apf::limited(wish.velocity + push, self.envelope.cruise_m_s);
-        desired.z = if is_level { 0.0 } else { desired.z.clamp(-self.envelope.climb_m_s, self.envelope.climb_m_s) };
+        desired.z =
+            if is_level { 0.0 } else { desired.z.clamp(-self.envelope.climb_m_s, self.envelope.climb_m_s) };
         let request = separation::Motion {
             position: motion.position,
             velocity: motion.velocity,
@@ -463,10 +474,13 @@ impl Guidance {
     /// At the place where the vehicle came to a stop, or to where others have pushed it.
     fn keep_station(&mut self, motion: &Motion) -> Wish {
         self.speed_m_s = 0.0;
-        let place = self.hover_at.filter(|place| (place - motion.position).norm() < GIVES_WAY_M).unwrap_or_else(|| {
-            let speed = motion.velocity.norm();
-            motion.position + motion.velocity * (speed / (2.0 * self.braking.decel_m_s2)).min(1.0)
-        });
+        let place = self
+            .hover_at
+            .filter(|place| (place - motion.position).norm() < GIVES_WAY_M)
+            .unwrap_or_else(|| {
+                let speed = motion.velocity.norm();
+                motion.position + motion.velocity * (speed / (2.0 * self.braking.decel_m_s2)).min(1.0)
+            });
         self.hover_at = Some(place);
         let back = apf::limited(place - motion.position, STATION_KEEPING_M_S);
         Wish { velocity: back, height_m: place.z }

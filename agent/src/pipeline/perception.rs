@@ -19,8 +19,8 @@ const CLEARANCE_RANGE_M: f64 = 2.5;
 const WIDEST_WINDOW_M: f64 = 120.0;
 /// The window is at most this high, m.
 const TALLEST_WINDOW_M: f64 = 40.0;
-/// The window begins this far below the take-off place, m.
-const BELOW_HOME_M: f64 = 1.0;
+/// A hit blocks this much of the column above and below it, m: the hull's height, and how well height is held.
+const VERTICAL_EXTENT_M: f64 = 0.4;
 /// Returns from lower than this above the take-off place are the ground.
 const GROUND_M: f64 = 0.4;
 /// Obstacle points this near are told to the safety filter, m.
@@ -72,13 +72,12 @@ pub struct Perception {
 }
 
 impl Perception {
-    /// An empty map of the space from `home` up to `ceiling_m` inside the fence, metres ENU. A fence too wide for
-    /// one map is covered by a window that rolls along with the vehicle.
+    /// An empty map of the space between the heights `floor_m` and `ceiling_m` inside the fence, metres ENU: no path leaves
+    /// these heights. A fence too wide for one map is covered by a window that rolls along with the vehicle.
     ///
     /// # Errors
     /// [`MapError`] when the fence is no box in space.
-    pub fn new(fence: &Fence, home: Vector3<f64>, ceiling_m: f64) -> Result<Self, MapError> {
-        let floor_m = home.z - BELOW_HOME_M;
+    pub fn new(fence: &Fence, home: Vector3<f64>, [floor_m, ceiling_m]: [f64; 2]) -> Result<Self, MapError> {
         let height_m = (ceiling_m.min(fence.max[2]) - floor_m).min(TALLEST_WINDOW_M);
         let width_m = [0, 1].map(|axis| fence.max[axis] - fence.min[axis] + 4.0 * RESOLUTION_M);
         let rolls = width_m.iter().any(|width| *width > WIDEST_WINDOW_M);
@@ -94,6 +93,7 @@ impl Perception {
             size_m: size,
             max_range_m: MAP_RANGE_M,
             ground_m: home.z + GROUND_M,
+            vertical_extent_m: VERTICAL_EXTENT_M,
             ..VoxelMapConfig::default()
         };
         Ok(Self {
@@ -150,7 +150,8 @@ impl Perception {
             let (sin, cos) = (scan.angle_min + f64::from(ray) * scan.angle_step).sin_cos();
             let reach = if hit { range } else { scan.max_range_m };
             let point = pose.position + to_world * Vector3::new(reach * cos, reach * sin, 0.0);
-            let is_neighbour = |other: &Vector3<f64>| (point - other).norm_squared() < NEIGHBOUR_M * NEIGHBOUR_M;
+            let is_neighbour =
+                |other: &Vector3<f64>| (point - other).norm_squared() < NEIGHBOUR_M * NEIGHBOUR_M;
             if hit && neighbours.iter().any(is_neighbour) {
                 // The way to the neighbour is free; what lies behind it is not known.
                 let point = pose.position + (point - pose.position) * (1.0 - (NEIGHBOUR_M / range).min(1.0));

@@ -36,7 +36,10 @@ pub fn keep_alive(now: Duration, measured_at: &[Option<Duration>]) -> KeepAlive 
 /// The age of the oldest input; `None` when one was never received.
 #[must_use]
 pub fn oldest_age(now: Duration, measured_at: &[Option<Duration>]) -> Option<Duration> {
-    measured_at.iter().map(|at| at.map(|at| now.saturating_sub(at))).max_by_key(|age| age.unwrap_or(Duration::MAX))?
+    measured_at
+        .iter()
+        .map(|at| at.map(|at| now.saturating_sub(at)))
+        .max_by_key(|age| age.unwrap_or(Duration::MAX))?
 }
 
 #[cfg(test)]

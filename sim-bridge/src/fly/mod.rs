@@ -42,8 +42,9 @@ const PATIENCE: u32 = 2;
 pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
     let scenario = Scenario::open(&args.world.scenario, &args.world.overrides(), args.world.seed)?;
     let out = args.out.clone().unwrap_or_else(|| default_folder(&scenario));
-    std::fs::create_dir_all(&out)
-        .with_context(|| format!("output folder {}: cannot be made; name another with --out", out.display()))?;
+    std::fs::create_dir_all(&out).with_context(|| {
+        format!("output folder {}: cannot be made; name another with --out", out.display())
+    })?;
     let recording = Recording::create(&out.join("mission.mcap"), &scenario)?;
     let mut table = LiveTable::stderr();
     for note in &scenario.notes {
@@ -63,7 +64,9 @@ pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
         #[cfg(feature = "zenoh")]
         Clock::Real => real::fly(&scenario, args, recording, table)?,
         #[cfg(not(feature = "zenoh"))]
-        Clock::Real => anyhow::bail!("--clock real: built without the cargo feature `zenoh`; use --clock lockstep"),
+        Clock::Real => {
+            anyhow::bail!("--clock real: built without the cargo feature `zenoh`; use --clock lockstep")
+        }
     };
     let path = out.join("summary.json");
     summary.write(&path).with_context(|| format!("{}: cannot be written", path.display()))?;

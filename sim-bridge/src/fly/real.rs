@@ -9,8 +9,16 @@ use anyhow::Context as _;
 use skein_wire::{Fleet, Link};
 use skein_zenoh::{ZenohConfig, ZenohSession};
 
-use super::{Flight, Links, Recording, setup::{FLEET, GROUND, vehicle_name}};
-use crate::{cli, scenario::Scenario, summary::{Summary, Traffic}, table::LiveTable};
+use super::{
+    Flight, Links, Recording,
+    setup::{FLEET, GROUND, vehicle_name},
+};
+use crate::{
+    cli,
+    scenario::Scenario,
+    summary::{Summary, Traffic},
+    table::LiveTable,
+};
 
 /// How long the two sessions may take to find each other.
 const TIME_TO_CONNECT: Duration = Duration::from_secs(10);
@@ -28,11 +36,9 @@ pub fn fly(
         ..ZenohConfig::new(fleet.clone())
     })
     .context("Zenoh session of the vehicles")?;
-    let ground = ZenohSession::open(ZenohConfig {
-        connect: vehicles.locators().to_vec(),
-        ..ZenohConfig::new(fleet)
-    })
-    .context("Zenoh session of the ground station")?;
+    let ground =
+        ZenohSession::open(ZenohConfig { connect: vehicles.locators().to_vec(), ..ZenohConfig::new(fleet) })
+            .context("Zenoh session of the ground station")?;
     await_connection(&ground)?;
     let vehicle_links = (0..scenario.vehicles.len())
         .map(|index| Ok(Box::new(vehicles.link(&vehicle_name(index))?) as Box<dyn Link>))

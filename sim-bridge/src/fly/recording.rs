@@ -8,7 +8,10 @@ use skein_wire::proto::TraceEvent;
 use skein_wire::vocabulary::ADVANCE;
 use skein_world::{Scene, Shape};
 
-use super::{setup::vehicle_name, swarm::{Happenings, Swarm}};
+use super::{
+    setup::vehicle_name,
+    swarm::{Happenings, Swarm},
+};
 use crate::scenario::Scenario;
 
 /// Planned paths are recorded this often.
@@ -28,9 +31,13 @@ impl Recording {
     /// [`RecorderError`] names the file that cannot be made.
     pub fn create(path: &Path, scenario: &Scenario) -> Result<Self, RecorderError> {
         let mut recorder = Recorder::create(path)?;
-        let names: Vec<String> = (0..scenario.vehicles.len()).map(|index| vehicle_name(index).to_string()).collect();
-        let hulls: Vec<(&str, f64)> =
-            names.iter().zip(&scenario.vehicles).map(|(name, plan)| (name.as_str(), plan.model.hull_radius_m)).collect();
+        let names: Vec<String> =
+            (0..scenario.vehicles.len()).map(|index| vehicle_name(index).to_string()).collect();
+        let hulls: Vec<(&str, f64)> = names
+            .iter()
+            .zip(&scenario.vehicles)
+            .map(|(name, plan)| (name.as_str(), plan.model.hull_radius_m))
+            .collect();
         recorder.scene(Duration::ZERO, &solids(&scenario.scene))?;
         recorder.vehicles(Duration::ZERO, &hulls)?;
         let line = format!("{} with {} vehicles, seed {}", scenario.name, names.len(), scenario.seed);

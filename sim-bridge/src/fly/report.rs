@@ -6,9 +6,7 @@ use skein_agent::Outcome;
 
 use super::swarm::Swarm;
 use crate::scenario::Scenario;
-use crate::summary::{
-    self, Collisions, PlanTimes, Spread, Summary, Traffic, VehicleSummary,
-};
+use crate::summary::{self, Collisions, PlanTimes, Spread, Summary, Traffic, VehicleSummary};
 use crate::table::{Progress, Row};
 
 /// The live table's rows.
@@ -49,16 +47,15 @@ pub fn summary(
     network: Traffic,
 ) -> Summary {
     let truth = swarm.truth();
-    let per_vehicle: Vec<VehicleSummary> = (0..swarm.agents().len()).map(|index| vehicle(swarm, index)).collect();
-    let collisions = Collisions {
-        obstacle: truth.collisions_obstacle.into(),
-        vehicle: truth.collisions_vehicle.into(),
-    };
+    let per_vehicle: Vec<VehicleSummary> =
+        (0..swarm.agents().len()).map(|index| vehicle(swarm, index)).collect();
+    let collisions =
+        Collisions { obstacle: truth.collisions_obstacle.into(), vehicle: truth.collisions_vehicle.into() };
     let collided = match collisions {
         Collisions { obstacle: 0, vehicle: 0 } => None,
-        Collisions { obstacle, vehicle } => Some(format!(
-            "{obstacle} collisions with obstacles and {vehicle} between vehicles"
-        )),
+        Collisions { obstacle, vehicle } => {
+            Some(format!("{obstacle} collisions with obstacles and {vehicle} between vehicles"))
+        }
     };
     let failed = per_vehicle
         .iter()

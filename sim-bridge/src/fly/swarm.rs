@@ -139,7 +139,8 @@ impl Swarm {
     /// Whether no vehicle is in the air.
     #[must_use]
     pub fn is_grounded(&self) -> bool {
-        (0..self.vehicles.len()).all(|index| self.simulation.vehicle(index).is_none_or(|state| !state.airborne))
+        (0..self.vehicles.len())
+            .all(|index| self.simulation.vehicle(index).is_none_or(|state| !state.airborne))
     }
 
     /// Time since the run began.
