@@ -2,6 +2,8 @@
 //!
 //! The tests share the UDP ports of `serve`, so they take turns.
 
+#![allow(clippy::expect_used)]
+
 use std::io::{Read as _, Write as _};
 use std::net::UdpSocket;
 use std::process::{Child, Command, Stdio};

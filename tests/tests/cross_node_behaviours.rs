@@ -1,5 +1,7 @@
 //! What b-threads of one node do to those of another, judged by how the vehicles move.
 
+#![allow(clippy::unwrap_used)]
+
 use std::collections::BTreeSet;
 use std::time::Duration;
 

@@ -1,5 +1,7 @@
 //! One seed is one run, whoever built the program.
 
+#![allow(clippy::unwrap_used)]
+
 use std::path::PathBuf;
 use std::process::Command;
 

@@ -1,5 +1,7 @@
 //! The swarm goes on, or comes down, in spite of faults.
 
+#![allow(clippy::unwrap_used)]
+
 use std::time::Duration;
 
 use skein_agent::Outcome;

@@ -1,5 +1,7 @@
 //! Four vehicles fly QGroundControl plans in trail through worlds made for Gazebo.
 
+#![allow(clippy::unwrap_used)]
+
 use std::fmt::Write as _;
 use std::path::Path;
 

@@ -1,5 +1,7 @@
 //! The clock on the wall, over real Zenoh sessions.
 
+#![allow(clippy::unwrap_used)]
+
 use skein_sim::cli::Clock;
 use skein_tests::{flight, fly};
 

@@ -1,5 +1,7 @@
 //! The built-in scenarios fly, and nothing flies without b-threads.
 
+#![allow(clippy::unwrap_used)]
+
 use skein_sim::cli::Controller;
 use skein_sim::summary::{Collisions, Summary};
 use skein_tests::{flight, fly};

@@ -94,7 +94,6 @@ impl Perception {
             max_range_m: MAP_RANGE_M,
             ground_m: home.z + GROUND_M,
             vertical_extent_m: VERTICAL_EXTENT_M,
-            ..VoxelMapConfig::default()
         };
         Ok(Self {
             map: ClearanceMap::new(config, centre, CLEARANCE_RANGE_M)?,
