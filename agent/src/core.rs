@@ -8,7 +8,7 @@ use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_mav::{Companion, CompanionConfig, Landed, SetPoint};
 use skein_planning::map::MapError;
 use skein_wire::vocabulary::{
-    ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, LAND, LANDED, ORDER, PLAN, RETURN,
+    ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, HOMEWARD, LAND, LANDED, ORDER, PLAN, RETURN,
 };
 use skein_wire::{Fleet, Link, NodeLink, State, vocabulary};
 
@@ -232,7 +232,8 @@ impl AgentCore {
     fn follow_autopilot(&mut self, now: Duration) {
         self.failsafes.ask(&mut self.companion);
         while let Some(event) = self.companion.poll_event() {
-            self.failsafes.hear(&event);
+            let autopilot = self.companion.telemetry().autopilot;
+            self.failsafes.hear(&event, autopilot);
             let heard = self.flight.hear(now, &event, &mut self.companion);
             heard.into_iter().for_each(|event| self.node.node_mut().enqueue(event));
         }
@@ -244,7 +245,7 @@ impl AgentCore {
         let telemetry = self.companion.telemetry();
         let mut events = Vec::new();
         events.extend(self.watches.preflight(now, telemetry, self.failsafes.are_sound()));
-        if let (FlightPhase::Flying, Some(position)) = (self.flight.phase(), telemetry.position) {
+        if let (true, Some(position)) = (self.is_airborne(), telemetry.position) {
             if let Some(battery) = telemetry.battery {
                 let home = Vector3::from(self.config.home);
                 let seconds_home = (position.value - home).norm() / self.config.envelope.cruise_m_s + 10.0;
@@ -309,14 +310,13 @@ impl AgentCore {
                     self.node.node_mut().enqueue(report.into_event(&self.me));
                 }
             }
-            Some(ADVANCE) => self.guidance.grant_leave(now),
-            Some(ENTER) => self.guidance.enter_passage(),
+            Some(ADVANCE | HOMEWARD) => self.guidance.grant_leave(now),
             Some(LAND) => self.task = format!("landing: {why}"),
             Some(RETURN) => self.task = format!("returning: {why}"),
             Some(HOLD) => self.task = "holding".to_owned(),
             Some(LANDED) => self.guidance.forget(),
             Some(vocabulary::TAKEOFF) => self.task = "taking off".to_owned(),
-            Some(ORDER) if event.text("what") == Some("resume") => self.flight.resume(now),
+            Some(ORDER) if matches!(event.text("what"), Some("resume" | "return")) => self.flight.resume(now),
             Some(COMPLETE) => self.end(Outcome::Complete, "arrived"),
             Some(FAILED) => self.end(Outcome::Failed(why.to_owned()), why),
             _ => {}
@@ -469,5 +469,5 @@ fn heights(config: &AgentConfig) -> [f64; 2] {
 
 /// What no remote b-thread can block, and only the operator's gateway can request.
 fn safety_events(me: &Me) -> EventSet {
-    me.any_of(&[HOLD, RETURN, LAND])
+    me.any_of(&vocabulary::OWN)
 }

@@ -1,6 +1,6 @@
 //! Failsafes: reads the autopilot's own failsafe parameters before take-off and refuses unsafe ones.
 
-use skein_mav::{Companion, MavEvent, ParameterValue};
+use skein_mav::{AutopilotKind, Companion, MavEvent, ParameterValue};
 
 /// What the autopilot must do by itself once set-points stop, and how soon.
 const CHECKS: [Check; 2] = [
@@ -41,24 +41,25 @@ impl Failsafes {
         }
     }
 
-    /// Takes in the autopilot's answers. One that lacks a parameter has another way to say it and is not refused.
-    pub fn hear(&mut self, event: &MavEvent) {
-        match event {
-            MavEvent::ParameterRead { name, value } => self.answer(name, Some(*value)),
-            MavEvent::ParameterMissing { name } => self.answer(name, None),
-            _ => {}
-        }
-    }
-
-    fn answer(&mut self, name: &str, value: Option<ParameterValue>) {
-        for (check, answer) in CHECKS.iter().zip(&mut self.answers) {
-            if check.parameter == name {
-                let unsafe_value = value.map(ParameterValue::as_f64).filter(|value| !(check.is_safe)(*value));
-                *answer = Some(match unsafe_value {
-                    None => Ok(()),
-                    Some(value) => Err(format!("{name} is {value}, expected {}", check.expected)),
-                });
-            }
+    /// Takes in the autopilot's answers. PX4 is asked again for what it does not tell; an autopilot of another kind has
+    /// other parameters.
+    pub fn hear(&mut self, event: &MavEvent, autopilot: Option<AutopilotKind>) {
+        let (name, value) = match event {
+            MavEvent::ParameterRead { name, value } => (name, Some(*value)),
+            MavEvent::ParameterMissing { name } => (name, None),
+            _ => return,
+        };
+        let checks = CHECKS.iter().zip(&mut self.answers).filter(|(check, _)| check.parameter == name);
+        for (check, answer) in checks {
+            *answer = Some(match value.map(ParameterValue::as_f64) {
+                Some(value) if (check.is_safe)(value) => Ok(()),
+                Some(value) => Err(format!("{name} is {value}, expected {}", check.expected)),
+                None if autopilot == Some(AutopilotKind::Px4) => {
+                    self.asked = false;
+                    Err(format!("{name} cannot be read, expected {}", check.expected))
+                }
+                None => Ok(()),
+            });
         }
     }
 

@@ -12,6 +12,8 @@ use crate::me::Me;
 
 /// Set-points must reach the autopilot for this long before it may be asked for offboard mode.
 const SET_POINTS_BEFORE_OFFBOARD: Duration = Duration::from_millis(300);
+/// The command to land is repeated this often while the autopilot does something else.
+const REPEAT_LAND: Duration = Duration::from_secs(2);
 /// Take-off is over this far below the height asked for.
 const TAKEOFF_TOLERANCE_M: f64 = 0.3;
 
@@ -50,13 +52,22 @@ pub struct Flight {
     heard_of: bool,
     /// Whether the autopilot has shown, since the last command, that it is off the ground.
     left_ground: bool,
+    /// When the command to land is repeated, if the autopilot does not land.
+    land_again: Duration,
 }
 
 impl Flight {
     /// A vehicle on the ground that will climb to `takeoff_height_m` above home.
     #[must_use]
     pub fn new(me: Me, takeoff_height_m: f64) -> Self {
-        Self { me, takeoff_height_m, phase: FlightPhase::Grounded, heard_of: false, left_ground: false }
+        Self {
+            me,
+            takeoff_height_m,
+            phase: FlightPhase::Grounded,
+            heard_of: false,
+            left_ground: false,
+            land_again: Duration::ZERO,
+        }
     }
 
     /// Where the vehicle is between two stands on the ground.
@@ -81,6 +92,7 @@ impl Flight {
             }
             (Some(LAND), phase) if phase != FlightPhase::Grounded => {
                 self.phase = FlightPhase::Landing;
+                self.land_again = now + REPEAT_LAND;
                 companion.command(now, Command::Land);
             }
             (Some(HOLD), FlightPhase::Adopted) => companion.command(now, Command::Hold),
@@ -112,9 +124,9 @@ impl Flight {
             }
             MavEvent::CommandAcked { result: CommandResult::Accepted, .. } => None,
             MavEvent::CommandAcked { command, result } => {
-                Some(self.command_failed(*command, &result.to_string()))
+                self.command_failed(now, *command, &result.to_string())
             }
-            MavEvent::CommandTimedOut { command } => Some(self.command_failed(*command, "no answer")),
+            MavEvent::CommandTimedOut { command } => self.command_failed(now, *command, "no answer"),
             MavEvent::ModeChanged { to, .. } if self.is_foreign(*to) => {
                 // Control ends with the mode change itself; the b-threads hear of it afterwards.
                 self.phase = FlightPhase::Taken;
@@ -134,15 +146,35 @@ impl Flight {
             FlightPhase::Landing => {
                 !matches!(mode, FlightMode::Land | FlightMode::Offboard | FlightMode::Hold)
             }
-            FlightPhase::Grounded | FlightPhase::Arming | FlightPhase::Taken | FlightPhase::Adopted => false,
+            FlightPhase::Adopted => mode != FlightMode::Hold,
+            FlightPhase::Grounded | FlightPhase::Arming | FlightPhase::Taken => false,
         }
     }
 
-    fn command_failed(&mut self, command: Command, why: &str) -> Event {
-        if matches!(self.phase, FlightPhase::Arming | FlightPhase::Climbing) && !self.left_ground {
-            self.phase = FlightPhase::Grounded;
+    /// On the ground a refused command ends the flight; in the air it is tried again.
+    fn command_failed(&mut self, now: Duration, command: Command, why: &str) -> Option<Event> {
+        match self.phase {
+            FlightPhase::Arming | FlightPhase::Climbing if !self.left_ground => {
+                self.phase = FlightPhase::Grounded;
+                Some(self.me.because(COMMAND_FAILED, &format!("{command:?}: {why}")))
+            }
+            FlightPhase::Engaging { .. } if command == Command::Offboard => {
+                self.engage(now);
+                None
+            }
+            _ => None,
         }
-        self.me.because(COMMAND_FAILED, &format!("{command:?}: {why}"))
+    }
+
+    /// A vehicle that was in the air before its agent: held if nobody flies it, else left to who does.
+    fn adopt(&mut self, mode: FlightMode) -> Event {
+        if matches!(mode, FlightMode::Offboard | FlightMode::Hold) {
+            self.phase = FlightPhase::Adopted;
+            self.me.event(FOUND_AIRBORNE)
+        } else {
+            self.phase = FlightPhase::Taken;
+            self.me.event(PILOT).with("mode", mode.to_string())
+        }
     }
 
     /// Moves on to the next phase when the telemetry says so; returns what the b-threads should hear of it.
@@ -157,11 +189,10 @@ impl Flight {
         if !self.heard_of && landed != Landed::Unknown {
             self.heard_of = true;
             if landed != Landed::OnGround && self.phase == FlightPhase::Grounded {
-                self.phase = FlightPhase::Adopted;
-                return Some(self.me.event(FOUND_AIRBORNE));
+                return Some(self.adopt(mode));
             }
         }
-        self.left_ground |= landed == Landed::InAir;
+        self.left_ground |= !matches!(landed, Landed::OnGround | Landed::Unknown);
         match self.phase {
             FlightPhase::Climbing if height_m >= self.takeoff_height_m - TAKEOFF_TOLERANCE_M => {
                 self.engage(now)
@@ -179,6 +210,10 @@ impl Flight {
             {
                 self.phase = FlightPhase::Grounded;
                 return Some(self.me.event(LANDED));
+            }
+            FlightPhase::Landing if mode != FlightMode::Land && now >= self.land_again => {
+                self.land_again = now + REPEAT_LAND;
+                companion.command(now, Command::Land);
             }
             _ => {}
         }

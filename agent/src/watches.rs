@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_bp::Event;
-use skein_mav::{Battery, Telemetry};
+use skein_mav::{Battery, Landed, Telemetry};
 use skein_wire::vocabulary::{
     BATTERY_CRITICAL, BATTERY_LOW, CLEAR, FENCE_BREACHED, READY, TOO_CLOSE, UNREADY,
 };
@@ -17,6 +17,8 @@ const TELEMETRY_FRESH_FOR: Duration = Duration::from_millis(500);
 const BATTERY_TO_START: f64 = 0.3;
 /// Energy kept in reserve over what the way home needs.
 const BATTERY_RESERVE: f64 = 0.15;
+/// Seconds of flight over which the drain is measured at the least.
+const DRAIN_MEASURED_S: f64 = 30.0;
 /// Energy at which only landing is left.
 const BATTERY_EMERGENCY: f64 = 0.08;
 /// Centre-to-centre distance at which a neighbour is too close, m; the safety filter keeps more.
@@ -53,9 +55,8 @@ pub struct Watches {
     critical: Edge,
     outside: Edge,
     close: Edge,
-    /// Energy used per second, smoothed.
-    drain_per_s: f64,
-    last_battery: Option<(Duration, f64)>,
+    /// When the flight began, and with how much energy.
+    flight_began: Option<(Duration, f64)>,
 }
 
 impl Watches {
@@ -69,8 +70,7 @@ impl Watches {
             critical: Edge::default(),
             outside: Edge::default(),
             close: Edge::default(),
-            drain_per_s: 0.0,
-            last_battery: None,
+            flight_began: None,
         }
     }
 
@@ -85,6 +85,7 @@ impl Watches {
         let ready = telemetry.connected
             && telemetry.ready_to_arm
             && telemetry.home.is_some()
+            && (telemetry.landed == Landed::OnGround && !telemetry.armed || self.ready.0 && telemetry.armed)
             && telemetry.is_fresh(now, TELEMETRY_FRESH_FOR)
             && charged
             && failsafes_sound;
@@ -93,17 +94,12 @@ impl Watches {
 
     /// Battery: low when what is left is what the way home needs, with reserve.
     pub fn battery(&mut self, now: Duration, battery: Battery, seconds_home: f64) -> Vec<Event> {
-        if let Some((then, fraction)) = self.last_battery {
-            let seconds = now.saturating_sub(then).as_secs_f64();
-            if seconds >= 1.0 {
-                let drain = (fraction - battery.fraction).max(0.0) / seconds;
-                self.drain_per_s += 0.2 * (drain - self.drain_per_s);
-                self.last_battery = Some((now, battery.fraction));
-            }
-        } else {
-            self.last_battery = Some((now, battery.fraction));
-        }
-        let needed = self.drain_per_s * seconds_home + BATTERY_RESERVE;
+        // Charge is told in whole per cents, so the drain is measured over a long stretch.
+        let (since, full) = *self.flight_began.get_or_insert((now, battery.fraction));
+        let flown_s = now.saturating_sub(since).as_secs_f64();
+        let drain_per_s =
+            if flown_s >= DRAIN_MEASURED_S { (full - battery.fraction).max(0.0) / flown_s } else { 0.0 };
+        let needed = drain_per_s * seconds_home + BATTERY_RESERVE;
         let mut events = Vec::new();
         if self.low.rises(battery.fraction <= needed) {
             events.push(self.me.event(BATTERY_LOW));

@@ -26,10 +26,12 @@ pub enum Order {
     Land(Who),
     /// Fly home and land there.
     Return(Who),
+    /// Fly again by yourself: the pilot has let go.
+    HandBack(Who),
 }
 
 impl Order {
-    /// The order as one word: `hold`, `resume`, `land` or `return`.
+    /// The order as one word: `hold`, `resume`, `land`, `return` or `hand_back`.
     #[must_use]
     pub fn what(&self) -> &'static str {
         match self {
@@ -37,6 +39,7 @@ impl Order {
             Self::Resume(_) => "resume",
             Self::Land(_) => "land",
             Self::Return(_) => "return",
+            Self::HandBack(_) => "hand_back",
         }
     }
 
@@ -44,7 +47,11 @@ impl Order {
     #[must_use]
     pub fn who(&self) -> &Who {
         match self {
-            Self::Hold(who) | Self::Resume(who) | Self::Land(who) | Self::Return(who) => who,
+            Self::Hold(who)
+            | Self::Resume(who)
+            | Self::Land(who)
+            | Self::Return(who)
+            | Self::HandBack(who) => who,
         }
     }
 
@@ -62,6 +69,12 @@ const ORDERED: &str = "ordered";
 #[must_use]
 pub fn ordered(ground: &NodeName, what: &str) -> EventSet {
     EventSet::named(ground.event_name(ORDERED)).and(EventSet::field_is("what", what))
+}
+
+/// Those among them that are for the whole swarm.
+#[must_use]
+pub fn ordered_for_all(ground: &NodeName, what: &str) -> EventSet {
+    ordered(ground, what).and(EventSet::field_is("who", ALL))
 }
 
 /// Those among them that are for `vehicle`, alone or with all.

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use serde::Serialize;
-use skein_bp::{BThread, Bid, Context, Event, Program, ProgramConfig};
+use skein_bp::{BThread, Bid, Context, Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_ground::{GroundConfig, GroundCore, Order, Who};
 use skein_wire::vocabulary::{ADVANCE, AIRBORNE, COMPLETE, FAILED, LANDED, ORDER, TAKEOFF};
@@ -41,7 +41,8 @@ enum Stage {
 impl BThread for Vehicle {
     fn bid(&self) -> Option<Bid> {
         let name = &self.name;
-        let bid = Bid::new().wait_for(vocabulary::of(name, ORDER));
+        let resume = EventSet::field_is("what", "resume");
+        let bid = Bid::new().wait_for(vocabulary::of(name, ORDER).and(resume.not()));
         Some(match self.stage {
             Stage::Parked => Bid::new().wait_for(vocabulary::of(name, TAKEOFF)),
             Stage::Climbing | Stage::Resting => bid.deadline(self.timer),
@@ -227,7 +228,7 @@ fn an_order_to_land_reaches_the_vehicles_it_is_for_even_on_hold() {
     assert!(!outcome.succeeded());
     assert_eq!(outcome.failed, BTreeMap::from([("uav/2".to_owned(), "ordered to land".to_owned())]));
     assert!(fleet.saw("uav/2/landed")[0] < Duration::from_secs(6));
-    assert_eq!((fleet.saw("uav/2/order").len(), fleet.saw("uav/1/order").len()), (1, 0));
+    assert_eq!((fleet.saw("uav/2/order").len(), fleet.saw("uav/1/order").len()), (2, 1));
 }
 
 #[test]

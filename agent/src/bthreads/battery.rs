@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{BATTERY_CRITICAL, BATTERY_LOW, GOTO, LAND, LANDED, RETURN};
+use skein_wire::vocabulary::{BATTERY_CRITICAL, BATTERY_LOW, GOTO, HAND_BACK, LAND, LANDED, RETURN};
 
 use crate::{me::Me, precedence};
 
@@ -40,8 +40,11 @@ impl BThread for Battery {
             Phase::Good => low.wait_for(me.any(BATTERY_LOW)).wait_for(critical),
             Phase::Low => low.request(me.because(RETURN, "battery low")).wait_for(critical),
             Phase::GoingHome => low.wait_for(critical),
-            Phase::Critical => emergency.request(me.because(LAND, "battery nearly empty")),
-            Phase::GoingDown => emergency.wait_for(me.any(LANDED)),
+            Phase::Critical => {
+                emergency.request(me.because(LAND, "battery nearly empty")).wait_for(me.any(LANDED))
+            }
+            // Given back by a pilot, it still has to land.
+            Phase::GoingDown => emergency.wait_for(me.any_of(&[LANDED, HAND_BACK])),
         })
     }
 
@@ -49,7 +52,7 @@ impl BThread for Battery {
         self.phase = match self.me.verb(event) {
             Some(BATTERY_LOW) => Phase::Low,
             Some(RETURN) => Phase::GoingHome,
-            Some(BATTERY_CRITICAL) => Phase::Critical,
+            Some(BATTERY_CRITICAL | HAND_BACK) => Phase::Critical,
             Some(LAND) => Phase::GoingDown,
             _ => Phase::Good,
         };

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ARRIVED, LAND, PLAN, STUCK};
+use skein_wire::vocabulary::{ARRIVED, GOTO, LAND, PLAN, STUCK};
 
 use crate::{me::Me, precedence};
 
@@ -29,7 +29,7 @@ impl Escape {
 impl BThread for Escape {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::MISSION).wait_for(me.any_of(&[ARRIVED, LAND]));
+        let bid = Bid::new().priority(precedence::MISSION).wait_for(me.any_of(&[GOTO, ARRIVED, LAND]));
         Some(match (self.stuck, self.attempts) {
             (false, _) => bid.wait_for(me.any(STUCK)),
             (true, ATTEMPTS..) => bid.request(me.because(LAND, "stuck: no way past what stands around")),

@@ -35,7 +35,9 @@ impl BThread for Geofence {
         let bid = Bid::new().priority(precedence::FENCE).block(self.outside.clone());
         Some(match self.phase {
             Phase::Inside => bid.wait_for(self.me.any(FENCE_BREACHED)),
-            Phase::Breached => bid.request(self.me.because(RETURN, "outside the geofence")),
+            Phase::Breached => {
+                bid.request(self.me.because(RETURN, "outside the geofence")).wait_for(self.me.any(LANDED))
+            }
             Phase::Returning => bid.wait_for(self.me.any(LANDED)),
         })
     }

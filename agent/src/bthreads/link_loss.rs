@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_dbp::facts::{PEER_JOINED, PEER_LOST};
-use skein_wire::vocabulary::{LAND, LANDED, RETURN};
+use skein_wire::vocabulary::{AIRBORNE, LAND, LANDED, RETURN};
 
 use crate::{me::Me, precedence};
 
@@ -35,6 +35,7 @@ pub struct LinkLoss {
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 enum Phase {
+    Grounded,
     Linked,
     Alone { until: Duration },
     Acting,
@@ -45,7 +46,7 @@ impl LinkLoss {
     /// The b-thread of vehicle `me`, whose ground station is the node `ground`.
     #[must_use]
     pub fn new(me: Me, ground: &str, policy: LinkLossPolicy) -> Self {
-        Self { me, ground: ground.to_owned(), policy, phase: Phase::Linked }
+        Self { me, ground: ground.to_owned(), policy, phase: Phase::Grounded }
     }
 }
 
@@ -59,10 +60,13 @@ impl BThread for LinkLoss {
         };
         let bid = Bid::new().priority(precedence::LINK);
         Some(match self.phase {
-            Phase::Linked => bid.wait_for(me.any(PEER_LOST)),
-            Phase::Alone { until } => bid.wait_for(me.any(PEER_JOINED)).deadline(until),
-            Phase::Acting => bid.request(me.because(verb, "ground station lost")),
-            Phase::Acted => bid.wait_for(me.any(LANDED)),
+            Phase::Grounded => bid.wait_for(me.any(AIRBORNE)),
+            Phase::Linked => bid.wait_for(me.any_of(&[PEER_LOST, LANDED])),
+            Phase::Alone { until } => bid.wait_for(me.any_of(&[PEER_JOINED, LANDED])).deadline(until),
+            Phase::Acting => {
+                bid.request(me.because(verb, "ground station lost")).wait_for(me.any(PEER_JOINED))
+            }
+            Phase::Acted => bid.wait_for(me.any_of(&[LANDED, PEER_JOINED])),
         })
     }
 
@@ -70,10 +74,11 @@ impl BThread for LinkLoss {
         let about_ground = event.text("node") == Some(self.ground.as_str());
         self.phase = match (&self.phase, self.me.verb(event)) {
             (Phase::Linked, Some(PEER_LOST)) if about_ground => Phase::Alone { until: cx.now() + PATIENCE },
-            (Phase::Alone { .. }, Some(PEER_JOINED)) if about_ground => Phase::Linked,
+            (_, Some(LANDED)) => Phase::Grounded,
+            (Phase::Grounded, _) => Phase::Linked,
+            (_, Some(PEER_JOINED)) if about_ground => Phase::Linked,
             (Phase::Alone { .. }, None) => Phase::Acting,
-            (Phase::Acting, _) => Phase::Acted,
-            (Phase::Acted, _) => Phase::Linked,
+            (Phase::Acting, Some(RETURN | LAND)) => Phase::Acted,
             (phase, _) => phase.clone(),
         };
     }

@@ -3,7 +3,8 @@
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_wire::vocabulary::{
-    AIRBORNE, ARRIVED, COMMAND_FAILED, COMPLETE, FAILED, GOTO, LAND, LANDED, ORDER, RETURN, TAKEOFF,
+    AIRBORNE, ARRIVED, COMMAND_FAILED, COMPLETE, FAILED, FOUND_AIRBORNE, GOTO, HAND_BACK, LAND, LANDED,
+    ORDER, RETURN, TAKEOFF,
 };
 
 use crate::{me::Me, precedence};
@@ -20,12 +21,24 @@ pub struct Mission {
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 enum Phase {
     Grounded,
+    /// In the air when the agent started: flies when an operator says so.
+    Found,
     Climbing,
-    Heading { leg: usize },
-    Flying { leg: usize },
-    Arrived,
-    Landing { failure: Option<String> },
-    Down { failure: Option<String> },
+    Heading {
+        leg: usize,
+    },
+    Flying {
+        leg: usize,
+    },
+    Descending {
+        failure: Option<String>,
+    },
+    Landing {
+        failure: Option<String>,
+    },
+    Down {
+        failure: Option<String>,
+    },
     Over,
 }
 
@@ -49,7 +62,7 @@ impl Mission {
 
     /// The phase that flies to waypoint `leg`, or lands after the last.
     fn towards(&self, leg: usize) -> Phase {
-        if leg < self.waypoints.len() { Phase::Heading { leg } } else { Phase::Arrived }
+        if leg < self.waypoints.len() { Phase::Heading { leg } } else { Phase::Descending { failure: None } }
     }
 }
 
@@ -64,31 +77,39 @@ impl BThread for Mission {
         let ended_by_others = me.any_of(&[LAND, RETURN, LANDED]);
         let bid = Bid::new().priority(precedence::MISSION);
         Some(match &self.phase {
-            Phase::Grounded => bid.wait_for(me.any_of(&[TAKEOFF, ORDER])),
-            Phase::Climbing => bid.wait_for(me.any_of(&[AIRBORNE, LAND, LANDED, COMMAND_FAILED])),
+            Phase::Grounded => bid.wait_for(me.any_of(&[TAKEOFF, FOUND_AIRBORNE])),
+            Phase::Found => bid.wait_for(me.any(ORDER)).wait_for(ended_by_others),
+            Phase::Climbing => bid.wait_for(me.any_of(&[AIRBORNE, COMMAND_FAILED])).wait_for(ended_by_others),
             Phase::Heading { leg } => {
                 bid.request(self.waypoints.get(*leg)?.clone()).wait_for(ended_by_others)
             }
             Phase::Flying { .. } => bid.wait_for(me.any(ARRIVED)).wait_for(ended_by_others),
-            Phase::Arrived => bid.request(me.because(LAND, "mission complete")).wait_for(ended_by_others),
-            Phase::Landing { .. } => bid.wait_for(me.any(LANDED)),
+            Phase::Descending { failure } => {
+                let why = failure.as_deref().unwrap_or("mission complete");
+                bid.request(me.because(LAND, why)).wait_for(ended_by_others)
+            }
+            // A pilot may interrupt a landing; given the vehicle back, it still has to land.
+            Phase::Landing { .. } => bid.wait_for(me.any_of(&[LANDED, HAND_BACK])),
             Phase::Down { failure: None } => bid.request(me.event(COMPLETE)),
             Phase::Down { failure: Some(why) } => bid.request(me.because(FAILED, why)),
-            Phase::Over => return None,
+            // There is nothing left to take off for.
+            Phase::Over => bid.block(me.any(TAKEOFF)),
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         let verb = self.me.verb(event).unwrap_or_default();
-        let flown = matches!(self.phase, Phase::Arrived);
         self.phase = match (&self.phase, verb) {
             (Phase::Down { .. }, _) => Phase::Over,
+            (Phase::Landing { failure }, HAND_BACK) => Phase::Descending { failure: failure.clone() },
             (Phase::Landing { failure }, _) => Phase::Down { failure: failure.clone() },
+            (Phase::Descending { failure }, LAND | RETURN) => Phase::Landing { failure: failure.clone() },
             (Phase::Grounded, TAKEOFF) => Phase::Climbing,
-            (Phase::Grounded, _) if event.text("what") == Some("resume") => self.towards(0),
+            (Phase::Grounded, FOUND_AIRBORNE) => Phase::Found,
+            (Phase::Found, ORDER) if event.text("what") == Some("resume") => self.towards(0),
             (Phase::Climbing, AIRBORNE) => self.towards(0),
             (Phase::Climbing, COMMAND_FAILED) => Phase::Down { failure: Some(reason(event)) },
-            (_, LAND | RETURN) => Phase::Landing { failure: (!flown).then(|| reason(event)) },
+            (_, LAND | RETURN) => Phase::Landing { failure: Some(reason(event)) },
             (_, LANDED) => Phase::Down { failure: Some("the autopilot landed by itself".to_owned()) },
             (Phase::Heading { leg }, GOTO) => Phase::Flying { leg: *leg },
             (Phase::Flying { leg }, ARRIVED) if event.int("leg") == i64::try_from(*leg).ok() => {

@@ -6,17 +6,19 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ADVANCE, ARRIVED, GOTO, LAND, PLANNED};
+use skein_wire::vocabulary::{ADVANCE, ARRIVED, GOTO, HOMEWARD, LAND, LANDED, PLANNED};
 
+use crate::bthreads::HOME_LEG;
 use crate::{me::Me, precedence};
 
 /// How long a leave to move is asked for: one navigation cycle.
 const CYCLE: Duration = Duration::from_millis(100);
 
-/// Requests `advance` once in each navigation cycle while there is a path to follow.
+/// Requests `advance`, or on the way home `homeward`, once in each navigation cycle while there is a path to follow.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct Navigation {
     me: Me,
+    homeward: bool,
     phase: Phase,
 }
 
@@ -31,7 +33,7 @@ impl Navigation {
     /// The b-thread of vehicle `me`.
     #[must_use]
     pub fn new(me: Me) -> Self {
-        Self { me, phase: Phase::Idle }
+        Self { me, homeward: false, phase: Phase::Idle }
     }
 }
 
@@ -39,18 +41,23 @@ impl BThread for Navigation {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
         let bid = Bid::new().priority(precedence::MISSION);
-        let no_path_left = me.any_of(&[ARRIVED, GOTO, LAND]);
+        let no_path_left = me.any_of(&[ARRIVED, GOTO, LAND, LANDED]);
         Some(match self.phase {
             Phase::Idle => bid.wait_for(me.any(PLANNED)),
-            Phase::Asking => bid.request(me.event(ADVANCE)).wait_for(no_path_left),
+            Phase::Asking => {
+                bid.request(me.event(if self.homeward { HOMEWARD } else { ADVANCE })).wait_for(no_path_left)
+            }
             Phase::Moving { until } => bid.wait_for(no_path_left).deadline(until),
         })
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
+        if self.me.heard(event, PLANNED) {
+            self.homeward = event.int("leg") == Some(HOME_LEG);
+        }
         self.phase = match self.me.verb(event) {
             Some(PLANNED) | None => Phase::Asking,
-            Some(ADVANCE) => Phase::Moving { until: cx.now() + CYCLE },
+            Some(ADVANCE | HOMEWARD) => Phase::Moving { until: cx.now() + CYCLE },
             _ => Phase::Idle,
         };
     }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ADVANCE, GOTO, LAND, PATH_BLOCKED, PLAN, PLANNED};
+use skein_wire::vocabulary::{ADVANCE, GOTO, HOMEWARD, LAND, PATH_BLOCKED, PLAN, PLANNED};
 
 use crate::{me::Me, precedence};
 
@@ -35,8 +35,11 @@ impl BThread for ObstacleAvoidance {
         let over = me.any_of(&[PLANNED, GOTO, LAND]);
         Some(match self.phase {
             Phase::Free => bid.wait_for(me.any(PATH_BLOCKED)),
-            Phase::Asking => bid.request(me.because(PLAN, "obstacle")).block(me.any(ADVANCE)).wait_for(over),
-            Phase::Waiting => bid.block(me.any(ADVANCE)).wait_for(over),
+            Phase::Asking => bid
+                .request(me.because(PLAN, "obstacle"))
+                .block(me.any_of(&[ADVANCE, HOMEWARD]))
+                .wait_for(over),
+            Phase::Waiting => bid.block(me.any_of(&[ADVANCE, HOMEWARD])).wait_for(over),
         })
     }
 

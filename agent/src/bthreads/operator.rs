@@ -26,18 +26,22 @@ impl BThread for Operator {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
         let mut bid = Bid::new().priority(precedence::LINK).wait_for(me.any(ORDER));
+        if self.holding {
+            // Whoever sends the vehicle home or down, it is no longer held.
+            bid = bid.block(me.any(ADVANCE)).wait_for(me.any_of(&[RETURN, LAND]));
+        }
         if let Some(event) = &self.pending {
             bid = bid.request(event.clone());
-        }
-        if self.holding {
-            bid = bid.block(me.any(ADVANCE));
         }
         Some(bid)
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         if !self.me.heard(event, ORDER) {
-            self.pending = None;
+            if self.pending.as_ref() == Some(event) {
+                self.pending = None;
+            }
+            self.holding &= self.me.heard(event, HOLD);
             return;
         }
         let what = event.text("what").unwrap_or_default();
@@ -50,7 +54,5 @@ impl BThread for Operator {
             _ => None,
         };
         self.holding = (self.holding && what != "resume") || what == "hold";
-        // A vehicle that is sent home or down is no longer held.
-        self.holding &= !matches!(what, "land" | "return");
     }
 }

@@ -2,12 +2,14 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ADVANCE, ENTER, GOTO, HAND_BACK, HOLD, LAND, PILOT, PLAN, RETURN, TAKEOFF};
+use skein_wire::vocabulary::{
+    ADVANCE, ENTER, GOTO, HAND_BACK, HOLD, HOMEWARD, LAND, PILOT, PLAN, RETURN, TAKEOFF,
+};
 
 use crate::{me::Me, precedence};
 
 /// Everything that would move the vehicle.
-const MOVES: [&str; 8] = [TAKEOFF, GOTO, PLAN, ADVANCE, ENTER, HOLD, LAND, RETURN];
+const MOVES: [&str; 9] = [TAKEOFF, GOTO, PLAN, ADVANCE, HOMEWARD, ENTER, HOLD, LAND, RETURN];
 
 /// Blocks every movement from a pilot's mode change until an operator hands the vehicle back.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]

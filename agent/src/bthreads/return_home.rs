@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ARRIVED, GOTO, LAND, RETURN};
+use skein_wire::vocabulary::{ARRIVED, GOTO, LAND, LANDED, RETURN};
 
 use crate::{me::Me, precedence};
 
@@ -41,8 +41,8 @@ impl BThread for ReturnHome {
         let bid = Bid::new().priority(precedence::BATTERY_LOW);
         Some(match &self.phase {
             Phase::Away => bid.wait_for(me.any(RETURN)),
-            Phase::Turning { .. } => bid.request(self.home.clone()).wait_for(me.any(LAND)),
-            Phase::Returning { .. } => bid.wait_for(me.any_of(&[ARRIVED, LAND])),
+            Phase::Turning { .. } => bid.request(self.home.clone()).wait_for(me.any_of(&[LAND, LANDED])),
+            Phase::Returning { .. } => bid.wait_for(me.any_of(&[ARRIVED, LAND, LANDED])),
             Phase::Landing { why } => bid.request(me.because(LAND, why)),
         })
     }

@@ -10,7 +10,7 @@ use std::time::Duration;
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, STALLED};
-use skein_wire::vocabulary::{ADVANCE, ENTER, LANDED, LEAVE, PASSAGE, of_every_vehicle};
+use skein_wire::vocabulary::{ADVANCE, ENTER, HOMEWARD, LANDED, LEAVE, PASSAGE, of_every_vehicle};
 
 use crate::{me::Me, precedence};
 
@@ -83,18 +83,20 @@ impl BThread for RightOfWay {
             Phase::Clear => bid.wait_for(me.any(PASSAGE)),
             Phase::Claiming { passage } => bid
                 .block(self.others_enter(passage))
-                .block(me.any(ADVANCE))
+                .block(me.any_of(&[ADVANCE, HOMEWARD]))
                 .wait_for(me.any(CONFIRMED))
                 .wait_for(gone),
             Phase::Entering { passage } => bid
                 .request(self.enter(passage))
                 .block(self.others_enter(passage))
-                .block(me.any(ADVANCE))
+                .block(me.any_of(&[ADVANCE, HOMEWARD]))
                 .wait_for(me.any_of(&[STALLED, BLOCK_LAPSED]))
                 .wait_for(gone),
-            Phase::Yielding { until, .. } => {
-                bid.block(me.any(ADVANCE)).wait_for(of_every_vehicle(LEAVE)).deadline(*until).wait_for(gone)
-            }
+            Phase::Yielding { until, .. } => bid
+                .block(me.any_of(&[ADVANCE, HOMEWARD]))
+                .wait_for(of_every_vehicle(LEAVE))
+                .deadline(*until)
+                .wait_for(gone),
             Phase::Inside { passage } => bid.block(self.others_enter(passage)).wait_for(gone),
         })
     }
@@ -112,7 +114,8 @@ impl BThread for RightOfWay {
                 Phase::Claiming { passage }
             }
             (Phase::Entering { passage }, Some(STALLED))
-                if self.goes_before_me(event.text("by").unwrap_or_default()) =>
+                if event.text("event").is_some_and(|stalled| stalled.ends_with(ENTER))
+                    && self.goes_before_me(event.text("by").unwrap_or_default()) =>
             {
                 Phase::Yielding { passage, until: cx.now() + PATIENCE }
             }

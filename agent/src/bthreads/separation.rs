@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ADVANCE, CLEAR, TOO_CLOSE};
+use skein_wire::vocabulary::{ADVANCE, CLEAR, HOMEWARD, TOO_CLOSE};
 
 use crate::{me::Me, precedence};
 
@@ -27,7 +27,7 @@ impl BThread for Separation {
     fn bid(&self) -> Option<Bid> {
         let bid = Bid::new().priority(precedence::COLLISION);
         Some(if self.too_close {
-            bid.wait_for(self.me.any(CLEAR)).block(self.me.any(ADVANCE))
+            bid.wait_for(self.me.any(CLEAR)).block(self.me.any_of(&[ADVANCE, HOMEWARD]))
         } else {
             bid.wait_for(self.me.any(TOO_CLOSE))
         })

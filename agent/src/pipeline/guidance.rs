@@ -145,13 +145,6 @@ struct Following {
     blocked: bool,
 }
 
-/// A narrow passage that was announced.
-#[derive(Clone, Copy, Debug)]
-struct Announced {
-    passage: Passage,
-    entered: bool,
-}
-
 /// Follows paths with leave, hovers without.
 #[derive(Debug)]
 pub struct Guidance {
@@ -160,7 +153,8 @@ pub struct Guidance {
     leg: Option<Leg>,
     following: Option<Following>,
     leave_until: Duration,
-    passage: Option<Announced>,
+    /// The narrow passage that was announced last.
+    passage: Option<Passage>,
     /// Where to hover while there is no leave to move.
     hover_at: Option<Vector3<f64>>,
     speed_m_s: f64,
@@ -222,13 +216,6 @@ impl Guidance {
         self.leave_until = now + LEAVE_LASTS;
     }
 
-    /// The right to pass is the vehicle's own.
-    pub fn enter_passage(&mut self) {
-        if let Some(announced) = &mut self.passage {
-            announced.entered = true;
-        }
-    }
-
     /// Somebody else moves the vehicle, or nobody: whatever place it hovered at is not its place any more.
     pub fn rest(&mut self) {
         self.hover_at = None;
@@ -271,6 +258,9 @@ impl Guidance {
             return Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() };
         };
         let target = map.voxels().clamp(&leg.target);
+        // Outside the map, as beyond the fence, the way begins where the map does.
+        let is_inside = map.voxels().index_of(&motion.position).is_some();
+        let start = if is_inside { motion.position } else { map.voxels().clamp(&motion.position) };
         let standing: Vec<Vector3<f64>> = neighbours
             .iter()
             .filter(|neighbour| neighbour.armed && neighbour.track.velocity.norm() < 0.5)
@@ -291,7 +281,7 @@ impl Guidance {
         };
         let discs: Vec<Disc> =
             standing.iter().filter(in_the_way).map(|&centre| Disc { centre, radius_m }).collect();
-        let request = Request { start: motion.position, goal: target, potential: &potential, discs: &discs };
+        let request = Request { start, goal: target, potential: &potential, discs: &discs };
         let mut found = self.search(map, &request);
         if found.is_err() && !discs.is_empty() {
             found = self.search(map, &Request { discs: &[], ..request });
@@ -397,10 +387,11 @@ impl Guidance {
     }
 
     fn check_passage(&mut self, motion: &Motion, map: &ClearanceMap) -> Option<Report> {
-        if let Some(announced) = self.passage {
-            let past_m = (motion.position - announced.passage.centre).dot(&announced.passage.direction);
-            let away_m = (motion.position - announced.passage.centre).norm();
-            if past_m > PASSAGE_BEHIND_M || away_m > PASSAGE_AHEAD_M + PASSAGE_BEHIND_M {
+        if let Some(passage) = self.passage {
+            let offset = motion.position - passage.centre;
+            let is_past = offset.dot(&passage.direction) > PASSAGE_BEHIND_M;
+            let turned_away = offset.norm() > PASSAGE_BEHIND_M && !self.leads_through(&passage);
+            if is_past || turned_away || offset.norm() > PASSAGE_AHEAD_M + PASSAGE_BEHIND_M {
                 self.passage = None;
                 return Some(Report::PassageLeft);
             }
@@ -409,8 +400,17 @@ impl Guidance {
         let following = self.following.as_ref()?;
         let config = PassageConfig { look_m: PASSAGE_AHEAD_M, ..PassageConfig::default() };
         let passage = first_passage(map, &following.path, following.station_m, &config)?;
-        self.passage = Some(Announced { passage, entered: false });
+        self.passage = Some(passage);
         Some(Report::Passage(passage.centre))
+    }
+
+    /// Whether the path ahead leads through a passage, as far as there is a path.
+    fn leads_through(&self, passage: &Passage) -> bool {
+        self.following.as_ref().is_none_or(|following| {
+            let end_m = following.path.length_m();
+            following.path.project_within(&passage.centre, following.station_m, end_m).distance_m
+                < passage.width_m
+        })
     }
 
     fn check_progress(&mut self, now: Duration, has_leave: bool) -> Option<Report> {
@@ -486,15 +486,18 @@ impl Guidance {
         Wish { velocity: back, height_m: place.z }
     }
 
-    /// The nearest points of the fence's walls: the filter keeps clear of them as of obstacles.
+    /// The nearest points of the fence's walls: the filter keeps clear of them as of obstacles. From outside they are open.
     fn fence_ahead(&self, position: Vector3<f64>) -> impl Iterator<Item = Vector3<f64>> + '_ {
-        [0, 1].into_iter().flat_map(move |axis| {
-            [self.fence.min[axis], self.fence.max[axis]].map(|wall| {
+        let Fence { min, max } = self.fence;
+        let walls =
+            [0, 1].into_iter().flat_map(move |axis| [(axis, min[axis], 1.0), (axis, max[axis], -1.0)]);
+        walls.filter(move |(axis, wall, inwards)| (position[*axis] - wall) * inwards > 0.0).map(
+            move |(axis, wall, _)| {
                 let mut point = position;
                 point[axis] = wall;
                 point
-            })
-        })
+            },
+        )
     }
 }
 

@@ -7,7 +7,7 @@ use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::{NodeName, facts};
 use skein_wire::vocabulary::{AIRBORNE, FAILED, LANDED, TAKEOFF, event, of};
 
-use crate::order::ordered;
+use crate::order::ordered_for_all;
 
 /// Requests `uav/N/takeoff` for each vehicle in turn. Each vehicle's own preflight b-thread may block its take-off. One
 /// that falls silent before it has taken off is asked again after the others.
@@ -38,7 +38,7 @@ impl BThread for Launch {
     fn bid(&self) -> Option<Bid> {
         let vehicle = self.waiting.front()?;
         // Who orders the swarm down does not want the rest of it up.
-        let called_off = EventSet::any_of(["land", "return"].map(|what| ordered(&self.ground, what)));
+        let called_off = EventSet::any_of(["land", "return"].map(|what| ordered_for_all(&self.ground, what)));
         let bid = Bid::new().interrupt(called_off).wait_for(self.given_up(vehicle));
         Some(if self.climbing {
             bid.wait_for(of(vehicle, AIRBORNE))

@@ -29,7 +29,7 @@ pub fn load(program: &mut Program, config: &GroundConfig) {
     program.add("hold", Hold::new(ground.clone(), vehicles.clone()));
     program.add(Watch::NAME, Watch::new(ground.clone(), vehicles.iter().cloned()));
     for vehicle in vehicles {
-        for what in ["land", "return"] {
+        for what in ["resume", "land", "return", "hand_back"] {
             program.add(format!("{what} {vehicle}"), Delivery::new(ground.clone(), vehicle.clone(), what));
         }
     }

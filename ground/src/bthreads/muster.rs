@@ -7,7 +7,7 @@ use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::{NodeName, facts, first_two_chunks};
 use skein_wire::vocabulary::{ADVANCE, AIRBORNE, FAILED, of_every_vehicle};
 
-use crate::order::ordered;
+use crate::order::ordered_for_all;
 
 /// Blocks `uav/*/advance` until every vehicle is in the air, or will not be.
 ///
@@ -29,7 +29,7 @@ impl Muster {
 impl BThread for Muster {
     fn bid(&self) -> Option<Bid> {
         // Whoever is ordered home must be free to move.
-        let called_off = EventSet::any_of(["land", "return"].map(|what| ordered(&self.ground, what)));
+        let called_off = EventSet::any_of(["land", "return"].map(|what| ordered_for_all(&self.ground, what)));
         let arrived = EventSet::any_of([AIRBORNE, FAILED].map(of_every_vehicle));
         let lost = facts::of(&self.ground, facts::PEER_LOST);
         (!self.missing.is_empty()).then(|| {

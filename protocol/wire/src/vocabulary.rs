@@ -38,6 +38,8 @@ pub const GOTO: &str = "goto";
 pub const PLAN: &str = "plan";
 /// Leave to move for one navigation cycle. Blocking it holds the vehicle.
 pub const ADVANCE: &str = "advance";
+/// Leave to move on the way home. Unlike [`ADVANCE`], nobody can block it from afar.
+pub const HOMEWARD: &str = "homeward";
 /// Enter the narrow passage around `x`, `y`, `z`.
 pub const ENTER: &str = "enter";
 /// The narrow passage lies behind.
@@ -93,3 +95,32 @@ pub const PILOT: &str = "pilot";
 pub const FOUND_AIRBORNE: &str = "found_airborne";
 /// The autopilot refused or never answered a command: data `why` (text).
 pub const COMMAND_FAILED: &str = "command_failed";
+
+/// What only the vehicle itself can say or decide: from afar these are neither blocked nor requested (G6).
+pub const OWN: [&str; 25] = [
+    HOLD,
+    RETURN,
+    LAND,
+    HAND_BACK,
+    HOMEWARD,
+    PLAN,
+    LEAVE,
+    READY,
+    UNREADY,
+    AIRBORNE,
+    LANDED,
+    ARRIVED,
+    PLANNED,
+    UNPLANNABLE,
+    PATH_BLOCKED,
+    STUCK,
+    PASSAGE,
+    TOO_CLOSE,
+    CLEAR,
+    BATTERY_LOW,
+    BATTERY_CRITICAL,
+    FENCE_BREACHED,
+    PILOT,
+    FOUND_AIRBORNE,
+    COMMAND_FAILED,
+];

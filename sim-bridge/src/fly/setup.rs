@@ -80,7 +80,8 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
             home: plan.start.into(),
             waypoints: plan.waypoints.iter().map(|point| (*point).into()).collect(),
             takeoff_height_m: scenario.takeoff_height_m,
-            return_altitude_m: RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64,
+            return_altitude_m: (RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64)
+                .min(bounds.max.z - 1.0),
             fence,
             envelope: Envelope {
                 cruise_m_s: scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
