@@ -17,6 +17,8 @@ use crate::scenario::{self, OrderKind, Scenario, VehiclePlan};
 pub const FLEET: &str = "sim";
 /// Lease of every node's bids.
 const LEASE: Duration = Duration::from_secs(1);
+/// Distance that vehicles keep from centre to centre, in hull radii: 1.4 m for a vehicle of 0.25 m.
+const SEPARATION_HULLS: f64 = 5.6;
 /// Lowest height at which vehicles return, m above the world's origin.
 const RETURN_ALTITUDE_M: f64 = 3.0;
 /// Vehicles return at so many heights, this far apart, m.
@@ -88,6 +90,7 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
                 climb_m_s: plan.model.max_climb_m_s.min(1.5),
                 brake_m_s2: plan.model.max_accel_m_s2 * 0.7,
                 hull_m: plan.model.hull_radius_m,
+                separation_m: SEPARATION_HULLS * plan.model.hull_radius_m,
                 ..Envelope::default()
             },
             link_loss: LinkLossPolicy::default(),
