@@ -127,7 +127,9 @@ proptest! {
         let back = first_passage(&map, &path(&[ends[1], [0.0, 0.0], ends[0]]), 0.0, &PassageConfig::default());
         prop_assert!(there.is_some() && back.is_some(), "{there:?} {back:?}");
         let (there, back) = (there.unwrap(), back.unwrap());
-        prop_assert!((there.centre - back.centre).norm() <= 0.5, "{there:?} {back:?}");
-        prop_assert!(there.centre.xy().norm() <= 0.4, "{there:?}");
+        // Where a slanted path passes trunks of a few voxels, the points that face it differ from either side. Right of way
+        // takes passages within 3 m for one.
+        prop_assert!((there.centre - back.centre).norm() <= 1.0, "{there:?} {back:?}");
+        prop_assert!(there.centre.xy().norm() <= 0.6, "{there:?}");
     }
 }
