@@ -83,6 +83,8 @@ pub struct AgentConfig {
     pub takeoff_height_m: f64,
     /// Height in the world at which this vehicle returns, m; different for every vehicle.
     pub return_altitude_m: f64,
+    /// Whether the vehicle has a lidar: without scans younger than 200 ms it then stands still.
+    pub lidar: bool,
     /// The geofence.
     pub fence: Fence,
     /// What the vehicle can do.

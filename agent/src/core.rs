@@ -10,7 +10,7 @@ use skein_planning::map::MapError;
 use skein_wire::vocabulary::{
     ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, HOMEWARD, LAND, LANDED, ORDER, PLAN, RETURN,
 };
-use skein_wire::{Fleet, Link, NodeLink, State, vocabulary};
+use skein_wire::{Fleet, Link, MissionState, NodeLink, State, vocabulary};
 
 use crate::{
     bthreads,
@@ -22,7 +22,7 @@ use crate::{
     pipeline::{
         guidance::{Guidance, Motion, Surroundings},
         perception::{Perception, Pose, Scan},
-        set_point::{KeepAlive, keep_alive, oldest_age},
+        set_point::{KeepAlive, SILENT_AFTER, keep_alive, oldest_age},
     },
     precedence,
     watches::Watches,
@@ -36,6 +36,8 @@ const ABOVE_WAYPOINTS_M: f64 = 4.0;
 const BELOW_WAYPOINTS_M: f64 = 1.0;
 /// No path is lower than this above the take-off place, m.
 const LEAST_HEIGHT_M: f64 = 0.6;
+/// An agent that has not run for this long has let its set-points fall silent, and does not take them up by itself.
+const LONGEST_PAUSE: Duration = SILENT_AFTER;
 /// A navigation cycle and a state message to the others begin this often.
 const CYCLE_PERIOD: Duration = Duration::from_millis(100);
 
@@ -114,6 +116,7 @@ pub struct AgentCore {
     flight: Flight,
     guidance: Guidance,
     next_cycle: Duration,
+    last_tick: Option<Duration>,
     task: String,
     outcome: Option<Outcome>,
     selections: Vec<Happened>,
@@ -165,6 +168,7 @@ impl AgentCore {
             flight: Flight::new(me.clone(), config.takeoff_height_m),
             guidance: Guidance::new(config.envelope, config.fence),
             next_cycle: Duration::ZERO,
+            last_tick: None,
             task: "on the ground".to_owned(),
             outcome: None,
             selections: Vec::new(),
@@ -183,6 +187,11 @@ impl AgentCore {
     /// Bytes for the autopilot.
     pub fn take_mavlink(&mut self) -> Vec<u8> {
         self.companion.take_output()
+    }
+
+    /// An order of whoever is at this vehicle's own computer: `what` as in [`vocabulary::order`].
+    pub fn order(&mut self, what: &str) {
+        self.node.node_mut().enqueue(vocabulary::order(&self.name, what));
     }
 
     /// Takes in a lidar scan.
@@ -212,11 +221,9 @@ impl AgentCore {
 
     /// One tick, every 20 ms: hears, decides, and answers with a set-point.
     pub fn tick(&mut self, now: Duration, link: &mut dyn Link) {
+        self.note_pause(now);
         self.companion.tick(now);
-        self.node.receive(now, link);
-        for state in self.node.take_states() {
-            self.neighbours.hear(now, state);
-        }
+        self.hear(now, link);
         let neighbours: Vec<Neighbour> = self.neighbours.at(now).collect();
         self.follow_autopilot(now);
         self.watch(now, &neighbours);
@@ -227,6 +234,31 @@ impl AgentCore {
         self.decide(now, &neighbours);
         self.steer(now, &neighbours);
         self.node.send(link);
+    }
+
+    /// Between two ticks: answers at once what other nodes say, without a set-point. Makes the swarm quick to hold.
+    pub fn respond(&mut self, now: Duration, link: &mut dyn Link) {
+        self.hear(now, link);
+        let neighbours: Vec<Neighbour> = self.neighbours.at(now).collect();
+        self.decide(now, &neighbours);
+        self.node.send(link);
+    }
+
+    fn hear(&mut self, now: Duration, link: &mut dyn Link) {
+        self.node.receive(now, link);
+        for state in self.node.take_states() {
+            self.neighbours.hear(now, state);
+        }
+    }
+
+    fn note_pause(&mut self, now: Duration) {
+        let pause = self.last_tick.replace(now).map_or(Duration::ZERO, |last| now.saturating_sub(last));
+        if pause > LONGEST_PAUSE
+            && let Some(event) = self.flight.wake(pause)
+        {
+            self.guidance.rest();
+            self.node.node_mut().enqueue(event);
+        }
     }
 
     fn follow_autopilot(&mut self, now: Duration) {
@@ -301,6 +333,7 @@ impl AgentCore {
                 self.guidance.head_for(event);
                 self.task = match event.int("leg") {
                     Some(bthreads::HOME_LEG) => "flying home".to_owned(),
+                    Some(bthreads::OPERATOR_LEG) => "going where the operator points".to_owned(),
                     leg => format!("leg {} of {}", leg.unwrap_or_default() + 1, self.config.waypoints.len()),
                 };
             }
@@ -335,15 +368,14 @@ impl AgentCore {
             return;
         }
         let telemetry = self.companion.telemetry();
-        let inputs = [
-            telemetry.position.map(|position| position.stamp),
-            telemetry.attitude.map(|attitude| attitude.stamp),
-            self.perception.last_scan(),
-        ];
+        let position = telemetry.position.map(|position| position.stamp);
+        let attitude = telemetry.attitude.map(|attitude| attitude.stamp);
+        let inputs = [position, attitude, self.perception.last_scan()];
+        let inputs = if self.config.lidar { &inputs[..] } else { &inputs[..2] };
         let Some(motion) = self.motion() else { return };
         let tracks: Vec<_> =
             neighbours.iter().filter(|neighbour| neighbour.armed).map(|neighbour| neighbour.track).collect();
-        match keep_alive(now, &inputs) {
+        match keep_alive(now, inputs) {
             KeepAlive::Command => {
                 let surroundings = Surroundings {
                     map: self.perception.map(),
@@ -352,7 +384,7 @@ impl AgentCore {
                 };
                 let set_point = self.guidance.steer(now, &motion, &surroundings);
                 self.set_points.commands += 1;
-                let age = oldest_age(now, &inputs).unwrap_or_default();
+                let age = oldest_age(now, inputs).unwrap_or_default();
                 self.set_points.oldest_input = self.set_points.oldest_input.max(age);
                 self.companion.set_point(now, set_point);
             }
@@ -380,6 +412,7 @@ impl AgentCore {
             time: now,
             position: motion.position,
             velocity: motion.velocity,
+            yaw_rad: telemetry.attitude.map_or(0.0, |attitude| attitude.value.euler_angles().2),
             position_sigma_m: POSITION_SIGMA_M,
             radius_m: self.config.envelope.hull_m,
             mode: status.mode,
@@ -387,12 +420,19 @@ impl AgentCore {
             armed: telemetry.armed,
             task: status.task,
             waiting_for: status.waiting_for,
+            mission: match &self.outcome {
+                None => MissionState::UnderWay,
+                Some(Outcome::Complete) => MissionState::Complete,
+                Some(Outcome::Failed(_)) => MissionState::Failed,
+            },
             path: self.guidance.path_ahead().take(State::MAX_PATH).collect(),
             ..State::new(self.name.clone())
         })
     }
 
-    fn is_airborne(&self) -> bool {
+    /// Whether the vehicle is in the air, as far as its autopilot has told.
+    #[must_use]
+    pub fn is_airborne(&self) -> bool {
         let telemetry = self.companion.telemetry();
         telemetry.armed && telemetry.landed != Landed::OnGround
     }
@@ -449,6 +489,12 @@ impl AgentCore {
     /// The path ahead, from the vehicle to its waypoint; empty without one.
     pub fn path_ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
         self.guidance.path_ahead()
+    }
+
+    /// The vehicle's node: its program, its peers, and what has come in that was not understood.
+    #[must_use]
+    pub fn node(&self) -> &NodeLink {
+        &self.node
     }
 
     /// The vehicle's node name.

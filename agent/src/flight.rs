@@ -5,7 +5,7 @@ use std::time::Duration;
 use skein_bp::Event;
 use skein_mav::{Command, CommandResult, Companion, FlightMode, Landed, MavEvent};
 use skein_wire::vocabulary::{
-    AIRBORNE, COMMAND_FAILED, FOUND_AIRBORNE, HAND_BACK, HOLD, LAND, LANDED, PILOT, TAKEOFF,
+    AIRBORNE, COMMAND_FAILED, FOUND_AIRBORNE, HAND_BACK, HOLD, LAND, LANDED, PILOT, SLEPT, TAKEOFF,
 };
 
 use crate::me::Me;
@@ -106,6 +106,17 @@ impl Flight {
         if self.phase == FlightPhase::Adopted {
             self.engage(now);
         }
+    }
+
+    /// The agent has not run for `pause`: if it flew the vehicle, it does not any more. Returns what the b-threads
+    /// should hear of it.
+    pub fn wake(&mut self, pause: Duration) -> Option<Event> {
+        let flew =
+            matches!(self.phase, FlightPhase::Climbing | FlightPhase::Engaging { .. } | FlightPhase::Flying);
+        flew.then(|| {
+            self.phase = FlightPhase::Taken;
+            self.me.event(SLEPT).with("seconds", pause.as_secs_f64())
+        })
     }
 
     fn engage(&mut self, now: Duration) {

@@ -7,8 +7,9 @@ use skein_bp::{Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeError, NodeName};
 use skein_wire::{Fleet, Link, NodeLink, State};
 
-use crate::Order;
-use crate::bthreads::{self, MissionOutcome, Watch};
+use crate::bthreads::{self, MissionOutcome, Watch, heard};
+use crate::order_log::OrderLog;
+use crate::{Order, OrderRecord};
 
 /// What a ground station must know.
 #[derive(Clone, Debug)]
@@ -25,6 +26,8 @@ pub struct GroundConfig {
     pub orders: Vec<(Duration, Order)>,
     /// Whether the b-threads are loaded; without them the station listens and asks for nothing.
     pub loaded: bool,
+    /// Whether the swarm takes off when an operator orders it, and not as soon as it is there.
+    pub launch_on_order: bool,
     /// Whether nobody sets out before everybody is in the air.
     pub muster: bool,
     /// Lease of the station's bids.
@@ -45,6 +48,7 @@ impl GroundConfig {
             incarnation: 1,
             orders: Vec::new(),
             loaded: true,
+            launch_on_order: false,
             muster: false,
             lease,
             seed: 0,
@@ -57,7 +61,10 @@ pub struct GroundCore {
     name: NodeName,
     node: NodeLink,
     orders: Vec<(Duration, Order)>,
+    vehicles: Vec<NodeName>,
+    now: Duration,
     roster: BTreeMap<NodeName, State>,
+    order_log: OrderLog,
     selections: Vec<Happened>,
 }
 
@@ -79,15 +86,27 @@ impl GroundCore {
             node: NodeLink::new(Node::new(node_config, program), config.fleet),
             name: config.name,
             orders: config.orders,
+            vehicles: config.vehicles,
+            now: Duration::ZERO,
             roster: BTreeMap::new(),
+            order_log: OrderLog::default(),
             selections: Vec::new(),
         }
     }
 
-    /// Says something to the vehicles, as the operator.
-    pub fn order(&mut self, order: &Order) {
-        let event = order.event(&self.name);
-        self.node.node_mut().enqueue(event);
+    /// Says something to the vehicles, as the operator. Returns the order's number: see [`orders`](Self::orders).
+    pub fn order(&mut self, order: &Order) -> u64 {
+        let who = order.who();
+        let concerned: Vec<_> = self
+            .vehicles
+            .iter()
+            .filter(|vehicle| who.includes(vehicle))
+            .map(|vehicle| (vehicle.clone(), self.roster.get(vehicle).map(|state| state.position)))
+            .collect();
+        for event in order.events(&self.name, &concerned) {
+            self.node.node_mut().enqueue(event);
+        }
+        self.order_log.give(self.now, order.clone(), concerned.into_iter().map(|(vehicle, _)| vehicle))
     }
 
     /// Hears, decides and answers.
@@ -95,16 +114,31 @@ impl GroundCore {
     /// # Errors
     /// [`NodeError`] when a b-thread misbehaves; the station goes on all the same.
     pub fn tick(&mut self, now: Duration, link: &mut dyn Link) -> Result<(), NodeError> {
+        self.now = now;
         let due = self.orders.partition_point(|(at, _)| *at <= now);
         for (_, order) in self.orders.drain(..due).collect::<Vec<_>>() {
-            self.order(&order);
+            let _number = self.order(&order);
         }
         let outcome = self.node.pump(now, link);
         for state in self.node.take_states() {
-            self.roster.insert(state.node.clone(), state);
+            self.note(state);
         }
-        self.selections.extend(self.node.node_mut().take_selections());
+        let happened = self.node.node_mut().take_selections();
+        self.order_log.update(now, self.node.node(), &happened);
+        self.selections.extend(happened);
         outcome
+    }
+
+    fn note(&mut self, state: State) {
+        if !self.vehicles.contains(&state.node) {
+            return;
+        }
+        let first_word =
+            self.roster.get(&state.node).is_none_or(|known| known.incarnation != state.incarnation);
+        if first_word {
+            self.node.node_mut().enqueue(heard::event(&self.name, &state));
+        }
+        self.roster.insert(state.node.clone(), state);
     }
 
     /// How the mission went, once every vehicle is on the ground and knows.
@@ -124,14 +158,25 @@ impl GroundCore {
         &self.name
     }
 
-    /// The station's node, to explain what it requests and blocks.
+    /// The station's node, to explain what it requests and blocks, and what has come in that was not understood.
     #[must_use]
-    pub fn node(&self) -> &Node {
-        self.node.node()
+    pub fn node(&self) -> &NodeLink {
+        &self.node
     }
 
-    /// Each vehicle's last word.
-    pub fn roster(&self) -> impl Iterator<Item = &State> {
-        self.roster.values()
+    /// Every vehicle in the order of take-off, with its last word if it has been heard.
+    pub fn roster(&self) -> impl Iterator<Item = (&NodeName, Option<&State>)> {
+        self.vehicles.iter().map(|vehicle| (vehicle, self.roster.get(vehicle)))
+    }
+
+    /// The latest orders and their answers, oldest first.
+    pub fn orders(&self) -> impl Iterator<Item = &OrderRecord> {
+        self.order_log.records()
+    }
+
+    /// Grows whenever [`orders`](Self::orders) has changed.
+    #[must_use]
+    pub fn orders_revision(&self) -> u64 {
+        self.order_log.revision()
     }
 }

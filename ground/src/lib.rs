@@ -2,7 +2,8 @@
 //!
 //! [`GroundCore`] is the station without I/O: a behavioural program ([`bthreads`]) joined to those of the vehicles. An
 //! [`Order`] becomes an event of the station; the b-threads do the rest, by blocking (`hold`) and by requesting at each
-//! vehicle's gateway (`land`, `return`). The [`recorder`] writes a mission as an MCAP file.
+//! vehicle's gateway (`land`, `return`). The [`recorder`] writes a mission as an MCAP file; the
+//! `console` (a feature) shows the swarm in a browser and takes the operator's orders from it.
 //!
 //! ```
 //! use std::time::Duration;
@@ -21,10 +22,14 @@
 //! ```
 
 pub mod bthreads;
+#[cfg(feature = "console")]
+pub mod console;
 mod core;
 mod order;
+mod order_log;
 pub mod recorder;
 
 pub use crate::core::{GroundConfig, GroundCore};
 pub use bthreads::MissionOutcome;
-pub use order::{Order, Who, ordered, ordered_for};
+pub use order::{Destination, Order, Who};
+pub use order_log::{Answer, OrderRecord};

@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 use foxglove::messages::{FrameTransforms, LaserScan, PoseInFrame, SceneUpdate};
 use nalgebra::{Isometry3, Vector3};
 use prost::Message;
-use skein_ground::recorder::{Form, Level, Recorder, RecorderError, Scan, Solid};
+use skein_ground::recorder::{Level, Recorder, RecorderError, Scan};
 use skein_wire::proto::TraceEvent;
+use skein_wire::{Form, Solid};
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 

@@ -198,7 +198,7 @@ fn a_hold_is_confirmed_and_stops_every_vehicle_until_it_is_lifted() {
 fn one_vehicle_can_be_held_and_let_go_out_of_all() {
     let orders = vec![
         (Duration::from_millis(3000), Order::Hold(Who::All)),
-        (Duration::from_millis(5000), Order::Resume(Who::Vehicle(name("uav/1")))),
+        (Duration::from_millis(5000), Order::Resume(Who::only(name("uav/1")))),
         (Duration::from_millis(9000), Order::Resume(Who::All)),
     ];
     let mut fleet = Fleet3::new(orders, NetworkConfig::default(), 1);
@@ -219,7 +219,7 @@ fn one_vehicle_can_be_held_and_let_go_out_of_all() {
 fn an_order_to_land_reaches_the_vehicles_it_is_for_even_on_hold() {
     let orders = vec![
         (Duration::from_millis(2500), Order::Hold(Who::All)),
-        (Duration::from_millis(4000), Order::Land(Who::Vehicle(name("uav/2")))),
+        (Duration::from_millis(4000), Order::Land(Who::only(name("uav/2")))),
         (Duration::from_millis(6000), Order::Resume(Who::All)),
     ];
     let mut fleet = Fleet3::new(orders, LOSSY, 3);

@@ -2,12 +2,13 @@
 //!
 //! Exit codes: 0 done, 1 the mission or check failed, 2 wrong usage or input.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::scenario::Overrides;
+use crate::scenario::{Overrides, Scenario, ScenarioError};
 
 /// How a program ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,6 +54,14 @@ pub enum Command {
     Fly(Fly),
     /// Host the world and its autopilots alone, for agents in other processes.
     Serve(Serve),
+    /// Write the configuration files of a scenario's swarm, for one process each.
+    Configure(Configure),
+    /// Measure something, and print it.
+    Bench {
+        /// What.
+        #[command(subcommand)]
+        what: Bench,
+    },
     /// List the built-in scenarios.
     List,
     /// Say whether a scenario, world or mission file is sound.
@@ -83,6 +92,66 @@ pub struct Fly {
     /// No live table.
     #[arg(long)]
     pub headless: bool,
+    /// World, ground station and each agent in a process of its own; `--clock real` only.
+    #[arg(long)]
+    pub processes: bool,
+    /// How the processes are joined.
+    #[arg(long, value_enum, default_value_t = Network::Peer, requires = "processes")]
+    pub network: Network,
+    /// Where the console is served, on this computer only; `--clock real` only. Port 0 is any that is free.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8700")]
+    pub console: SocketAddr,
+    /// Use network ports so much further up, beside another swarm on this computer.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub port_offset: u16,
+}
+
+/// Options of `configure`.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct Configure {
+    /// What will be flown.
+    #[command(flatten)]
+    pub world: WorldArgs,
+    /// Folder for the files; made if missing.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// How the processes are joined.
+    #[arg(long, value_enum, default_value_t = Network::Peer)]
+    pub network: Network,
+    /// The swarm takes off when an operator says so, and not as soon as it is there.
+    #[arg(long)]
+    pub launch_on_order: bool,
+    /// Use network ports so much further up, beside another swarm on this computer.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub port_offset: u16,
+}
+
+/// How processes are joined over Zenoh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Network {
+    /// Each with every other one.
+    Peer,
+    /// Through the ground station.
+    Router,
+    /// Through a `zenohd` that runs beside them.
+    Zenohd,
+}
+
+/// What can be measured.
+#[derive(Debug, Clone, PartialEq, Subcommand)]
+pub enum Bench {
+    /// From an operator's Hold to the last vehicle's acknowledgement, each in a process of its own.
+    Hold {
+        /// Size of the swarm.
+        #[arg(long, value_name = "N", default_value_t = 8)]
+        vehicles: usize,
+        /// How many times.
+        #[arg(long, value_name = "N", default_value_t = 200)]
+        holds: usize,
+        /// Use network ports so much further up, beside another swarm on this computer.
+        #[arg(long, value_name = "N", default_value_t = 2000)]
+        port_offset: u16,
+    },
 }
 
 /// Options of `serve`.
@@ -94,6 +163,15 @@ pub struct Serve {
     /// How many times faster than the clock on the wall.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
     pub speed: f64,
+    /// How the world is joined to the other nodes (see sim-bridge/world.toml).
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Folder for summary.json; made if missing.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Use MAVLink ports so much further up, beside another swarm on this computer.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub port_offset: u16,
 }
 
 /// What world and swarm are simulated.
@@ -116,6 +194,14 @@ pub struct WorldArgs {
 }
 
 impl WorldArgs {
+    /// Reads the scenario with its files.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub fn open(&self) -> Result<Scenario, ScenarioError> {
+        Scenario::open(&self.scenario, &self.overrides(), self.seed)
+    }
+
     /// What the options set over the scenario.
     pub fn overrides(&self) -> Overrides {
         Overrides { vehicles: self.vehicles, world: self.world_file.clone(), missions: self.missions.clone() }

@@ -1,13 +1,25 @@
 //! One-host runs: scenarios, the lockstep and real-time runners, summaries.
 //!
-//! [`fly`] hosts a whole swarm in one process; [`serve`] hosts the world alone, for agents and MAVLink clients in
-//! other processes. Both take a [`scenario`].
+//! [`fly`] hosts a whole swarm in one process, or starts one process for each of its nodes; `serve` hosts the world alone,
+//! for agents and MAVLink clients in other processes. All take a [`scenario`].
 
+#[cfg(feature = "zenoh")]
+pub mod bench;
 pub mod check;
 pub mod cli;
+#[cfg(feature = "zenoh")]
+pub mod configure;
 pub mod fly;
+#[cfg(feature = "zenoh")]
+mod mavlink_ports;
 pub mod mission;
+#[cfg(feature = "zenoh")]
+pub mod processes;
 pub mod scenario;
+mod scene_view;
+#[cfg(feature = "zenoh")]
 pub mod serve;
 pub mod summary;
 pub mod table;
+#[cfg(feature = "zenoh")]
+pub mod world_host;

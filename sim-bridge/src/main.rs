@@ -7,11 +7,13 @@ use clap::Parser as _;
 use serde_json::json;
 use skein_sim::cli::{Cli, Command, Exit};
 use skein_sim::scenario::{Scenario, ScenarioError};
-use skein_sim::{check, fly, serve};
+use skein_sim::summary::Summary;
+use skein_sim::{check, fly};
 
 fn main() -> ExitCode {
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
+        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
         .with_env_filter(
             // Zenoh warns of things that are as they should be on one host; RUST_LOG says otherwise.
             tracing_subscriber::EnvFilter::try_from_default_env()
@@ -34,20 +36,38 @@ fn run(cli: &Cli) -> anyhow::Result<Exit> {
     match &cli.command {
         Command::Fly(args) => {
             let summary = fly::run(args)?;
-            if cli.json {
-                print!("{}", summary.to_json()?);
-            } else {
-                print!("{}", summary.render());
-            }
+            show(&summary, cli.json)?;
             Ok(if summary.succeeded { Exit::Done } else { Exit::Failed })
         }
-        Command::Serve(args) => serve::run(args, cli.json).map(|()| Exit::Done),
+        #[cfg(feature = "zenoh")]
+        Command::Serve(args) => {
+            let summary = skein_sim::serve::run(args, cli.json)?;
+            show(&summary, cli.json)?;
+            Ok(Exit::Done)
+        }
+        #[cfg(feature = "zenoh")]
+        Command::Configure(args) => skein_sim::configure::run(args, cli.json).map(|()| Exit::Done),
+        #[cfg(feature = "zenoh")]
+        Command::Bench { what } => skein_sim::bench::run(what, cli.json).map(|()| Exit::Done),
+        #[cfg(not(feature = "zenoh"))]
+        Command::Serve(_) | Command::Configure(_) | Command::Bench { .. } => {
+            anyhow::bail!("built without the cargo feature `zenoh`, which this needs")
+        }
         Command::List => {
             list(cli.json);
             Ok(Exit::Done)
         }
         Command::Check { file } => check(file, cli.json),
     }
+}
+
+fn show(summary: &Summary, as_json: bool) -> anyhow::Result<()> {
+    if as_json {
+        print!("{}", summary.to_json()?);
+    } else {
+        print!("{}", summary.render());
+    }
+    Ok(())
 }
 
 /// An unsound file is an answer, and the check has failed; a file that cannot be read is wrong input.

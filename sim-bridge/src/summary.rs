@@ -43,7 +43,7 @@ pub struct Summary {
     pub events: EventCounts,
     /// Traffic between nodes.
     pub network: Traffic,
-    /// Hash over every selected event and every pose: equal hashes mean equal runs.
+    /// Hash over every selected event and every pose: equal hashes mean equal runs. Empty for runs in several processes.
     pub trace_hash: String,
     /// One entry a vehicle, in order.
     pub per_vehicle: Vec<VehicleSummary>,
@@ -208,12 +208,17 @@ impl Summary {
         let (separation, clearance) = (metres(self.min_separation_m), metres(self.min_clearance_m));
         writeln!(out, "  closest     {separation} between centres, {clearance} from hull to obstacle")?;
         let PlanTimes { mean, p99, max } = self.plan_ms;
-        writeln!(out, "  planning    {mean:.2} ms mean, {p99:.2} ms p99, {max:.2} ms max")?;
+        // Other processes keep theirs to themselves.
+        if max > 0.0 {
+            writeln!(out, "  planning    {mean:.2} ms mean, {p99:.2} ms p99, {max:.2} ms max")?;
+        }
         let EventCounts { occurred, remote } = self.events;
         writeln!(out, "  events      {occurred}, of which {remote} requested by another node")?;
         let Traffic { messages, bytes } = self.network;
         writeln!(out, "  network     {messages} messages, {:.1} kB", bytes as f64 / 1000.0)?;
-        writeln!(out, "  trace       {}", self.trace_hash)?;
+        if !self.trace_hash.is_empty() {
+            writeln!(out, "  trace       {}", self.trace_hash)?;
+        }
         writeln!(out, "{}", self.table())
     }
 
@@ -229,8 +234,12 @@ impl Summary {
                 vehicle.outcome.as_str().to_owned(),
                 format!("{:.1} s", vehicle.flight_time_s),
                 format!("{:.1} m", vehicle.path_length_m),
-                vehicle.set_points.to_string(),
-                format!("{:.0} ms", vehicle.oldest_input_ms),
+                if vehicle.set_points > 0 { vehicle.set_points.to_string() } else { "-".into() },
+                if vehicle.set_points > 0 {
+                    format!("{:.0} ms", vehicle.oldest_input_ms)
+                } else {
+                    "-".into()
+                },
                 format!("{:.0} %", vehicle.battery * 100.0),
                 vehicle.reason.clone().unwrap_or_default(),
             ]);

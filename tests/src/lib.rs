@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use skein_dbp::NodeName;
-use skein_sim::cli::{Clock, Controller, Fly, WorldArgs};
+use skein_sim::cli::{self, Clock, Controller, Fly, WorldArgs};
 use skein_sim::fly::{self, Happenings, Links, Swarm};
 use skein_sim::scenario::Scenario;
 use skein_sim::summary::Summary;
@@ -28,6 +28,10 @@ pub fn flight(scenario: &str, seed: u64) -> Fly {
         controller: Controller::Bp,
         out: None,
         headless: true,
+        processes: false,
+        network: cli::Network::Peer,
+        console: ([127, 0, 0, 1], 0).into(),
+        port_offset: 0,
     }
 }
 

@@ -82,7 +82,7 @@ fn an_order_to_land_brings_everyone_down_at_once() {
 fn an_order_to_return_brings_a_vehicle_home() {
     let mut lockstep = Lockstep::new("open", None, 2);
     lockstep.run_until(seconds(8.0));
-    lockstep.swarm.order(&Order::Return(Who::Vehicle(lockstep.nodes[0].clone())));
+    lockstep.swarm.order(&Order::Return(Who::only(lockstep.nodes[0].clone())));
     lockstep.run_until(seconds(120.0));
     assert!(lockstep.swarm.is_grounded());
     let place = lockstep.swarm.simulation().vehicle(0).unwrap().motion.position;

@@ -1,12 +1,13 @@
 //! Mission: take off when told, fly the waypoints in turn, land.
 
 use serde::Serialize;
-use skein_bp::{BThread, Bid, Context, Event};
+use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_wire::vocabulary::{
     AIRBORNE, ARRIVED, COMMAND_FAILED, COMPLETE, FAILED, FOUND_AIRBORNE, GOTO, HAND_BACK, LAND, LANDED,
     ORDER, RETURN, TAKEOFF,
 };
 
+use crate::bthreads::OPERATOR_LEG;
 use crate::{me::Me, precedence};
 
 /// Requests one `goto` after another, then `land`, and says how the mission ended.
@@ -28,6 +29,10 @@ enum Phase {
         leg: usize,
     },
     Flying {
+        leg: usize,
+    },
+    /// An operator has sent the vehicle elsewhere; this leg comes next.
+    Diverted {
         leg: usize,
     },
     Descending {
@@ -75,15 +80,19 @@ impl BThread for Mission {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
         let ended_by_others = me.any_of(&[LAND, RETURN, LANDED]);
+        let diverted = me.any(GOTO).and(EventSet::field_is("leg", OPERATOR_LEG));
         let bid = Bid::new().priority(precedence::MISSION);
         Some(match &self.phase {
             Phase::Grounded => bid.wait_for(me.any_of(&[TAKEOFF, FOUND_AIRBORNE])),
             Phase::Found => bid.wait_for(me.any(ORDER)).wait_for(ended_by_others),
             Phase::Climbing => bid.wait_for(me.any_of(&[AIRBORNE, COMMAND_FAILED])).wait_for(ended_by_others),
             Phase::Heading { leg } => {
-                bid.request(self.waypoints.get(*leg)?.clone()).wait_for(ended_by_others)
+                bid.request(self.waypoints.get(*leg)?.clone()).wait_for(diverted).wait_for(ended_by_others)
             }
-            Phase::Flying { .. } => bid.wait_for(me.any(ARRIVED)).wait_for(ended_by_others),
+            Phase::Flying { .. } => {
+                bid.wait_for(me.any(ARRIVED)).wait_for(diverted).wait_for(ended_by_others)
+            }
+            Phase::Diverted { .. } => bid.wait_for(me.any(ORDER)).wait_for(ended_by_others),
             Phase::Descending { failure } => {
                 let why = failure.as_deref().unwrap_or("mission complete");
                 bid.request(me.because(LAND, why)).wait_for(ended_by_others)
@@ -111,6 +120,12 @@ impl BThread for Mission {
             (Phase::Climbing, COMMAND_FAILED) => Phase::Down { failure: Some(reason(event)) },
             (_, LAND | RETURN) => Phase::Landing { failure: Some(reason(event)) },
             (_, LANDED) => Phase::Down { failure: Some("the autopilot landed by itself".to_owned()) },
+            (Phase::Heading { leg } | Phase::Flying { leg }, GOTO)
+                if event.int("leg") == Some(OPERATOR_LEG) =>
+            {
+                Phase::Diverted { leg: *leg }
+            }
+            (Phase::Diverted { leg }, ORDER) if event.text("what") == Some("resume") => self.towards(*leg),
             (Phase::Heading { leg }, GOTO) => Phase::Flying { leg: *leg },
             (Phase::Flying { leg }, ARRIVED) if event.int("leg") == i64::try_from(*leg).ok() => {
                 self.towards(leg + 1)

@@ -6,7 +6,7 @@ use skein_wire::vocabulary::{ADVANCE, HAND_BACK, HOLD, LAND, ORDER, RETURN};
 
 use crate::{me::Me, precedence};
 
-/// Turns `order {what}` into the vehicle's own `hold`, `land`, `return` or `hand_back`; `resume` ends a hold.
+/// Turns `order {what}` into the vehicle's own `hold`, `land`, `return` or `hand_back`; `resume` and `goto` end a hold.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct Operator {
     me: Me,
@@ -53,6 +53,6 @@ impl BThread for Operator {
             "hand_back" => Some(self.me.event(HAND_BACK)),
             _ => None,
         };
-        self.holding = (self.holding && what != "resume") || what == "hold";
+        self.holding = (self.holding && !matches!(what, "resume" | "goto")) || what == "hold";
     }
 }

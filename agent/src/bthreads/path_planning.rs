@@ -1,11 +1,12 @@
-//! Path planning: every waypoint gets a path; a waypoint that has none ends the flight.
+//! Path planning: every waypoint gets a path; a waypoint that has none ends the flight, an operator's point does not.
 
 use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ARRIVED, GOTO, LAND, PLAN, PLANNED, UNPLANNABLE};
+use skein_wire::vocabulary::{ARRIVED, DECLINED, GOTO, LAND, PLAN, PLANNED, UNPLANNABLE};
 
+use crate::bthreads::OPERATOR_LEG;
 use crate::{me::Me, precedence};
 
 /// How often a waypoint without a path is tried again: the map may have held a ghost.
@@ -27,6 +28,7 @@ enum Phase {
     Computing { attempt: u8 },
     Pausing { attempt: u8, until: Duration },
     GivingUp { why: String },
+    Declining { why: String },
 }
 
 impl PathPlanning {
@@ -47,6 +49,7 @@ impl BThread for PathPlanning {
             Phase::Computing { .. } => bid.wait_for(me.any_of(&[PLANNED, UNPLANNABLE, ARRIVED])),
             Phase::Pausing { until, .. } => bid.wait_for(me.any(PLANNED)).deadline(*until),
             Phase::GivingUp { why } => bid.request(me.because(LAND, why)),
+            Phase::Declining { why } => bid.request(me.because(DECLINED, why).with("what", "goto")),
         })
     }
 
@@ -55,14 +58,16 @@ impl BThread for PathPlanning {
             Phase::Asking { attempt } | Phase::Computing { attempt } | Phase::Pausing { attempt, .. } => {
                 attempt
             }
-            Phase::Idle | Phase::GivingUp { .. } => 1,
+            Phase::Idle | Phase::GivingUp { .. } | Phase::Declining { .. } => 1,
         };
         self.phase = match self.me.verb(event) {
             Some(GOTO) => Phase::Asking { attempt: 1 },
             Some(PLAN) => Phase::Computing { attempt },
             Some(UNPLANNABLE) if attempt < ATTEMPTS => Phase::Pausing { attempt, until: cx.now() + PAUSE },
             Some(UNPLANNABLE) => {
-                Phase::GivingUp { why: event.text("why").unwrap_or("no path to the waypoint").to_owned() }
+                let why = event.text("why").unwrap_or("no path to the waypoint").to_owned();
+                let ordered = event.int("leg") == Some(OPERATOR_LEG);
+                if ordered { Phase::Declining { why } } else { Phase::GivingUp { why } }
             }
             None => Phase::Asking { attempt: attempt + 1 },
             Some(_) => Phase::Idle,

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_wire::vocabulary::{
-    ADVANCE, ENTER, GOTO, HAND_BACK, HOLD, HOMEWARD, LAND, PILOT, PLAN, RETURN, TAKEOFF,
+    ADVANCE, ENTER, GOTO, HAND_BACK, HOLD, HOMEWARD, LAND, PILOT, PLAN, RETURN, SLEPT, TAKEOFF,
 };
 
 use crate::{me::Me, precedence};
@@ -11,7 +11,8 @@ use crate::{me::Me, precedence};
 /// Everything that would move the vehicle.
 const MOVES: [&str; 9] = [TAKEOFF, GOTO, PLAN, ADVANCE, HOMEWARD, ENTER, HOLD, LAND, RETURN];
 
-/// Blocks every movement from a pilot's mode change until an operator hands the vehicle back.
+/// Blocks every movement, from a pilot's mode change or from waking up with a vehicle that somebody else had to look
+/// after meanwhile, until an operator hands the vehicle back.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct Pilot {
     me: Me,
@@ -32,11 +33,11 @@ impl BThread for Pilot {
         Some(if self.has_control {
             bid.wait_for(self.me.any(HAND_BACK)).block(self.me.any_of(&MOVES))
         } else {
-            bid.wait_for(self.me.any(PILOT))
+            bid.wait_for(self.me.any_of(&[PILOT, SLEPT]))
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
-        self.has_control = self.me.heard(event, PILOT);
+        self.has_control = !self.me.heard(event, HAND_BACK);
     }
 }

@@ -7,7 +7,7 @@ use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::NodeName;
 use skein_wire::vocabulary::{ADVANCE, of, of_every_vehicle};
 
-use crate::order::{Who, ordered};
+use crate::order::{is_for, ordered};
 
 /// Blocks `advance` of the vehicles that are to hold, from an order to hold until another order.
 ///
@@ -21,6 +21,9 @@ pub struct Hold {
 }
 
 impl Hold {
+    /// The name that this b-thread runs under: the core asks by it whose block is confirmed.
+    pub const NAME: &'static str = "hold";
+
     /// The b-thread of the ground station `ground` for its `vehicles`.
     #[must_use]
     pub fn new(ground: NodeName, vehicles: Vec<NodeName>) -> Self {
@@ -38,23 +41,17 @@ impl Hold {
 
 impl BThread for Hold {
     fn bid(&self) -> Option<Bid> {
-        let orders = ["hold", "resume", "land", "return"].map(|what| ordered(&self.ground, what));
+        let orders = ["hold", "resume", "land", "return", "goto"].map(|what| ordered(&self.ground, what));
         let bid = Bid::new().wait_for(EventSet::any_of(orders));
         Some(if self.held.is_empty() { bid } else { bid.block(self.block()) })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
-        let who = Who::of(event);
-        let concerned = |vehicle: &&NodeName| match &who {
-            Some(Who::All) => true,
-            Some(Who::Vehicle(name)) => name == *vehicle,
-            None => false,
-        };
         if event.text("what") == Some("hold") {
-            self.held.extend(self.vehicles.iter().filter(concerned).cloned());
+            self.held.extend(self.vehicles.iter().filter(|vehicle| is_for(event, vehicle)).cloned());
         } else {
-            // Whoever is ordered home or down must be free to move, like who is to go on.
-            self.held.retain(|vehicle| !concerned(&vehicle));
+            // Whoever is ordered elsewhere, home or down must be free to move, like who is to go on.
+            self.held.retain(|vehicle| !is_for(event, vehicle));
         }
     }
 }

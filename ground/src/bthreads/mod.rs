@@ -3,18 +3,20 @@
 //! Adding a b-thread: write its file, name it in [`load`].
 
 mod delivery;
+pub mod heard;
 mod hold;
 mod launch;
 mod muster;
+pub mod roll_call;
 mod watch;
 
 use skein_bp::Program;
-use skein_wire::vocabulary::TAKEOFF;
 
 pub use delivery::Delivery;
 pub use hold::Hold;
 pub use launch::Launch;
 pub use muster::Muster;
+pub use roll_call::RollCall;
 pub use watch::{MissionOutcome, Watch};
 
 use crate::GroundConfig;
@@ -22,15 +24,14 @@ use crate::GroundConfig;
 /// Loads the ground station's b-threads into its program.
 pub fn load(program: &mut Program, config: &GroundConfig) {
     let (ground, vehicles) = (&config.name, &config.vehicles);
-    program.add(TAKEOFF, Launch::new(ground.clone(), vehicles.clone()));
+    program.add("roll_call", RollCall::new(ground.clone(), vehicles.clone()));
+    program.add("launch", Launch::new(ground.clone(), config.launch_on_order));
     if config.muster {
         program.add("muster", Muster::new(ground.clone(), vehicles.iter().cloned()));
     }
-    program.add("hold", Hold::new(ground.clone(), vehicles.clone()));
+    program.add(Hold::NAME, Hold::new(ground.clone(), vehicles.clone()));
     program.add(Watch::NAME, Watch::new(ground.clone(), vehicles.iter().cloned()));
     for vehicle in vehicles {
-        for what in ["resume", "land", "return", "hand_back"] {
-            program.add(format!("{what} {vehicle}"), Delivery::new(ground.clone(), vehicle.clone(), what));
-        }
+        program.add(Delivery::name(vehicle), Delivery::new(ground.clone(), vehicle.clone()));
     }
 }

@@ -7,6 +7,7 @@ use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::{NodeName, facts, first_two_chunks};
 use skein_wire::vocabulary::{ADVANCE, AIRBORNE, FAILED, of_every_vehicle};
 
+use super::heard::{self, Situation};
 use crate::order::ordered_for_all;
 
 /// Blocks `uav/*/advance` until every vehicle is in the air, or will not be.
@@ -33,12 +34,17 @@ impl BThread for Muster {
         let arrived = EventSet::any_of([AIRBORNE, FAILED].map(of_every_vehicle));
         let lost = facts::of(&self.ground, facts::PEER_LOST);
         (!self.missing.is_empty()).then(|| {
-            Bid::new().block(of_every_vehicle(ADVANCE)).wait_for(arrived).wait_for(lost).interrupt(called_off)
+            let bid = Bid::new().block(of_every_vehicle(ADVANCE)).interrupt(called_off);
+            bid.wait_for(arrived).wait_for(lost).wait_for(heard::of(&self.ground))
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
-        let vehicle = event.text("node").or_else(|| first_two_chunks(event.name()));
+        let vehicle = match heard::read(event) {
+            Some((_, Situation::Grounded)) => return,
+            Some(_) => event.text("vehicle"),
+            None => event.text("node").or_else(|| first_two_chunks(event.name())),
+        };
         if let Some(vehicle) = vehicle {
             self.missing.remove(vehicle);
         }

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::{NodeName, first_two_chunks};
-use skein_wire::vocabulary::{COMPLETE, FAILED, LANDED, TAKEOFF, of_every_vehicle};
+use skein_wire::vocabulary::{AIRBORNE, COMPLETE, FAILED, LANDED, of_every_vehicle};
+
+use super::heard::{self, Situation};
 
 /// What each vehicle still owes: the outcome of its mission and, if it has flown, its landing.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -20,6 +22,18 @@ struct Progress {
     flying: bool,
     /// Done, or the reason why not.
     mission: Option<Result<(), String>>,
+}
+
+impl Progress {
+    /// The vehicle was there, and so far, before this station.
+    fn find(&mut self, situation: Situation, task: &str) {
+        self.flying = situation == Situation::Flying;
+        match situation {
+            Situation::Complete => self.mission = Some(Ok(())),
+            Situation::Failed => self.mission = Some(Err(task.to_owned())),
+            Situation::Grounded | Situation::Flying => {}
+        }
+    }
 }
 
 /// How a mission went.
@@ -69,8 +83,10 @@ impl BThread for Watch {
     fn bid(&self) -> Option<Bid> {
         Some(match self.outcome() {
             None => {
-                let news = [TAKEOFF, LANDED, COMPLETE, FAILED];
-                Bid::new().wait_for(EventSet::any_of(news.map(of_every_vehicle)))
+                let news = [AIRBORNE, LANDED, COMPLETE, FAILED];
+                Bid::new()
+                    .wait_for(EventSet::any_of(news.map(of_every_vehicle)))
+                    .wait_for(heard::of(&self.ground))
             }
             Some(outcome) if !self.told => Bid::new().request(
                 Event::new(self.ground.event_name("mission_over")).with("succeeded", outcome.succeeded()),
@@ -80,13 +96,19 @@ impl BThread for Watch {
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
+        if let Some((vehicle, situation)) = heard::read(event) {
+            if let Some(progress) = self.vehicles.get_mut(vehicle.as_str()) {
+                progress.find(situation, event.text("why").unwrap_or_default());
+            }
+            return;
+        }
         let home = first_two_chunks(event.name()).unwrap_or_default();
         let Some(progress) = self.vehicles.get_mut(home) else {
             self.told |= event.kind() == "mission_over";
             return;
         };
         match event.kind() {
-            TAKEOFF => progress.flying = true,
+            AIRBORNE => progress.flying = true,
             LANDED => progress.flying = false,
             COMPLETE => progress.mission = Some(Ok(())),
             _ => progress.mission = Some(Err(event.text("why").unwrap_or("no reason given").into())),

@@ -5,6 +5,7 @@ use foxglove::messages::{
     SpherePrimitive, TextPrimitive, Timestamp, Vector3 as Vector, line_primitive,
 };
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use skein_wire::{Form, Solid};
 
 use super::WORLD;
 
@@ -12,34 +13,6 @@ const OBSTACLE: Color = Color { r: 0.45, g: 0.36, b: 0.27, a: 1.0 };
 const TEXT: Color = Color { r: 1.0, g: 1.0, b: 1.0, a: 1.0 };
 const PATH_THICKNESS_M: f64 = 0.05;
 const TEXT_HEIGHT_M: f64 = 0.4;
-
-/// A body that stands in the world.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Solid {
-    /// Its form, centred on its origin.
-    pub form: Form,
-    /// Own frame to world ENU, metres.
-    pub pose: Isometry3<f64>,
-}
-
-/// The form of a body, metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Form {
-    /// A cuboid of this whole size.
-    Box(Vector3<f64>),
-    /// A cylinder about z.
-    Cylinder {
-        /// Radius of the round section.
-        radius: f64,
-        /// Whole length along z.
-        height: f64,
-    },
-    /// A ball.
-    Sphere {
-        /// Radius.
-        radius: f64,
-    },
-}
 
 /// All obstacles as one entity.
 pub fn obstacles(timestamp: Timestamp, solids: &[Solid]) -> SceneEntity {

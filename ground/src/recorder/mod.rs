@@ -29,10 +29,10 @@ use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 use nalgebra::{Isometry3, Vector3};
 use prost::Message;
+use skein_wire::Solid;
 use skein_wire::proto::TraceEvent;
 use thiserror::Error;
 
-pub use drawing::{Form, Solid};
 pub use foxglove::messages::log::Level;
 
 /// Simulated time that a chunk holds.

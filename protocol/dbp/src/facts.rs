@@ -30,7 +30,7 @@ pub const PEER_LOST: &str = "peer_lost";
 pub const STALLED: &str = "stalled";
 /// `event` is no longer stalled.
 pub const UNSTALLED: &str = "unstalled";
-/// Another process has this node's name, in this `incarnation`.
+/// Another process has this node's name, in this `incarnation`; told every few seconds while it goes on.
 pub const DUPLICATE_NAME: &str = "duplicate_name";
 /// `bthread` requests `event`, whose home is not in the roster.
 pub const UNROUTABLE: &str = "unroutable";

@@ -36,6 +36,11 @@ impl HeldBlocks {
         }
     }
 
+    /// The synchronisation point since which `bthread` blocks something elsewhere, and the homes it concerns.
+    pub(crate) fn get(&self, bthread: &str) -> Option<(u64, &[NodeName])> {
+        self.0.get(bthread).map(|held| (held.sync, &*held.homes))
+    }
+
     /// Forgets all b-threads but these, at these synchronisation points.
     pub(crate) fn retain(&mut self, stated: &BTreeMap<String, u64>) {
         self.0.retain(|bthread, held| stated.get(bthread) == Some(&held.sync));

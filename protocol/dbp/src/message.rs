@@ -3,6 +3,7 @@
 //! Bids travel as *state*: a lost, repeated or overtaken record does no harm, because the newest one says all.
 //! Occurrences travel as a numbered *stream* with a history behind it.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use skein_bp::{Event, EventSet};
@@ -198,6 +199,8 @@ pub struct Occurrence {
     pub event: Event,
     /// The remote requests it served.
     pub requests_served: Vec<ServedRequest>,
+    /// The b-threads that requested it, as the home names them: remote ones as `node#bthread`. For people.
+    pub requested_by: Vec<Arc<str>>,
     /// When, on the home's clock; for display only.
     pub at: Duration,
 }

@@ -30,6 +30,8 @@ const SWARM: &str = "swarm/";
 const RESTART_GUARD: &str = "restart guard";
 /// How often one step comes back to facts that its own selections have brought about.
 const MOST_ROUNDS: usize = 16;
+/// A node whose name another process has is told so again after this long, while that goes on.
+const REPEAT_DOUBLE: Duration = Duration::from_secs(2);
 /// How many of its own last presences a node can tell from another's.
 const PRESENCES_KNOWN: usize = 16;
 
@@ -114,7 +116,8 @@ pub struct Node {
     deliveries: VecDeque<Delivery>,
     presence_due: Duration,
     presences: VecDeque<Duration>,
-    doubles: BTreeSet<u64>,
+    /// When it was last told that another process has this node's name.
+    double_told: Option<Duration>,
     guarding: bool,
     seen_revision: Option<u64>,
     stalls_due: bool,
@@ -194,7 +197,7 @@ impl Node {
             deliveries: VecDeque::new(),
             presence_due: Duration::ZERO,
             presences: VecDeque::new(),
-            doubles: BTreeSet::new(),
+            double_told: None,
             guarding,
             seen_revision: None,
             stalls_due: true,
@@ -318,6 +321,19 @@ impl Node {
     #[must_use]
     pub fn stats(&self) -> NodeStats {
         self.stats
+    }
+
+    /// The other homes that the present block of `bthread` concerns, each with whether it surely keeps the block now.
+    pub fn kept_by(&self, bthread: &str) -> impl Iterator<Item = (&NodeName, bool)> {
+        let held = self.held.get(bthread);
+        let lease = self.config.lease;
+        held.into_iter().flat_map(|(sync, homes)| homes.iter().map(move |home| (home, sync))).map(
+            move |(home, sync)| {
+                let until =
+                    self.outboxes.get(home).and_then(|outbox| outbox.kept_until(bthread, sync, lease));
+                (home, until.is_some_and(|until| self.now < until))
+            },
+        )
     }
 
     /// Who requests, blocks and waits for the events of a set, and behind each remote b-thread its node and the age

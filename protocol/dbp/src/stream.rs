@@ -176,6 +176,7 @@ mod tests {
             seq,
             event: Event::new("uav/1/x"),
             requests_served: vec![],
+            requested_by: vec![],
             at: Duration::ZERO,
         }
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use skein_bp::{Event, EventSet, Pattern, Real, Value};
 use skein_dbp::{
     BidAck, BidRecord, NodeName, Occurrence, OnLoss, Presence, Refusal, RefusalReason, RemoteBid, Repair,
@@ -12,7 +12,7 @@ use skein_dbp::{
 };
 
 use crate::proto::{self, event_set, value::Kind};
-use crate::{DecodeError, State};
+use crate::{DecodeError, Form, MissionState, Scan, Scene, Solid, State};
 
 type Result<T> = std::result::Result<T, DecodeError>;
 
@@ -56,6 +56,14 @@ fn not_negative(field: &'static str, given: f64) -> Result<f64> {
     } else {
         Err(DecodeError::Range { field, given: given.to_string(), expected: "a finite number of at least 0" })
     }
+}
+
+fn vector(field: &'static str, v: &proto::Vec3) -> Result<Vector3<f64>> {
+    Ok(Vector3::new(finite(field, v.x)?, finite(field, v.y)?, finite(field, v.z)?))
+}
+
+fn at_most(field: &'static str, given: usize, most: usize, expected: &'static str) -> Result<()> {
+    if given <= most { Ok(()) } else { Err(DecodeError::Range { field, given: given.to_string(), expected }) }
 }
 
 impl From<&Value> for proto::Value {
@@ -332,6 +340,7 @@ impl From<&Occurrence> for proto::Occurrence {
             seq: occurrence.seq,
             event: Some((&occurrence.event).into()),
             requests_served: occurrence.requests_served.iter().map(served).collect(),
+            requested_by: occurrence.requested_by.iter().map(|name| name.as_ref().into()).collect(),
             at_ns: ns(occurrence.at),
         }
     }
@@ -355,6 +364,7 @@ impl TryFrom<proto::Occurrence> for Occurrence {
             seq: number("Occurrence.seq", occurrence.seq, 1)?,
             event: required("Occurrence.event", occurrence.event)?.try_into()?,
             requests_served: occurrence.requests_served.into_iter().map(served).collect::<Result<_>>()?,
+            requested_by: occurrence.requested_by.into_iter().map(Arc::from).collect(),
             at: Duration::from_nanos(occurrence.at_ns),
         })
     }
@@ -432,6 +442,12 @@ impl From<&State> for proto::State {
             task: state.task.clone(),
             waiting_for: state.waiting_for.clone(),
             path: state.path.iter().take(State::MAX_PATH).map(vector).collect(),
+            mission: match state.mission {
+                MissionState::UnderWay => proto::Mission::UnderWay,
+                MissionState::Complete => proto::Mission::Complete,
+                MissionState::Failed => proto::Mission::Failed,
+            }
+            .into(),
         }
     }
 }
@@ -440,13 +456,7 @@ impl TryFrom<proto::State> for State {
     type Error = DecodeError;
 
     fn try_from(state: proto::State) -> Result<Self> {
-        fn vector(field: &'static str, v: &proto::Vec3) -> Result<Vector3<f64>> {
-            Ok(Vector3::new(finite(field, v.x)?, finite(field, v.y)?, finite(field, v.z)?))
-        }
-        if state.path.len() > Self::MAX_PATH {
-            let given = format!("{} points long", state.path.len());
-            return Err(DecodeError::Range { field: "State.path", given, expected: "at most 32 points" });
-        }
+        at_most("State.path", state.path.len(), Self::MAX_PATH, "at most 32 points")?;
         if !(0.0..=1.0).contains(&state.battery) {
             let given = state.battery.to_string();
             return Err(DecodeError::Range {
@@ -470,6 +480,113 @@ impl TryFrom<proto::State> for State {
             task: state.task,
             waiting_for: state.waiting_for,
             path: state.path.iter().map(|point| vector("State.path", point)).collect::<Result<_>>()?,
+            // In a word of a later version, it is not over as far as this one can tell.
+            mission: match proto::Mission::try_from(state.mission).unwrap_or_default() {
+                proto::Mission::UnderWay => MissionState::UnderWay,
+                proto::Mission::Complete => MissionState::Complete,
+                proto::Mission::Failed => MissionState::Failed,
+            },
         })
+    }
+}
+
+impl From<&Scan> for proto::Scan {
+    fn from(scan: &Scan) -> Self {
+        Self {
+            measured_unix_ns: ns(scan.measured_at_unix),
+            angle_min: scan.angle_min,
+            angle_step: scan.angle_step,
+            max_range_m: scan.max_range_m,
+            ranges_m: scan.ranges_m.clone(),
+            up_m: scan.up_m,
+            down_m: scan.down_m,
+        }
+    }
+}
+
+impl TryFrom<proto::Scan> for Scan {
+    type Error = DecodeError;
+
+    fn try_from(scan: proto::Scan) -> Result<Self> {
+        at_most("Scan.ranges_m", scan.ranges_m.len(), Self::MAX_RAYS, "at most 4096 rays")?;
+        let range = |field, given: Option<f32>| match given {
+            Some(given) => not_negative(field, f64::from(given)).map(|_| Some(given)),
+            None => Ok(None),
+        };
+        Ok(Self {
+            measured_at_unix: Duration::from_nanos(scan.measured_unix_ns),
+            angle_min: finite("Scan.angle_min", scan.angle_min)?,
+            angle_step: finite("Scan.angle_step", scan.angle_step)?,
+            max_range_m: not_negative("Scan.max_range_m", scan.max_range_m)?,
+            ranges_m: scan.ranges_m,
+            up_m: range("Scan.up_m", scan.up_m)?,
+            down_m: range("Scan.down_m", scan.down_m)?,
+        })
+    }
+}
+
+impl From<&Scene> for proto::Scene {
+    fn from(scene: &Scene) -> Self {
+        Self {
+            min: Some(vec3(scene.min.x, scene.min.y, scene.min.z)),
+            max: Some(vec3(scene.max.x, scene.max.y, scene.max.z)),
+            solids: scene.solids.iter().take(Scene::MAX_SOLIDS).map(Into::into).collect(),
+        }
+    }
+}
+
+impl TryFrom<proto::Scene> for Scene {
+    type Error = DecodeError;
+
+    fn try_from(scene: proto::Scene) -> Result<Self> {
+        at_most("Scene.solids", scene.solids.len(), Self::MAX_SOLIDS, "at most 4096 bodies")?;
+        Ok(Self {
+            min: vector("Scene.min", &required("Scene.min", scene.min)?)?,
+            max: vector("Scene.max", &required("Scene.max", scene.max)?)?,
+            solids: scene.solids.into_iter().map(Solid::try_from).collect::<Result<_>>()?,
+        })
+    }
+}
+
+impl From<&Solid> for proto::Solid {
+    fn from(solid: &Solid) -> Self {
+        let (position, turn) = (&solid.pose.translation.vector, &solid.pose.rotation);
+        Self {
+            position: Some(vec3(position.x, position.y, position.z)),
+            orientation: Some(proto::Quaternion { x: turn.i, y: turn.j, z: turn.k, w: turn.w }),
+            form: Some(match solid.form {
+                Form::Box(size) => proto::solid::Form::Box(vec3(size.x, size.y, size.z)),
+                Form::Cylinder { radius, height } => {
+                    proto::solid::Form::Cylinder(proto::solid::Cylinder { radius, height })
+                }
+                Form::Sphere { radius } => proto::solid::Form::Sphere(radius),
+            }),
+        }
+    }
+}
+
+impl TryFrom<proto::Solid> for Solid {
+    type Error = DecodeError;
+
+    fn try_from(solid: proto::Solid) -> Result<Self> {
+        let form = match required("Solid.form", solid.form)? {
+            proto::solid::Form::Box(size) => Form::Box(vector("Solid.box", &size)?),
+            proto::solid::Form::Cylinder(cylinder) => Form::Cylinder {
+                radius: not_negative("Solid.cylinder.radius", cylinder.radius)?,
+                height: not_negative("Solid.cylinder.height", cylinder.height)?,
+            },
+            proto::solid::Form::Sphere(radius) => {
+                Form::Sphere { radius: not_negative("Solid.sphere", radius)? }
+            }
+        };
+        let position = vector("Solid.position", &required("Solid.position", solid.position)?)?;
+        let turn = required("Solid.orientation", solid.orientation)?;
+        let turn = Quaternion::new(turn.w, turn.x, turn.y, turn.z);
+        let turn = UnitQuaternion::try_new(turn, 1e-6).ok_or(DecodeError::Range {
+            field: "Solid.orientation",
+            given: "no rotation".into(),
+            expected: "a unit quaternion",
+        })?;
+        Ok(Self { form, pose: Isometry3::from_parts(Translation3::from(position), turn) })
     }
 }

@@ -73,6 +73,18 @@ pub enum Topic {
         /// The vehicle.
         node: NodeName,
     },
+    /// `scan/<sensor>/<vehicle>`: what a vehicle's lidar sees.
+    Scan {
+        /// The node that reads the lidar.
+        sensor: NodeName,
+        /// The vehicle.
+        vehicle: NodeName,
+    },
+    /// `scene/<node>`: what stands in a world.
+    Scene {
+        /// Who hosts the world.
+        node: NodeName,
+    },
 }
 
 /// A text that is not one of Skein's keys.
@@ -88,7 +100,7 @@ pub enum KeyError {
     },
     /// The key has another form.
     #[error(
-        "`{given}` is not a key: expected `{ROOT}/<fleet>/<what>/<node>`, `<what>` being bid, ack, occ, repair, presence or state, and a second node where it is for one"
+        "`{given}` is not a key: expected `{ROOT}/<fleet>/<what>/<node>`, `<what>` being bid, ack, occ, repair, presence, state, scan or scene, and a second node where it is for one"
     )]
     Form {
         /// The text at fault.
@@ -143,7 +155,9 @@ impl Key {
             | Topic::Occurrence { home: node, .. }
             | Topic::Repair { from: node, .. }
             | Topic::Presence { node }
-            | Topic::State { node } => node,
+            | Topic::State { node }
+            | Topic::Scan { sensor: node, .. }
+            | Topic::Scene { node } => node,
         }
     }
 
@@ -155,8 +169,27 @@ impl Key {
                 Some(node)
             }
             Topic::Occurrence { to, .. } => to.as_ref(),
-            Topic::Presence { .. } | Topic::State { .. } => None,
+            Topic::Scan { vehicle, .. } => Some(vehicle),
+            Topic::Presence { .. } | Topic::State { .. } | Topic::Scene { .. } => None,
         }
+    }
+
+    /// The pattern, in Zenoh's language, of all states.
+    #[must_use]
+    pub fn states(fleet: &Fleet) -> String {
+        format!("{ROOT}/{fleet}/state/*/*")
+    }
+
+    /// The pattern of all occurrences, as they happen.
+    #[must_use]
+    pub fn occurrences(fleet: &Fleet) -> String {
+        format!("{ROOT}/{fleet}/occ/*/*")
+    }
+
+    /// The pattern of all scenes.
+    #[must_use]
+    pub fn scenes(fleet: &Fleet) -> String {
+        format!("{ROOT}/{fleet}/scene/*/*")
     }
 
     /// The patterns, in Zenoh's language, of all keys that a node of this name wants to hear.
@@ -177,6 +210,8 @@ impl fmt::Display for Key {
             Topic::Repair { .. } => "repair",
             Topic::Presence { .. } => "presence",
             Topic::State { .. } => "state",
+            Topic::Scan { .. } => "scan",
+            Topic::Scene { .. } => "scene",
         };
         write!(f, "{ROOT}/{}/{what}/{}", self.fleet, self.sender())?;
         self.recipient().map_or(Ok(()), |node| write!(f, "/{node}"))
@@ -204,6 +239,8 @@ impl FromStr for Key {
             ("repair", Some(home)) => Topic::Repair { from: sender, home },
             ("presence", None) => Topic::Presence { node: sender },
             ("state", None) => Topic::State { node: sender },
+            ("scan", Some(vehicle)) => Topic::Scan { sensor: sender, vehicle },
+            ("scene", None) => Topic::Scene { node: sender },
             _ => return Err(form()),
         };
         Ok(Self { fleet: Fleet::new(fleet)?, topic })
@@ -226,9 +263,11 @@ mod tests {
             Topic::Ack { home: a.clone(), node: b.clone() },
             Topic::Occurrence { home: a.clone(), to: None },
             Topic::Occurrence { home: a.clone(), to: Some(b.clone()) },
-            Topic::Repair { from: a.clone(), home: b },
+            Topic::Repair { from: a.clone(), home: b.clone() },
             Topic::Presence { node: a.clone() },
-            Topic::State { node: a },
+            Topic::State { node: a.clone() },
+            Topic::Scan { sensor: b.clone(), vehicle: a.clone() },
+            Topic::Scene { node: a },
         ];
         let fleet = Fleet::new("demo").unwrap();
         for topic in topics {

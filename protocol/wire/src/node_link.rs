@@ -1,13 +1,17 @@
 //! A node coupled to its link.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use skein_dbp::{Message, Node, NodeError, NodeName, Recipient};
 
-use crate::{Fleet, Key, Link, Payload, State, Topic};
+use crate::{DecodeError, Fleet, Key, Link, Payload, State, Topic};
 
 /// How many messages one pump takes in, so that a flood cannot keep a node from going on.
 const MOST_PER_PUMP: usize = 4096;
+
+/// Of how many nodes it is remembered that they speak another version.
+const MOST_SKEWED: usize = 256;
 
 /// A node, its fleet, and what has come in beside the protocol: other vehicles' states.
 ///
@@ -19,6 +23,7 @@ pub struct NodeLink {
     fleet: Fleet,
     states: Vec<State>,
     stats: NodeLinkStats,
+    skewed: BTreeMap<NodeName, u32>,
 }
 
 /// What has come in that was not understood.
@@ -38,7 +43,7 @@ impl NodeLink {
     /// Couples `node` to its fleet.
     #[must_use]
     pub fn new(node: Node, fleet: Fleet) -> Self {
-        Self { node, fleet, states: Vec::new(), stats: NodeLinkStats::default() }
+        Self { node, fleet, states: Vec::new(), stats: NodeLinkStats::default(), skewed: BTreeMap::new() }
     }
 
     /// Takes in what has arrived, lets the node go on, and sends what it has to say.
@@ -91,13 +96,32 @@ impl NodeLink {
     pub fn receive(&mut self, now: Duration, link: &mut dyn Link) {
         for (key, payload) in std::iter::from_fn(|| link.poll()).take(MOST_PER_PUMP) {
             self.stats.received += 1;
-            match Payload::decode(&payload) {
+            let payload = Payload::decode(&payload);
+            self.note_version(key.sender(), &payload);
+            match payload {
                 Err(_) => self.stats.undecodable += 1,
                 Ok(payload) if !speaks_for_itself(&key, &payload) => self.stats.forged += 1,
                 Ok(Payload::State(state)) if state.node == *self.node.name() => {}
                 Ok(Payload::State(state)) => self.states.push(state),
                 Ok(Payload::Message(message)) => self.node.handle(now, message),
+                // Not for a node: a sensor's and a world's words have listeners of their own.
+                Ok(Payload::Scan(_) | Payload::Scene(_)) => self.stats.forged += 1,
             }
+        }
+    }
+
+    /// The nodes whose messages this build cannot read, each with the version it speaks.
+    pub fn skewed(&self) -> impl Iterator<Item = (&NodeName, u32)> {
+        self.skewed.iter().map(|(node, version)| (node, *version))
+    }
+
+    fn note_version(&mut self, sender: &NodeName, payload: &Result<Payload, DecodeError>) {
+        match payload {
+            Err(DecodeError::Version { given }) if self.skewed.len() < MOST_SKEWED => {
+                self.skewed.insert(sender.clone(), *given);
+            }
+            Err(_) => {}
+            Ok(_) => drop(self.skewed.remove(sender)),
         }
     }
 

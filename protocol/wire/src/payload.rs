@@ -3,7 +3,7 @@
 use prost::Message as _;
 use skein_dbp::Message;
 
-use crate::{DecodeError, State, proto};
+use crate::{DecodeError, Scan, Scene, State, proto};
 
 /// The version of the messages that this build writes, and the greatest that it reads.
 pub const VERSION: u32 = 1;
@@ -26,6 +26,10 @@ pub enum Payload {
     Message(Message),
     /// A vehicle's state.
     State(State),
+    /// What a vehicle's lidar sees.
+    Scan(Scan),
+    /// What stands in a world.
+    Scene(Scene),
 }
 
 impl Payload {
@@ -40,6 +44,8 @@ impl Payload {
             Self::Message(Message::Repair(repair)) => Body::Repair(repair.into()),
             Self::Message(Message::Presence(presence)) => Body::Presence(presence.into()),
             Self::State(state) => Body::State(state.into()),
+            Self::Scan(scan) => Body::Scan(scan.into()),
+            Self::Scene(scene) => Body::Scene(scene.into()),
         };
         proto::Packet { version: VERSION, body: Some(body) }.encode_to_vec()
     }
@@ -61,6 +67,8 @@ impl Payload {
             Body::Repair(repair) => Message::Repair(repair.try_into()?),
             Body::Presence(presence) => Message::Presence(presence.try_into()?),
             Body::State(state) => return Ok(Self::State(state.try_into()?)),
+            Body::Scan(scan) => return Ok(Self::Scan(scan.try_into()?)),
+            Body::Scene(scene) => return Ok(Self::Scene(scene.try_into()?)),
         };
         Ok(Self::Message(message))
     }

@@ -36,6 +36,20 @@ pub struct State {
     pub waiting_for: String,
     /// Points of the planned path, metres, for display; only the first [`State::MAX_PATH`] travel.
     pub path: Vec<Vector3<f64>>,
+    /// How far its mission is.
+    pub mission: MissionState,
+}
+
+/// How far a vehicle's mission is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MissionState {
+    /// Not over.
+    #[default]
+    UnderWay,
+    /// It did what it was sent for, and stands on the ground.
+    Complete,
+    /// It did not, and stands on the ground; its task says why.
+    Failed,
 }
 
 impl State {
@@ -60,6 +74,7 @@ impl State {
             task: String::new(),
             waiting_for: String::new(),
             path: Vec::new(),
+            mission: MissionState::default(),
         }
     }
 }

@@ -24,7 +24,8 @@ pub fn of_every_vehicle(verb: &str) -> EventSet {
     EventSet::from(format!("uav/*/{verb}"))
 }
 
-/// An operator's order to one vehicle: `what` is `hold`, `resume`, `land`, `return` or `hand_back`.
+/// An operator's order to one vehicle: `what` is `hold`, `resume`, `land`, `return`, `hand_back`, or `goto` with `x`, `y`,
+/// `z` beside it.
 #[must_use]
 pub fn order(node: impl std::fmt::Display, what: &str) -> Event {
     event(node, ORDER).with("what", what)
@@ -54,6 +55,8 @@ pub const LAND: &str = "land";
 pub const ORDER: &str = "order";
 /// An operator gives the vehicle back to its agent after a pilot had it.
 pub const HAND_BACK: &str = "hand_back";
+/// An order is not carried out: data `what`, `why` (texts).
+pub const DECLINED: &str = "declined";
 /// The mission is complete and the vehicle is on the ground.
 pub const COMPLETE: &str = "complete";
 /// The mission ended without reaching its goal: data `why` (text).
@@ -91,17 +94,21 @@ pub const BATTERY_CRITICAL: &str = "battery_critical";
 pub const FENCE_BREACHED: &str = "fence_breached";
 /// Somebody else changed the flight mode: data `mode` (text).
 pub const PILOT: &str = "pilot";
+/// The agent did not run for `seconds` (real), too long for what it knew and what it had said to count.
+pub const SLEPT: &str = "slept";
 /// The agent started while its vehicle was in the air.
 pub const FOUND_AIRBORNE: &str = "found_airborne";
 /// The autopilot refused or never answered a command: data `why` (text).
 pub const COMMAND_FAILED: &str = "command_failed";
 
 /// What only the vehicle itself can say or decide: from afar these are neither blocked nor requested (G6).
-pub const OWN: [&str; 25] = [
+pub const OWN: [&str; 27] = [
     HOLD,
     RETURN,
     LAND,
     HAND_BACK,
+    DECLINED,
+    SLEPT,
     HOMEWARD,
     PLAN,
     LEAVE,

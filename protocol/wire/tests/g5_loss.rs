@@ -100,7 +100,7 @@ fn a_process_that_takes_a_name_in_use_is_noticed_by_both() {
     let other = skein_dbp::Node::new(swarm.config("uav/1", 4), program(1));
     let mut other = skein_wire::NodeLink::new(other, skein_wire::Fleet::new("test").unwrap());
     let mut link = swarm.network.join(&name("uav/1"));
-    for _ in 0..100 {
+    for _ in 0..50 {
         swarm.tick();
         other.pump(swarm.now, &mut link).unwrap();
     }

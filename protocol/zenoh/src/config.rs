@@ -1,22 +1,23 @@
-//! Where a session listens and connects.
+//! How a session is joined to others, and where.
 
 use std::net::{IpAddr, TcpListener};
+use std::path::{Path, PathBuf};
 
+use serde::Deserialize;
 use skein_wire::Fleet;
 
 use crate::ZenohError;
 
+/// Longest message that Zenoh puts together from its fragments, in bytes: more than any that Skein reads.
+const MOST_REASSEMBLED: usize = 16 << 20;
+
 /// What a [`ZenohSession`](crate::ZenohSession) is told when it opens.
-///
-/// Nothing is found by multicast: who is to be reached is named. Endpoints are Zenoh's, `tcp/127.0.0.1:7447`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ZenohConfig {
     /// The fleet; sessions of other fleets are not heard.
     pub fleet: Fleet,
-    /// Where others may connect; port 0 is any free one, see [`ZenohSession::locators`](crate::ZenohSession::locators).
-    pub listen: Vec<String>,
-    /// Whom to connect to, again and again until it is there.
-    pub connect: Vec<String>,
+    /// How it is joined to others, and where.
+    pub network: NetworkSettings,
     /// How many messages may wait to be put. Beyond, new ones are dropped: bids and states are repeated anyway,
     /// occurrences are repaired.
     pub outgoing_capacity: usize,
@@ -24,35 +25,139 @@ pub struct ZenohConfig {
     pub incoming_capacity: usize,
 }
 
-impl ZenohConfig {
-    /// A session of `fleet` that listens on a free port of the loopback interface.
-    #[must_use]
-    pub fn new(fleet: Fleet) -> Self {
+/// The table `[network]` of a node's configuration file.
+///
+/// Nothing is found by multicast: who is to be reached is named, and peers then tell each other of further ones.
+/// Endpoints are Zenoh's: `tcp/127.0.0.1:7447`, or `tls/192.168.1.4:7447` where [`Security`] is configured.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct NetworkSettings {
+    /// How it takes part.
+    pub mode: Mode,
+    /// Where others may connect; port 0 is any free one, see [`ZenohSession::locators`](crate::ZenohSession::locators).
+    /// A client listens nowhere.
+    pub listen: Vec<String>,
+    /// Whom to connect to, again and again until it is there.
+    pub connect: Vec<String>,
+    /// Who belongs to the fleet. Without it, only the loopback interface is used.
+    pub security: Option<Security>,
+}
+
+/// How a session takes part in the network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// Talks to every other peer directly; relays nothing. Nobody's loss cuts others off.
+    #[default]
+    Peer,
+    /// Talks through one router: `zenohd`, or a node in router mode.
+    Client,
+    /// Relays for others.
+    Router,
+}
+
+/// Certificates, as PEM files: whoever has one of this authority is a member, and all that travels is encrypted.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Security {
+    /// The authority's certificate.
+    pub authority: PathBuf,
+    /// This node's certificate, for the host names by which others connect to it.
+    pub certificate: PathBuf,
+    /// Its private key.
+    pub key: PathBuf,
+}
+
+impl Default for NetworkSettings {
+    /// A peer on a free port of the loopback interface.
+    fn default() -> Self {
         Self {
-            fleet,
+            mode: Mode::default(),
             listen: vec!["tcp/127.0.0.1:0".into()],
             connect: Vec::new(),
-            outgoing_capacity: 4096,
-            incoming_capacity: 4096,
+            security: None,
         }
+    }
+}
+
+impl ZenohConfig {
+    /// A session of `fleet` that is joined to others as `network` says.
+    #[must_use]
+    pub fn new(fleet: Fleet, network: NetworkSettings) -> Self {
+        Self { fleet, network, outgoing_capacity: 4096, incoming_capacity: 4096 }
+    }
+}
+
+impl NetworkSettings {
+    /// A peer that listens on a free port of the loopback interface and connects to these endpoints.
+    #[must_use]
+    pub fn connected_to(connect: Vec<String>) -> Self {
+        Self { connect, ..Self::default() }
+    }
+
+    /// The same, with its files' paths relative to `folder`: that of the configuration file.
+    #[must_use]
+    pub fn relative_to(mut self, folder: &Path) -> Self {
+        if let Some(security) = &mut self.security {
+            for path in [&mut security.authority, &mut security.certificate, &mut security.key] {
+                *path = folder.join(&*path);
+            }
+        }
+        self
     }
 
     /// Zenoh's own configuration, with the endpoints that are listened on in the end.
     pub(crate) fn to_zenoh(&self) -> Result<(zenoh::Config, Vec<String>), ZenohError> {
-        self.connect.iter().try_for_each(|endpoint| loopback_host(endpoint).map(|_| ()))?;
-        let listen = self.listen.iter().map(|endpoint| with_port(endpoint)).collect::<Result<Vec<_>, _>>()?;
-        let mut config = zenoh::Config::default();
-        for (key, value) in [
-            ("mode", r#""peer""#.to_owned()),
+        for endpoint in &self.connect {
+            Endpoint::parse(endpoint)?.check(self.security.is_some())?;
+        }
+        let (mode, listen) = match self.mode {
+            Mode::Peer => ("peer", self.listen()?),
+            Mode::Router => ("router", self.listen()?),
+            Mode::Client if self.connect.is_empty() => return Err(ZenohError::ClientOfNobody),
+            Mode::Client => ("client", Vec::new()),
+        };
+        let mut settings = vec![
+            ("mode", format!("{mode:?}")),
             ("scouting/multicast/enabled", "false".into()),
             // Without multicast there is nothing to wait for at opening.
             ("scouting/delay", "0".into()),
-            ("listen/endpoints", json_list(&listen)),
-            ("connect/endpoints", json_list(&self.connect)),
-        ] {
+            ("listen/endpoints", json(&listen)),
+            ("connect/endpoints", json(&self.connect)),
+            // Who is not there yet is tried again and again, while the node goes on.
+            ("connect/timeout_ms", "-1".into()),
+            ("connect/exit_on_failure", "false".into()),
+            (
+                "connect/retry",
+                "{ period_init_ms: 200, period_max_ms: 1000, period_increase_factor: 1.5 }".into(),
+            ),
+            ("transport/link/rx/max_message_size", MOST_REASSEMBLED.to_string()),
+        ];
+        if let Some(Security { authority, certificate, key }) = &self.security {
+            settings.extend([
+                ("transport/link/tls/root_ca_certificate", json(authority)),
+                ("transport/link/tls/listen_certificate", json(certificate)),
+                ("transport/link/tls/listen_private_key", json(key)),
+                ("transport/link/tls/connect_certificate", json(certificate)),
+                ("transport/link/tls/connect_private_key", json(key)),
+                ("transport/link/tls/enable_mtls", "true".into()),
+            ]);
+        }
+        let mut config = zenoh::Config::default();
+        for (key, value) in settings {
             config.insert_json5(key, &value).map_err(|source| ZenohError::Config { key, value, source })?;
         }
         Ok((config, listen))
+    }
+
+    /// Where to listen, with free ports in the place of 0, so that they are known before anyone asks for them.
+    fn listen(&self) -> Result<Vec<String>, ZenohError> {
+        let with_port = |endpoint: &String| {
+            let parsed = Endpoint::parse(endpoint)?;
+            parsed.check(self.security.is_some())?;
+            parsed.with_port()
+        };
+        self.listen.iter().map(with_port).collect()
     }
 
     /// Whether opening again may find another free port.
@@ -61,52 +166,76 @@ impl ZenohConfig {
     }
 }
 
-/// The host and port of a TCP endpoint on the loopback interface. Others are refused, since nothing secures them yet.
-fn loopback_host(endpoint: &str) -> Result<(&str, u16), ZenohError> {
-    let bad = || ZenohError::Endpoint { endpoint: endpoint.into() };
-    let (host, port) =
-        endpoint.strip_prefix("tcp/").and_then(|address| address.rsplit_once(':')).ok_or_else(bad)?;
-    let port = port.parse().map_err(|_| bad())?;
-    let address = host.strip_prefix('[').and_then(|host| host.strip_suffix(']')).unwrap_or(host);
-    let loopback = match address.parse::<IpAddr>() {
-        Ok(address) => address.is_loopback(),
-        Err(_) if host.is_empty() => return Err(bad()),
-        Err(_) => address == "localhost",
-    };
-    if loopback { Ok((host, port)) } else { Err(ZenohError::NotLoopback { endpoint: endpoint.into() }) }
+/// `tcp/127.0.0.1:7447`, in its parts.
+struct Endpoint<'a> {
+    text: &'a str,
+    encrypted: bool,
+    host: &'a str,
+    port: u16,
 }
 
-/// The endpoint with a free port in the place of 0, so that it is known before anyone asks for it.
-fn with_port(endpoint: &str) -> Result<String, ZenohError> {
-    let (host, port) = loopback_host(endpoint)?;
-    if port != 0 {
-        return Ok(endpoint.into());
+impl<'a> Endpoint<'a> {
+    fn parse(text: &'a str) -> Result<Self, ZenohError> {
+        let bad = || ZenohError::Endpoint { endpoint: text.into() };
+        let (protocol, address) = text.split_once('/').ok_or_else(bad)?;
+        let encrypted = match protocol {
+            "tcp" => false,
+            "tls" => true,
+            _ => return Err(bad()),
+        };
+        let (host, port) = address.rsplit_once(':').filter(|(host, _)| !host.is_empty()).ok_or_else(bad)?;
+        Ok(Self { text, encrypted, host, port: port.parse().map_err(|_| bad())? })
     }
-    let free = TcpListener::bind(format!("{host}:0")).and_then(|listener| listener.local_addr());
-    let free = free.map_err(|source| ZenohError::NoPort { endpoint: endpoint.into(), source })?;
-    Ok(format!("tcp/{host}:{}", free.port()))
+
+    fn is_loopback(&self) -> bool {
+        let bare = self.host.strip_prefix('[').and_then(|host| host.strip_suffix(']')).unwrap_or(self.host);
+        bare.parse::<IpAddr>().map_or(bare == "localhost", |address| address.is_loopback())
+    }
+
+    /// What others could reach, or what leads to others, needs something to tell friend from foe.
+    fn check(&self, secured: bool) -> Result<(), ZenohError> {
+        match (self.encrypted, secured) {
+            (true, true) => Ok(()),
+            (true, false) => Err(ZenohError::NoCertificates { endpoint: self.text.into() }),
+            (false, _) if self.is_loopback() => Ok(()),
+            (false, _) => Err(ZenohError::NotLoopback { endpoint: self.text.into() }),
+        }
+    }
+
+    fn with_port(&self) -> Result<String, ZenohError> {
+        if self.port != 0 {
+            return Ok(self.text.into());
+        }
+        let free = TcpListener::bind(format!("{}:0", self.host)).and_then(|listener| listener.local_addr());
+        let free = free.map_err(|source| ZenohError::NoPort { endpoint: self.text.into(), source })?;
+        let protocol = if self.encrypted { "tls" } else { "tcp" };
+        Ok(format!("{protocol}/{}:{}", self.host, free.port()))
+    }
 }
 
-/// Endpoints have passed [`loopback_host`], so they hold nothing that would need an escape.
-fn json_list(endpoints: &[String]) -> String {
-    let quoted: Vec<String> = endpoints.iter().map(|endpoint| format!("\"{endpoint}\"")).collect();
-    format!("[{}]", quoted.join(","))
+/// A value in the language of Zenoh's configuration, of which Rust's quoted text is a part here.
+fn json(value: &impl std::fmt::Debug) -> String {
+    format!("{value:?}")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn check(endpoint: &str, secured: bool) -> Result<(), ZenohError> {
+        Endpoint::parse(endpoint)?.check(secured)
+    }
+
     #[test]
     fn only_loopback_is_accepted_without_security() {
         for fine in ["tcp/127.0.0.1:7447", "tcp/127.9.9.9:1", "tcp/[::1]:0", "tcp/localhost:7447"] {
-            assert!(loopback_host(fine).is_ok(), "{fine} was refused");
+            assert!(check(fine, false).is_ok(), "{fine} was refused");
         }
         for open in ["tcp/0.0.0.0:7447", "tcp/[::]:0", "tcp/192.168.1.4:7447", "tcp/example.org:7447"] {
-            assert!(
-                matches!(loopback_host(open), Err(ZenohError::NotLoopback { .. })),
-                "{open} was accepted"
-            );
+            for secured in [false, true] {
+                let outcome = check(open, secured);
+                assert!(matches!(outcome, Err(ZenohError::NotLoopback { .. })), "{open} was accepted");
+            }
         }
         for bad in [
             "",
@@ -118,13 +247,36 @@ mod tests {
             "tcp/127.0.0.1:x",
             "tcp/127.0.0.1:1#iface=eth0",
         ] {
-            assert!(matches!(loopback_host(bad), Err(ZenohError::Endpoint { .. })), "{bad} was accepted");
+            assert!(matches!(check(bad, true), Err(ZenohError::Endpoint { .. })), "{bad} was accepted");
         }
     }
 
     #[test]
+    fn encrypted_links_need_certificates_and_may_lead_anywhere() {
+        assert!(check("tls/192.168.1.4:7447", true).is_ok());
+        let without = check("tls/192.168.1.4:7447", false);
+        assert!(matches!(without, Err(ZenohError::NoCertificates { .. })));
+    }
+
+    #[test]
     fn a_port_is_chosen_before_opening() {
-        let endpoint = with_port("tcp/127.0.0.1:0").unwrap();
+        let endpoint = Endpoint::parse("tcp/127.0.0.1:0").unwrap().with_port().unwrap();
         assert!(endpoint.starts_with("tcp/127.0.0.1:") && !endpoint.ends_with(":0"), "{endpoint}");
+    }
+
+    #[test]
+    fn a_client_needs_somebody_to_connect_to() {
+        let alone = NetworkSettings { mode: Mode::Client, ..NetworkSettings::default() };
+        assert!(matches!(alone.to_zenoh(), Err(ZenohError::ClientOfNobody)));
+    }
+
+    #[test]
+    fn the_table_is_read_and_a_wrong_word_in_it_is_named() {
+        let settings: NetworkSettings =
+            toml::from_str("mode = \"client\"\nconnect = [\"tcp/127.0.0.1:7447\"]").unwrap();
+        assert_eq!(settings.mode, Mode::Client);
+        let error = toml::from_str::<NetworkSettings>("mode = \"pear\"").unwrap_err().to_string();
+        assert!(error.contains("line 1") && error.contains("`peer`"), "{error}");
+        assert!(toml::from_str::<NetworkSettings>("lisen = []").is_err());
     }
 }

@@ -4,19 +4,32 @@
 #[derive(Debug, thiserror::Error)]
 pub enum ZenohError {
     /// An endpoint of another form.
-    #[error("`{endpoint}` is not an endpoint: expected `tcp/<address>:<port>`, such as `tcp/127.0.0.1:7447`")]
+    #[error(
+        "`{endpoint}` is not an endpoint: expected `tcp/<address>:<port>` or `tls/<address>:<port>`, such as `tcp/127.0.0.1:7447`"
+    )]
     Endpoint {
         /// The text at fault.
         endpoint: String,
     },
     /// An endpoint that others could reach, or that leads to others, with nothing to tell friend from foe.
     #[error(
-        "`{endpoint}` is not on the loopback interface: without security configured, only `127.0.0.1`, `[::1]` and `localhost` are accepted"
+        "`{endpoint}` is not on the loopback interface, where only `tls/` is accepted: configure `[network.security]`, or use `127.0.0.1`, `[::1]` or `localhost`"
     )]
     NotLoopback {
         /// The endpoint at fault.
         endpoint: String,
     },
+    /// An encrypted endpoint without certificates.
+    #[error(
+        "`{endpoint}` needs certificates: configure `authority`, `certificate` and `key` under `[network.security]`"
+    )]
+    NoCertificates {
+        /// The endpoint at fault.
+        endpoint: String,
+    },
+    /// A client with no router to connect to.
+    #[error("`mode = \"client\"` needs a router to connect to: name its endpoint in `connect`")]
+    ClientOfNobody,
     /// The system gives no port.
     #[error("no free port for `{endpoint}`: {source}")]
     NoPort {

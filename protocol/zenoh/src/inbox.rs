@@ -4,47 +4,86 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use skein_wire::Key;
+use skein_wire::{Key, MAX_PAYLOAD};
+
+use crate::Bell;
+
+/// How many bytes may wait at a link, however few messages they are.
+const MOST_BYTES: usize = 64 << 20;
 
 /// A bounded ring: when it is full, the oldest message makes room, because newer ones supersede it.
 #[derive(Debug)]
 pub(crate) struct Inbox {
-    messages: Mutex<VecDeque<(Key, Vec<u8>)>>,
+    waiting: Mutex<Waiting>,
     capacity: usize,
+    /// Rung when a message has come.
+    pub(crate) bell: Bell,
     pub(crate) received: AtomicU64,
     pub(crate) dropped: AtomicU64,
     pub(crate) misnamed: AtomicU64,
+    pub(crate) oversized: AtomicU64,
+}
+
+#[derive(Debug, Default)]
+struct Waiting {
+    messages: VecDeque<(Key, Vec<u8>)>,
+    bytes: usize,
+}
+
+impl Waiting {
+    fn pop(&mut self) -> Option<(Key, Vec<u8>)> {
+        let message = self.messages.pop_front()?;
+        self.bytes -= message.1.len();
+        Some(message)
+    }
 }
 
 impl Inbox {
     pub(crate) fn new(capacity: usize) -> Self {
         Self {
-            messages: Mutex::new(VecDeque::new()),
+            waiting: Mutex::default(),
             capacity,
+            bell: Bell::default(),
             received: AtomicU64::new(0),
             dropped: AtomicU64::new(0),
             misnamed: AtomicU64::new(0),
+            oversized: AtomicU64::new(0),
         }
     }
 
-    /// Takes in a message under a key of Skein's; others are counted.
-    pub(crate) fn push(&self, key: &str, payload: impl FnOnce() -> Vec<u8>) {
-        self.received.fetch_add(1, Ordering::Relaxed);
+    /// Takes in a message of `bytes` under a key of Skein's; others, and those that are too long, are counted and not
+    /// even copied.
+    pub(crate) fn push(&self, key: &str, bytes: usize, payload: impl FnOnce() -> Vec<u8>) {
+        let count = |counter: &AtomicU64| counter.fetch_add(1, Ordering::Relaxed);
+        count(&self.received);
         let Ok(key) = key.parse() else {
-            self.misnamed.fetch_add(1, Ordering::Relaxed);
+            count(&self.misnamed);
             return;
         };
-        let payload = payload();
-        let mut messages = self.messages.lock().unwrap_or_else(PoisonError::into_inner);
-        if messages.len() == self.capacity {
-            messages.pop_front();
-            self.dropped.fetch_add(1, Ordering::Relaxed);
+        if bytes > MAX_PAYLOAD {
+            count(&self.oversized);
+            return;
         }
-        messages.push_back((key, payload));
+        let payload = payload();
+        let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
+        while waiting.messages.len() >= self.capacity || waiting.bytes + payload.len() > MOST_BYTES {
+            if waiting.pop().is_none() {
+                break;
+            }
+            count(&self.dropped);
+        }
+        waiting.bytes += payload.len();
+        waiting.messages.push_back((key, payload));
+        drop(waiting);
+        self.bell.ring();
     }
 
     pub(crate) fn pop(&self) -> Option<(Key, Vec<u8>)> {
-        self.messages.lock().unwrap_or_else(PoisonError::into_inner).pop_front()
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner).pop()
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner).messages.is_empty()
     }
 }
 
@@ -52,16 +91,34 @@ impl Inbox {
 mod tests {
     use super::*;
 
+    const KEY: &str = "skein/demo/state/uav/1";
+
+    fn read(counter: &AtomicU64) -> u64 {
+        counter.load(Ordering::Relaxed)
+    }
+
     #[test]
     fn the_oldest_makes_room_and_strange_keys_are_counted() {
         let inbox = Inbox::new(2);
         for byte in 0..3 {
-            inbox.push("skein/demo/state/uav/1", || vec![byte]);
+            inbox.push(KEY, 1, || vec![byte]);
         }
-        inbox.push("elsewhere", || panic!("the payload of a strange key was read"));
-        let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        inbox.push("elsewhere", 1, || panic!("the payload of a strange key was read"));
         assert_eq!((read(&inbox.received), read(&inbox.dropped), read(&inbox.misnamed)), (4, 1, 1));
         let payloads: Vec<_> = std::iter::from_fn(|| inbox.pop()).map(|(_, payload)| payload).collect();
         assert_eq!(payloads, [vec![1], vec![2]]);
+    }
+
+    #[test]
+    fn neither_one_long_message_nor_many_fill_the_memory() {
+        let inbox = Inbox::new(1 << 20);
+        inbox.push(KEY, MAX_PAYLOAD + 1, || panic!("a payload that is too long was read"));
+        assert_eq!(read(&inbox.oversized), 1);
+        for _ in 0..80 {
+            inbox.push(KEY, MAX_PAYLOAD, || vec![0; MAX_PAYLOAD]);
+        }
+        let kept: usize = std::iter::from_fn(|| inbox.pop()).map(|(_, payload)| payload.len()).sum();
+        assert_eq!(kept, MOST_BYTES);
+        assert!(inbox.is_empty() && inbox.bell.wait(std::time::Duration::ZERO));
     }
 }

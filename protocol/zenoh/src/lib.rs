@@ -7,25 +7,32 @@
 //!
 //! Several nodes of one process share a session; other processes connect to its [`locators`](ZenohSession::locators).
 //! Without security configured, only the loopback interface is used, and nothing is announced by multicast.
+//! [`next_incarnation`] is the number by which others tell a node's lives apart.
 //!
 //! ```
 //! use skein_wire::{Fleet, NodeName};
-//! use skein_zenoh::{ZenohConfig, ZenohSession};
+//! use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohSession};
 //!
-//! let session = ZenohSession::open(ZenohConfig::new(Fleet::new("demo")?))?;
+//! let session = ZenohSession::open(ZenohConfig::new(Fleet::new("demo")?, NetworkSettings::default()))?;
 //! let link = session.link(&NodeName::new("uav/1")?)?;
 //! assert!(session.locators()[0].starts_with("tcp/127.0.0.1:"));
 //! assert_eq!(link.stats().received, 0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bell;
+mod complaints;
 mod config;
 mod error;
 mod inbox;
+mod incarnation;
 mod link;
 mod session;
 
-pub use config::ZenohConfig;
+pub use bell::Bell;
+pub use complaints::Complaints;
+pub use config::{Mode, NetworkSettings, Security, ZenohConfig};
 pub use error::ZenohError;
+pub use incarnation::{IncarnationError, next_incarnation};
 pub use link::{ZenohLink, ZenohLinkStats};
 pub use session::{ZenohSession, ZenohStats};

@@ -5,8 +5,8 @@ use std::sync::atomic::Ordering;
 
 use skein_wire::{Key, Link};
 
-use crate::ZenohSession;
 use crate::inbox::Inbox;
+use crate::{Bell, ZenohSession};
 
 /// One node's link over a [`ZenohSession`]. It never waits.
 #[derive(Debug)]
@@ -25,11 +25,25 @@ pub struct ZenohLinkStats {
     pub dropped: u64,
     /// Messages under keys that are none of Skein's.
     pub misnamed: u64,
+    /// Messages longer than any may be.
+    pub oversized: u64,
 }
 
 impl ZenohLink {
     pub(crate) fn new(session: ZenohSession, port: u64, inbox: Arc<Inbox>) -> Self {
         Self { session, port, inbox }
+    }
+
+    /// Rings when a message has arrived.
+    #[must_use]
+    pub fn bell(&self) -> Bell {
+        self.inbox.bell.clone()
+    }
+
+    /// Whether no message waits to be taken.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.inbox.is_empty()
     }
 
     /// What has arrived so far.
@@ -39,6 +53,7 @@ impl ZenohLink {
             received: self.inbox.received.load(Ordering::Relaxed),
             dropped: self.inbox.dropped.load(Ordering::Relaxed),
             misnamed: self.inbox.misnamed.load(Ordering::Relaxed),
+            oversized: self.inbox.oversized.load(Ordering::Relaxed),
         }
     }
 }

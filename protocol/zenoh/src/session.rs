@@ -72,7 +72,7 @@ impl ZenohSession {
     /// That it opens does not mean that it is connected: see [`connected_peers`](Self::connected_peers).
     ///
     /// # Errors
-    /// [`ZenohError`] when an endpoint is not on the loopback interface, cannot be listened on, or is none.
+    /// [`ZenohError`] when an endpoint is none, cannot be listened on, or could reach others without security.
     pub fn open(config: ZenohConfig) -> Result<Self, ZenohError> {
         let counters = Arc::new(Counters::default());
         let (commands, queue) = sync_channel(config.outgoing_capacity.max(1));
@@ -106,9 +106,16 @@ impl ZenohSession {
     /// # Errors
     /// [`ZenohError::Subscribe`] when Zenoh does not let it listen.
     pub fn link(&self, node: &NodeName) -> Result<ZenohLink, ZenohError> {
+        self.listen(Key::subscriptions(&self.0.fleet, node))
+    }
+
+    /// A link that hears what is put under keys of these patterns: a sensor's scans, a world's scene.
+    ///
+    /// # Errors
+    /// [`ZenohError::Subscribe`] names the pattern at fault.
+    pub fn listen(&self, patterns: Vec<String>) -> Result<ZenohLink, ZenohError> {
         let port = self.0.next_port.fetch_add(1, Ordering::Relaxed);
         let inbox = Arc::new(Inbox::new(self.0.incoming_capacity));
-        let patterns = Key::subscriptions(&self.0.fleet, node);
         let (answer, joined) = sync_channel(1);
         self.ask(Command::Join { port, patterns, inbox: inbox.clone(), answer })?;
         joined.recv().map_err(|_| ZenohError::ThreadGone)??;
@@ -179,9 +186,9 @@ impl Drop for Shared {
 }
 
 fn open(config: &ZenohConfig) -> Result<(zenoh::Session, Vec<String>), ZenohError> {
-    let mut tries = if config.chooses_port() { OPENING_TRIES } else { 1 };
+    let mut tries = if config.network.chooses_port() { OPENING_TRIES } else { 1 };
     loop {
-        let (zenoh_config, listen) = config.to_zenoh()?;
+        let (zenoh_config, listen) = config.network.to_zenoh()?;
         tries -= 1;
         match zenoh::open(zenoh_config).wait() {
             Ok(session) => return Ok((session, listen)),
@@ -241,7 +248,8 @@ fn subscribe(
     let (own, inbox) = (mark(session, port), inbox.clone());
     let heard = move |sample: zenoh::sample::Sample| {
         if sample.attachment().is_none_or(|mark| *mark.to_bytes() != *own) {
-            inbox.push(sample.key_expr().as_str(), || sample.payload().to_bytes().into_owned());
+            let payload = sample.payload();
+            inbox.push(sample.key_expr().as_str(), payload.len(), || payload.to_bytes().into_owned());
         }
     };
     session

@@ -8,7 +8,7 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_wire::{Fleet, Key, Link, NodeLink, Payload, State, Topic};
-use skein_zenoh::{ZenohConfig, ZenohError, ZenohLink, ZenohSession};
+use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohError, ZenohLink, ZenohSession};
 
 /// States one bid until one of its events happens.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -28,15 +28,19 @@ fn fleet() -> Fleet {
     Fleet::new("test").unwrap()
 }
 
+fn config(connect: Vec<String>) -> ZenohConfig {
+    ZenohConfig::new(fleet(), NetworkSettings::connected_to(connect))
+}
+
 fn name(text: &str) -> NodeName {
     NodeName::new(text).unwrap()
 }
 
 /// Two sessions, the second connected to the first.
 fn sessions() -> (ZenohSession, ZenohSession) {
-    let first = ZenohSession::open(ZenohConfig::new(fleet())).unwrap();
+    let first = ZenohSession::open(config(Vec::new())).unwrap();
     let connect = first.locators().to_vec();
-    let second = ZenohSession::open(ZenohConfig { connect, ..ZenohConfig::new(fleet()) }).unwrap();
+    let second = ZenohSession::open(config(connect)).unwrap();
     wait_until("the sessions are connected", || {
         first.connected_peers() == 1 && second.connected_peers() == 1
     });
@@ -126,7 +130,7 @@ fn two_processes_worth_of_nodes_request_and_block_across_tcp() {
 
 #[test]
 fn nodes_of_one_session_hear_one_another_and_not_themselves() {
-    let session = ZenohSession::open(ZenohConfig::new(fleet())).unwrap();
+    let session = ZenohSession::open(config(Vec::new())).unwrap();
     let (mut one, mut two) = (session.link(&name("uav/1")).unwrap(), session.link(&name("uav/2")).unwrap());
     let state = Payload::State(State::new(name("uav/1"))).encode();
     let key = Key::new(&fleet(), Topic::State { node: name("uav/1") });
@@ -161,7 +165,7 @@ fn another_fleet_is_not_heard() {
 
 #[test]
 fn putting_never_waits_and_what_does_not_fit_is_counted() {
-    let config = ZenohConfig { outgoing_capacity: 8, ..ZenohConfig::new(fleet()) };
+    let config = ZenohConfig { outgoing_capacity: 8, ..config(Vec::new()) };
     let session = ZenohSession::open(config).unwrap();
     let mut link = session.link(&name("uav/1")).unwrap();
     let key = Key::new(&fleet(), Topic::State { node: name("uav/1") });
@@ -177,20 +181,20 @@ fn putting_never_waits_and_what_does_not_fit_is_counted() {
 #[test]
 fn links_that_are_not_loopback_are_refused() {
     for (listen, connect) in [("tcp/0.0.0.0:0", None), ("tcp/127.0.0.1:0", Some("tcp/192.0.2.1:7447"))] {
-        let config = ZenohConfig {
+        let network = NetworkSettings {
             listen: vec![listen.into()],
             connect: connect.into_iter().map(Into::into).collect(),
-            ..ZenohConfig::new(fleet())
+            ..NetworkSettings::default()
         };
+        let config = ZenohConfig::new(fleet(), network);
         assert!(matches!(ZenohSession::open(config), Err(ZenohError::NotLoopback { .. })));
     }
 }
 
 #[test]
 fn a_port_in_use_is_an_error_that_names_it() {
-    let first = ZenohSession::open(ZenohConfig::new(fleet())).unwrap();
-    let error =
-        ZenohSession::open(ZenohConfig { listen: first.locators().to_vec(), ..ZenohConfig::new(fleet()) })
-            .unwrap_err();
+    let first = ZenohSession::open(config(Vec::new())).unwrap();
+    let network = NetworkSettings { listen: first.locators().to_vec(), ..NetworkSettings::default() };
+    let error = ZenohSession::open(ZenohConfig::new(fleet(), network)).unwrap_err();
     assert!(error.to_string().contains(&first.locators()[0]), "{error}");
 }

@@ -1,10 +1,12 @@
 //! `fly`: a whole mission on this host, from the scenario to the summary.
 
+#[cfg(feature = "zenoh")]
+mod apart;
 mod plan_times;
 #[cfg(feature = "zenoh")]
 mod real;
 mod recording;
-mod report;
+pub(crate) mod report;
 mod setup;
 mod swarm;
 mod trace_hash;
@@ -40,29 +42,31 @@ const PATIENCE: u32 = 2;
 /// # Errors
 /// What is wrong with the scenario or the output folder; a failed mission is no error but a [`Summary`] that says so.
 pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
-    let scenario = Scenario::open(&args.world.scenario, &args.world.overrides(), args.world.seed)?;
+    let scenario = args.world.open()?;
     let out = args.out.clone().unwrap_or_else(|| default_folder(&scenario));
     std::fs::create_dir_all(&out).with_context(|| {
         format!("output folder {}: cannot be made; name another with --out", out.display())
     })?;
-    let recording = Recording::create(&out.join("mission.mcap"), &scenario)?;
+    let recording = |out: &Path| Recording::create(&out.join("mission.mcap"), &scenario);
     let mut table = LiveTable::stderr();
     for note in &scenario.notes {
         table.note(note)?;
     }
+    anyhow::ensure!(
+        !(args.processes && args.clock == Clock::Lockstep),
+        "--processes: each process follows the clock on the wall; leave out --clock lockstep"
+    );
     let summary = match args.clock {
         Clock::Lockstep => {
             let network = memory_network(&scenario);
             let links = memory_links(&network, &scenario);
-            let flight = Flight::new(&scenario, args, links, recording, table)?;
-            let traffic = || {
-                let stats = network.stats();
-                Traffic { messages: stats.messages, bytes: stats.bytes }
-            };
-            flight.fly(|now| network.advance(now), traffic)?
+            let flight = Flight::new(&scenario, args, links, recording(&out)?, table)?;
+            flight.fly(&mut Lockstep(network))?
         }
         #[cfg(feature = "zenoh")]
-        Clock::Real => real::fly(&scenario, args, recording, table)?,
+        Clock::Real if args.processes => apart::fly(&scenario, args, &out, table)?,
+        #[cfg(feature = "zenoh")]
+        Clock::Real => real::fly(&scenario, args, recording(&out)?, table)?,
         #[cfg(not(feature = "zenoh"))]
         Clock::Real => {
             anyhow::bail!("--clock real: built without the cargo feature `zenoh`; use --clock lockstep")
@@ -93,6 +97,34 @@ fn memory_links(network: &Network, scenario: &Scenario) -> Links {
         .map(|index| Box::new(network.join(&vehicle_name(index))) as Box<dyn skein_wire::Link>)
         .collect();
     Links { vehicles, ground: Box::new(network.join(&GROUND)) }
+}
+
+/// Whoever hosts a flight: keeps its pace, and shows it to others.
+trait Host {
+    /// Before each step of the world.
+    fn before_step(&mut self, swarm: &mut Swarm);
+
+    /// After each step, with what happened in it.
+    fn after_step(&mut self, swarm: &Swarm, happenings: &Happenings);
+
+    /// What has passed between the nodes.
+    fn traffic(&self) -> Traffic;
+}
+
+/// As fast as the processor allows, over the in-memory network; nobody else looks on.
+struct Lockstep(Network);
+
+impl Host for Lockstep {
+    fn before_step(&mut self, swarm: &mut Swarm) {
+        self.0.advance(swarm.now() + skein_world::STEP);
+    }
+
+    fn after_step(&mut self, _: &Swarm, _: &Happenings) {}
+
+    fn traffic(&self) -> Traffic {
+        let stats = self.0.stats();
+        Traffic { messages: stats.messages, bytes: stats.bytes }
+    }
 }
 
 /// How often the user has asked to stop, with Ctrl-C.
@@ -148,25 +180,22 @@ impl<'a> Flight<'a> {
         })
     }
 
-    /// Steps until the mission is over; `before_step` is told the time that comes.
-    fn fly(
-        mut self,
-        mut before_step: impl FnMut(Duration),
-        traffic: impl Fn() -> Traffic,
-    ) -> anyhow::Result<Summary> {
+    /// Steps until the mission is over.
+    fn fly(mut self, host: &mut dyn Host) -> anyhow::Result<Summary> {
         while !self.is_over() {
-            before_step(self.swarm.now() + skein_world::STEP);
+            host.before_step(&mut self.swarm);
             let happenings = self.swarm.step();
+            host.after_step(&self.swarm, &happenings);
             self.recording.take_in(&self.swarm, &happenings)?;
             if happenings.ticked {
                 self.look_after_limits();
-                self.network_messages = traffic().messages;
+                self.network_messages = host.traffic().messages;
                 self.draw()?;
             }
         }
         self.recording.finish()?;
         let why = self.called_off.map(|called_off| called_off.why);
-        Ok(report::summary(self.scenario, &self.swarm, self.began.elapsed(), why, traffic()))
+        Ok(report::summary(self.scenario, &self.swarm.account(host.traffic()), self.began.elapsed(), why))
     }
 
     fn is_over(&self) -> bool {
@@ -205,6 +234,8 @@ impl<'a> Flight<'a> {
     }
 }
 
-fn interruptions() -> u32 {
+/// How often the user has asked to stop.
+pub(crate) fn interruptions() -> u32 {
+    LazyLock::force(&INTERRUPTIONS);
     INTERRUPTIONS.load(Ordering::Relaxed)
 }

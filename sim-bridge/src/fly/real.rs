@@ -1,25 +1,33 @@
-//! The clock on the wall: the same swarm, step by step in real time, its events over Zenoh.
+//! The clock on the wall: the same swarm, step by step in real time, its events over Zenoh, its vehicles' MAVLink over UDP,
+//! and the console beside it.
 //!
 //! All vehicles share one session and the ground station has its own, joined over TCP on loopback, so that what passes
 //! between vehicles and ground passes through the network stack.
 
+use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
+use skein_ground::console::Console;
 use skein_wire::{Fleet, Link};
-use skein_zenoh::{ZenohConfig, ZenohSession};
+use skein_world::STEP;
+use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohSession};
 
 use super::{
-    Flight, Links, Recording,
+    Flight, Happenings, Host, Links, Recording, Swarm,
     setup::{FLEET, GROUND, vehicle_name},
 };
 use crate::{
     cli,
+    mavlink_ports::MavlinkPorts,
     scenario::Scenario,
+    scene_view,
     summary::{Summary, Traffic},
     table::LiveTable,
 };
 
+/// Where other nodes can join.
+const ZENOH_PORT: u16 = 7447;
 /// How long the two sessions may take to find each other.
 const TIME_TO_CONNECT: Duration = Duration::from_secs(10);
 
@@ -28,35 +36,99 @@ pub fn fly(
     scenario: &Scenario,
     args: &cli::Fly,
     recording: Recording,
-    table: LiveTable<std::io::Stderr>,
+    mut table: LiveTable<std::io::Stderr>,
 ) -> anyhow::Result<Summary> {
     let fleet = Fleet::new(FLEET)?;
-    let vehicles = ZenohSession::open(ZenohConfig {
-        listen: vec!["tcp/127.0.0.1:0".to_owned()],
-        ..ZenohConfig::new(fleet.clone())
-    })
-    .context("Zenoh session of the vehicles")?;
-    let ground =
-        ZenohSession::open(ZenohConfig { connect: vehicles.locators().to_vec(), ..ZenohConfig::new(fleet) })
-            .context("Zenoh session of the ground station")?;
+    let open = |network| ZenohSession::open(ZenohConfig::new(fleet.clone(), network));
+    let known = format!("tcp/127.0.0.1:{}", ZENOH_PORT + args.port_offset);
+    let vehicles = open(NetworkSettings { listen: vec![known], ..NetworkSettings::default() })
+        // Beside another swarm, anywhere.
+        .or_else(|_| open(NetworkSettings::default()))
+        .context("Zenoh session of the vehicles")?;
+    let ground = open(NetworkSettings::connected_to(vehicles.locators().to_vec()))
+        .context("Zenoh session of the ground station")?;
     await_connection(&ground)?;
     let vehicle_links = (0..scenario.vehicles.len())
         .map(|index| Ok(Box::new(vehicles.link(&vehicle_name(index))?) as Box<dyn Link>))
         .collect::<anyhow::Result<_>>()?;
     let links = Links { vehicles: vehicle_links, ground: Box::new(ground.link(&GROUND)?) };
 
+    let console = serve_console(args.console)?;
+    table.note(&format!("console: {}", console.url()))?;
+    table.note(&format!("other nodes: Zenoh on {}", vehicles.locators().join(", ")))?;
+    let ports = MavlinkPorts::open(scenario.vehicles.len(), args.port_offset);
+    match &ports {
+        Ok(_) => {
+            table.note("MAVLink: from all vehicles to udp 127.0.0.1:14550, as QGroundControl expects")?
+        }
+        // Two swarms on one computer fly all the same.
+        Err(error) => table.note(&format!("no MAVLink for other programs: {error:#}"))?,
+    }
     let flight = Flight::new(scenario, args, links, recording, table)?;
-    let began = Instant::now();
-    let speed = args.speed;
-    let keep_pace = move |now: Duration| {
-        let due = began + now.div_f64(speed);
+    flight.fly(&mut RealTime {
+        began: Instant::now(),
+        speed: args.speed,
+        sessions: [vehicles, ground],
+        console,
+        scene: Some(scene_view::view(&scenario.scene)),
+        ports: ports.ok(),
+    })
+}
+
+/// At the address asked for, or at any that is free.
+fn serve_console(address: SocketAddr) -> anyhow::Result<Console> {
+    let console = Console::serve(address, || {});
+    Ok(console.or_else(|error| match error {
+        skein_ground::console::ConsoleError::Listen { .. } => Console::serve((address.ip(), 0).into(), || {}),
+        error => Err(error),
+    })?)
+}
+
+/// Keeps pace with the clock, and lets others look on and have a say.
+struct RealTime {
+    began: Instant,
+    speed: f64,
+    sessions: [ZenohSession; 2],
+    console: Console,
+    /// Until it has been shown.
+    scene: Option<skein_wire::Scene>,
+    ports: Option<MavlinkPorts>,
+}
+
+impl Host for RealTime {
+    fn before_step(&mut self, swarm: &mut Swarm) {
+        let due = self.began + (swarm.now() + STEP).div_f64(self.speed);
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
-    };
-    let traffic = || {
-        let (vehicles, ground) = (vehicles.stats(), ground.stats());
-        Traffic { messages: vehicles.messages + ground.messages, bytes: vehicles.bytes + ground.bytes }
-    };
-    flight.fly(keep_pace, traffic)
+        if let Some(ports) = &mut self.ports {
+            ports.receive(|index, bytes| swarm.send_mavlink(index, bytes));
+        }
+        for wish in self.console.take_orders() {
+            let number = swarm.order(&wish.order);
+            wish.given_as(number);
+        }
+    }
+
+    fn after_step(&mut self, swarm: &Swarm, happenings: &Happenings) {
+        if let Some(ports) = &mut self.ports {
+            for (index, bytes) in happenings.mavlink.iter().enumerate() {
+                ports.send(index, bytes);
+            }
+        }
+        if let Some(scene) = self.scene.take() {
+            self.console.show_scene(swarm.ground(), Some(&scene));
+        }
+        if happenings.ticked {
+            self.console.publish(swarm.now(), swarm.ground(), &happenings.selections);
+        }
+    }
+
+    fn traffic(&self) -> Traffic {
+        let stats = self.sessions.each_ref().map(ZenohSession::stats);
+        Traffic {
+            messages: stats.iter().map(|stats| stats.messages).sum(),
+            bytes: stats.iter().map(|stats| stats.bytes).sum(),
+        }
+    }
 }
 
 fn await_connection(session: &ZenohSession) -> anyhow::Result<()> {

@@ -3,16 +3,16 @@
 use std::path::Path;
 use std::time::Duration;
 
-use skein_ground::recorder::{Form, Level, Recorder, RecorderError, Scan, Solid};
+use skein_ground::recorder::{Level, Recorder, RecorderError, Scan};
 use skein_wire::proto::TraceEvent;
 use skein_wire::vocabulary::ADVANCE;
-use skein_world::{Scene, Shape};
 
 use super::{
     setup::vehicle_name,
     swarm::{Happenings, Swarm},
 };
 use crate::scenario::Scenario;
+use crate::scene_view;
 
 /// Planned paths are recorded this often.
 const PATH_PERIOD: Duration = Duration::from_millis(500);
@@ -38,7 +38,7 @@ impl Recording {
             .zip(&scenario.vehicles)
             .map(|(name, plan)| (name.as_str(), plan.model.hull_radius_m))
             .collect();
-        recorder.scene(Duration::ZERO, &solids(&scenario.scene))?;
+        recorder.scene(Duration::ZERO, &scene_view::view(&scenario.scene).solids)?;
         recorder.vehicles(Duration::ZERO, &hulls)?;
         let line = format!("{} with {} vehicles, seed {}", scenario.name, names.len(), scenario.seed);
         recorder.log(Duration::ZERO, Level::Info, "skein-sim", &line)?;
@@ -100,18 +100,4 @@ impl Recording {
     pub fn finish(self) -> Result<(), RecorderError> {
         self.recorder.finish()
     }
-}
-
-/// The obstacles as Foxglove draws them; planes without end are left out.
-fn solids(scene: &Scene) -> Vec<Solid> {
-    let solid = |obstacle: &skein_world::Obstacle| {
-        let form = match obstacle.shape {
-            Shape::Box { half_extents } => Form::Box(2.0 * half_extents),
-            Shape::Cylinder { radius, half_height } => Form::Cylinder { radius, height: 2.0 * half_height },
-            Shape::Sphere { radius } => Form::Sphere { radius },
-            Shape::Plane { .. } => return None,
-        };
-        Some(Solid { form, pose: obstacle.pose })
-    };
-    scene.obstacles().iter().filter_map(solid).collect()
 }

@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use skein_agent::Outcome;
+use skein_agent::{Outcome, SetPointRecord};
+use skein_world::Simulation;
 
+use super::setup::vehicle_name;
 use super::swarm::Swarm;
 use crate::scenario::Scenario;
-use crate::summary::{self, Collisions, PlanTimes, Spread, Summary, Traffic, VehicleSummary};
+use crate::summary::{self, Collisions, EventCounts, PlanTimes, Spread, Summary, Traffic, VehicleSummary};
 use crate::table::{Progress, Row};
 
 /// The live table's rows.
@@ -38,17 +40,34 @@ pub fn progress(swarm: &Swarm, wall: Duration, messages: u64) -> Progress {
     }
 }
 
+/// What is known of a run at its end.
+pub struct Account<'a> {
+    /// The truth of it.
+    pub simulation: &'a Simulation,
+    /// How each vehicle's mission ended, by its agent's word.
+    pub outcomes: Vec<Option<Outcome>>,
+    /// What each agent made its set-points from, where that is known.
+    pub set_points: Vec<SetPointRecord>,
+    /// How long plans took, where that is known.
+    pub plan_times_ms: &'a [f64],
+    /// Events of all nodes.
+    pub events: EventCounts,
+    /// Messages of all nodes.
+    pub network: Traffic,
+    /// Hash of the run; empty where it cannot be had.
+    pub trace_hash: String,
+}
+
 /// What came of the run; `called_off` is why it was ended before it was over.
 pub fn summary(
     scenario: &Scenario,
-    swarm: &Swarm,
+    account: &Account<'_>,
     wall: Duration,
     called_off: Option<String>,
-    network: Traffic,
 ) -> Summary {
-    let truth = swarm.truth();
-    let per_vehicle: Vec<VehicleSummary> =
-        (0..swarm.agents().len()).map(|index| vehicle(swarm, index)).collect();
+    let truth = account.simulation.truth();
+    let vehicles = 0..account.outcomes.len();
+    let per_vehicle: Vec<VehicleSummary> = vehicles.clone().map(|index| vehicle(account, index)).collect();
     let collisions =
         Collisions { obstacle: truth.collisions_obstacle.into(), vehicle: truth.collisions_vehicle.into() };
     let collided = match collisions {
@@ -62,8 +81,8 @@ pub fn summary(
         .find(|vehicle| vehicle.outcome != summary::Outcome::Arrived)
         .map(|vehicle| format!("{}: {}", vehicle.id, vehicle.reason.as_deref().unwrap_or("did not arrive")));
     let reason = called_off.or(collided).or(failed);
-    let flown = || (0..swarm.agents().len()).filter_map(|index| swarm.simulation().vehicle(index));
-    let sim_time_s = swarm.now().as_secs_f64();
+    let flown = || vehicles.clone().filter_map(|index| account.simulation.vehicle(index));
+    let sim_time_s = account.simulation.now().as_secs_f64();
     Summary {
         scenario: scenario.name.clone(),
         seed: scenario.seed,
@@ -78,18 +97,17 @@ pub fn summary(
         min_clearance_m: truth.min_clearance_m,
         flight_time_s: Spread::of(flown().map(|vehicle| vehicle.flight_time.as_secs_f64())),
         path_length_m: Spread::of(flown().map(|vehicle| vehicle.path_length_m)),
-        plan_ms: PlanTimes::of(swarm.plan_times_ms().to_vec()),
-        events: swarm.events(),
-        network,
-        trace_hash: swarm.trace_hash(),
+        plan_ms: PlanTimes::of(account.plan_times_ms.to_vec()),
+        events: account.events,
+        network: account.network,
+        trace_hash: account.trace_hash.clone(),
         per_vehicle,
     }
 }
 
-fn vehicle(swarm: &Swarm, index: usize) -> VehicleSummary {
-    let agent = swarm.agents().nth(index);
-    let truth = swarm.simulation().vehicle(index);
-    let outcome = agent.and_then(skein_agent::AgentCore::outcome);
+fn vehicle(account: &Account<'_>, index: usize) -> VehicleSummary {
+    let truth = account.simulation.vehicle(index);
+    let outcome = account.outcomes.get(index).and_then(Option::as_ref);
     let crashed = truth.is_some_and(|vehicle| vehicle.crashed);
     let airborne = truth.is_some_and(|vehicle| vehicle.airborne);
     let flew = truth.is_some_and(|vehicle| !vehicle.flight_time.is_zero());
@@ -101,9 +119,9 @@ fn vehicle(swarm: &Swarm, index: usize) -> VehicleSummary {
         None if flew => (summary::Outcome::LandedEarly, Some("it landed before its goal".to_owned())),
         None => (summary::Outcome::Grounded, Some("it never took off".to_owned())),
     };
-    let set_points = agent.map(skein_agent::AgentCore::set_points).unwrap_or_default();
+    let set_points = account.set_points.get(index).copied().unwrap_or_default();
     VehicleSummary {
-        id: agent.map(|agent| agent.name().to_string()).unwrap_or_default(),
+        id: vehicle_name(index).to_string(),
         outcome,
         reason,
         flight_time_s: truth.map_or(0.0, |vehicle| vehicle.flight_time.as_secs_f64()),

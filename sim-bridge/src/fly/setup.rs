@@ -30,6 +30,9 @@ const ROOM_TO_LAND_M: f64 = 1.5;
 /// The ground station's node name.
 pub static GROUND: LazyLock<NodeName> = LazyLock::new(|| node_name("ground", "main"));
 
+/// The node name that an operator's script may use. Nobody misses it while it is not there.
+const SCRIPT: &str = "script/operator";
+
 /// The node name of vehicle `index`: `uav/{index + 1}`.
 #[must_use]
 pub fn vehicle_name(index: usize) -> NodeName {
@@ -63,7 +66,8 @@ pub fn simulation_config(scenario: &Scenario) -> SimulationConfig {
 #[must_use]
 pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<AgentConfig> {
     let vehicles = || (0..scenario.vehicles.len()).map(vehicle_name);
-    let roster: Vec<String> = vehicles().chain([GROUND.clone()]).map(|name| name.to_string()).collect();
+    let others = [GROUND.to_string(), SCRIPT.to_owned()];
+    let roster: Vec<String> = vehicles().map(|name| name.to_string()).chain(others).collect();
     let bounds = scenario.scene.bounds();
     let fence = Fence { min: bounds.min.into(), max: bounds.max.into() };
     let (levels, spacing_m) = RETURN_LEVELS;
@@ -84,6 +88,7 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
             takeoff_height_m: scenario.takeoff_height_m,
             return_altitude_m: (RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64)
                 .min(bounds.max.z - 1.0),
+            lidar: true,
             fence,
             envelope: Envelope {
                 cruise_m_s: scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
@@ -119,7 +124,7 @@ pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Control
     let orders = scenario.orders.iter().map(|said| {
         let who = match said.who {
             scenario::Who::All => Who::All,
-            scenario::Who::Vehicle(number) => Who::Vehicle(vehicle_name(number.saturating_sub(1))),
+            scenario::Who::Vehicle(number) => Who::only(vehicle_name(number.saturating_sub(1))),
         };
         let order = match said.order {
             OrderKind::Hold => Order::Hold(who),

@@ -10,8 +10,8 @@ use skein_ground::{GroundConfig, GroundCore, Order};
 use skein_wire::Link;
 use skein_world::{LidarScan, Simulation, Truth};
 
-use super::{plan_times::PlanTimes, trace_hash::TraceHash};
-use crate::summary::EventCounts;
+use super::{plan_times::PlanTimes, report::Account, trace_hash::TraceHash};
+use crate::summary::{EventCounts, Traffic};
 
 /// Agents and ground tick once in so many steps of the world: every 20 ms.
 const STEPS_PER_TICK: u64 = 5;
@@ -40,6 +40,8 @@ pub struct Happenings {
     pub selections: Vec<Happened>,
     /// Lidar scans, by vehicle.
     pub scans: Vec<(usize, LidarScan)>,
+    /// What each autopilot has said.
+    pub mavlink: Vec<Vec<u8>>,
     /// Whether agents and ground ticked.
     pub ticked: bool,
 }
@@ -81,6 +83,7 @@ impl Swarm {
         for (index, vehicle) in self.vehicles.iter_mut().enumerate() {
             let bytes = self.simulation.receive(index);
             vehicle.agent.receive_mavlink(now, &bytes);
+            happenings.mavlink.push(bytes);
         }
         for (index, scan) in &happenings.scans {
             if let Some(vehicle) = self.vehicles.get_mut(*index) {
@@ -123,8 +126,19 @@ impl Swarm {
     }
 
     /// Says something to the vehicles, as an operator at the ground station.
-    pub fn order(&mut self, order: &Order) {
-        self.ground.order(order);
+    pub fn order(&mut self, order: &Order) -> u64 {
+        self.ground.order(order)
+    }
+
+    /// Says something to the autopilot of vehicle `index`, as another program would.
+    pub fn send_mavlink(&mut self, index: usize, bytes: &[u8]) {
+        self.simulation.send(index, bytes);
+    }
+
+    /// The ground station.
+    #[must_use]
+    pub fn ground(&self) -> &GroundCore {
+        &self.ground
     }
 
     /// Whether every vehicle's mission has ended and it stands on the ground.
@@ -165,6 +179,20 @@ impl Swarm {
         self.agents().map(AgentCore::outcome)
     }
 
+    /// What may be said of the run so far; `network` is what its nodes have sent.
+    #[must_use]
+    pub fn account(&self, network: Traffic) -> Account<'_> {
+        Account {
+            simulation: &self.simulation,
+            outcomes: self.outcomes().map(Option::<&Outcome>::cloned).collect(),
+            set_points: self.agents().map(AgentCore::set_points).collect(),
+            plan_times_ms: self.plan_times.milliseconds(),
+            events: self.events,
+            network,
+            trace_hash: self.trace.hex(),
+        }
+    }
+
     /// What the referee has seen so far.
     #[must_use]
     pub fn truth(&self) -> Truth {
@@ -175,12 +203,6 @@ impl Swarm {
     #[must_use]
     pub fn events(&self) -> EventCounts {
         self.events
-    }
-
-    /// How long each plan took, in milliseconds of wall time.
-    #[must_use]
-    pub fn plan_times_ms(&self) -> &[f64] {
-        self.plan_times.milliseconds()
     }
 
     /// The hash of everything so far.

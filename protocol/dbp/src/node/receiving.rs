@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use crate::facts::{self, count};
-use crate::node::{Delivery, LEAST_LEASE, Node};
+use crate::node::{Delivery, LEAST_LEASE, Node, REPEAT_DOUBLE};
 use crate::peers::Word;
 use crate::stream::{Heard, REPAIR_CHUNK, Stream};
 use crate::table::{ProxyChange, TakenIn};
@@ -184,7 +184,11 @@ impl Node {
         let own = presence.incarnation == self.config.incarnation && self.presences.contains(&presence.up);
         let of_a_former_life =
             presence.incarnation < self.config.incarnation && self.up() < self.config.lease;
-        if !own && !of_a_former_life && self.doubles.insert(presence.incarnation) {
+        if own || of_a_former_life {
+            return true;
+        }
+        if self.double_told.is_none_or(|at| self.now >= at + REPEAT_DOUBLE) {
+            self.double_told = Some(self.now);
             self.fact(facts::DUPLICATE_NAME, |fact| fact.with("incarnation", count(presence.incarnation)));
         }
         true

@@ -83,7 +83,7 @@ impl Node {
 
     /// Tells the program what has occurred elsewhere.
     fn apply(&mut self, occurrence: Occurrence) -> Result<(), NodeError> {
-        let Occurrence { home, seq, event, requests_served, .. } = occurrence;
+        let Occurrence { home, seq, event, requests_served, requested_by, .. } = occurrence;
         if self.home_of(&event) != Home::Elsewhere(home.clone()) {
             // A home decides on its own events only.
             self.stats.ignored += 1;
@@ -105,10 +105,6 @@ impl Node {
         self.program.step(self.now)?;
         self.stats.heard += 1;
         self.stalls_due = true;
-        let requested_by = requests_served
-            .iter()
-            .map(|request| format!("{}#{}", request.node, request.bthread).into())
-            .collect();
         self.selections.push(Happened {
             event,
             home,
@@ -136,6 +132,7 @@ impl Node {
                 seq,
                 event: event.clone(),
                 requests_served: served,
+                requested_by: requested_by.clone(),
                 at: self.now,
             };
             self.history.push(occurrence.clone());

@@ -6,7 +6,8 @@ use std::time::Duration;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, COMMAND_LONG_DATA, EXTENDED_SYS_STATE_DATA,
-    GPS_GLOBAL_ORIGIN_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, MavCmd, SYS_STATUS_DATA,
+    GPS_GLOBAL_ORIGIN_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, MavCmd,
+    SYS_STATUS_DATA,
 };
 
 /// A message that is missing is asked for this often at most.
@@ -39,6 +40,8 @@ impl Default for Subscriptions {
     fn default() -> Self {
         let every = |message_id, interval_ms| (message_id, Wish::Every(Duration::from_millis(interval_ms)));
         let wishes = [
+            // A pilot's mode change is to be known at once, not with the next second.
+            every(HEARTBEAT_DATA::ID, 100),
             every(LOCAL_POSITION_NED_DATA::ID, 20),
             every(ATTITUDE_QUATERNION_DATA::ID, 20),
             (GPS_GLOBAL_ORIGIN_DATA::ID, Wish::Once),

@@ -1,0 +1,48 @@
+//! `skein-agent`: see `skein-agent --help`.
+
+mod autopilot_link;
+mod config;
+mod run;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Skein's agent: one vehicle's behavioural program, its navigation, and its autopilot's link.
+#[derive(Parser)]
+#[command(name = "skein-agent", version, after_help = "Exit codes: 0 done, 2 wrong usage or input.")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Fly one vehicle until Ctrl-C, which lands it first. A second Ctrl-C ends at once, in the air too.
+    Run {
+        /// The agent's configuration; agent/agent.toml explains every field.
+        #[arg(long, value_name = "FILE")]
+        config: PathBuf,
+    },
+}
+
+fn main() -> ExitCode {
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
+        .with_target(false)
+        .with_env_filter(
+            tracing_subscriber::EnvFilter::try_from_default_env()
+                .unwrap_or_else(|_| "info,zenoh=error".into()),
+        )
+        .init();
+    let Command::Run { config } = Cli::parse().command;
+    match config::Config::read(&config).and_then(run::run) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("skein-agent: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}

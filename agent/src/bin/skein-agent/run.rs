@@ -1,0 +1,168 @@
+//! `run`: the agent's loop around its core.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+use anyhow::Context as _;
+use skein_agent::{AgentCore, Scan};
+use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
+use skein_wire::{Fleet, Key, Link as _, Payload, Topic};
+use skein_zenoh::{Bell, Complaints, ZenohConfig, ZenohLink, ZenohSession, next_incarnation};
+
+use crate::autopilot_link::AutopilotLink;
+use crate::config::Config;
+
+/// The control loop's period.
+const TICK: Duration = Duration::from_millis(20);
+/// The autopilot's link is looked at this often. What has come since the last look counts as that old: so nothing that
+/// waited while the agent did not run passes for fresh.
+const LOOK: Duration = Duration::from_millis(5);
+/// A scan from further in the future comes from a clock that is wrong.
+const CLOCK_TOLERANCE: Duration = Duration::from_millis(50);
+
+/// Flies until Ctrl-C, which lands the vehicle first.
+pub fn run(config: Config) -> anyhow::Result<()> {
+    let mut driver = Driver::open(config)?;
+    let interruptions = Arc::new(AtomicU32::new(0));
+    ctrlc::set_handler({
+        let (interruptions, bell) = (interruptions.clone(), driver.bell.clone());
+        move || {
+            interruptions.fetch_add(1, Ordering::Relaxed);
+            bell.ring();
+        }
+    })
+    .context("Ctrl-C cannot be caught")?;
+    let mut landing = false;
+    loop {
+        driver.go_on();
+        match interruptions.load(Ordering::Relaxed) {
+            0 => {}
+            1 if driver.core.is_airborne() => {
+                if !std::mem::replace(&mut landing, true) {
+                    tracing::warn!("landing, then ending; Ctrl-C again ends at once");
+                    driver.core.order("land");
+                }
+            }
+            _ => return Ok(()),
+        }
+    }
+}
+
+struct Driver {
+    core: AgentCore,
+    autopilot: AutopilotLink,
+    link: ZenohLink,
+    scans: Option<ZenohLink>,
+    bell: Bell,
+    complaints: Complaints,
+    began: Instant,
+    looked: Duration,
+    next_tick: Duration,
+    strange_scans: u64,
+}
+
+impl Driver {
+    fn open(mut config: Config) -> anyhow::Result<Self> {
+        config.agent.incarnation = next_incarnation(&config.state, &config.name)?;
+        let fleet = Fleet::new(&config.agent.fleet).context("`fleet`")?;
+        let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
+        let link = session.link(&config.name)?;
+        let scans = config.lidar.map(|sensor| {
+            let topic = Topic::Scan { sensor, vehicle: config.name.clone() };
+            session.listen(vec![Key::new(&fleet, topic).to_string()])
+        });
+        tracing::info!(
+            "{} of fleet {fleet}, life {}, Zenoh on {:?}, autopilot {}",
+            config.name,
+            config.agent.incarnation,
+            session.locators(),
+            config.autopilot
+        );
+        Ok(Self {
+            core: AgentCore::new(config.agent)?,
+            autopilot: AutopilotLink::new(config.autopilot),
+            bell: link.bell(),
+            link,
+            scans: scans.transpose()?,
+            complaints: Complaints::default(),
+            began: Instant::now(),
+            looked: Duration::ZERO,
+            next_tick: Duration::ZERO,
+            strange_scans: 0,
+        })
+    }
+
+    /// Waits for something to do, and does it.
+    fn go_on(&mut self) {
+        let to_tick = self.next_tick.saturating_sub(self.began.elapsed());
+        self.bell.wait(to_tick.min(LOOK));
+        let now = self.began.elapsed();
+        let core = &mut self.core;
+        let looked = std::mem::replace(&mut self.looked, now);
+        self.autopilot.receive(|bytes| core.receive_mavlink(looked, bytes));
+        self.take_in_scans(now);
+        if now >= self.next_tick {
+            // Ticks that were missed are not made up for.
+            self.next_tick = (self.next_tick + TICK).max(now);
+            self.core.tick(now, &mut self.link);
+            if let Some(line) = self.complaints.check(now, self.core.node(), &self.link) {
+                tracing::warn!("{line}");
+            }
+        } else if !self.link.is_empty() {
+            self.core.respond(now, &mut self.link);
+        }
+        self.autopilot.send(&self.core.take_mavlink());
+        self.tell();
+    }
+
+    fn take_in_scans(&mut self, now: Duration) {
+        let Some(scans) = &mut self.scans else { return };
+        while let Some((_, payload)) = scans.poll() {
+            let Ok(Payload::Scan(scan)) = Payload::decode(&payload) else {
+                self.strange_scans += 1;
+                if self.strange_scans.is_power_of_two() {
+                    tracing::warn!("{} messages under the lidar's key are no scans", self.strange_scans);
+                }
+                continue;
+            };
+            let unix = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
+            let age = match unix.checked_sub(scan.measured_at_unix) {
+                Some(age) => age,
+                None if scan.measured_at_unix - unix <= CLOCK_TOLERANCE => Duration::ZERO,
+                None => {
+                    self.strange_scans += 1;
+                    if self.strange_scans.is_power_of_two() {
+                        tracing::warn!(
+                            "the lidar's scans come from the future: keep its computer's clock with this one's"
+                        );
+                    }
+                    continue;
+                }
+            };
+            let Some(stamp) = now.checked_sub(age) else { continue };
+            self.core.sense(
+                now,
+                &Scan {
+                    stamp,
+                    angle_min: scan.angle_min,
+                    angle_step: scan.angle_step,
+                    max_range_m: scan.max_range_m,
+                    ranges_m: scan.ranges_m,
+                    up_m: scan.up_m,
+                    down_m: scan.down_m,
+                },
+            );
+        }
+    }
+
+    /// Writes down what the vehicle itself has decided or met.
+    fn tell(&mut self) {
+        for happened in self.core.take_selections() {
+            let repeated = matches!(happened.event.kind(), ADVANCE | HOMEWARD);
+            if happened.home == *self.core.name() && !repeated {
+                tracing::info!("{}", happened.event);
+            }
+        }
+    }
+}

@@ -1,0 +1,94 @@
+/**
+ * The commands: what each button sends, and to whom.
+ *
+ * A safety order acts at once. Only launching asks again, as arming takes two steps.
+ */
+
+import { html, setText } from './dom';
+import type { Command } from './protocol';
+import { orderName } from './words';
+
+const BUTTONS: { what: Command; key: string; title: string }[] = [
+  { what: 'hold', key: 'H', title: 'Stop and stay there until resumed' },
+  { what: 'resume', key: 'R', title: 'Go on after a hold' },
+  { what: 'return', key: 'B', title: 'Fly back home and land there' },
+  { what: 'land', key: 'L', title: 'Land here and now' },
+  { what: 'goto', key: 'G', title: 'Fly to a place you click' },
+  { what: 'launch', key: '', title: 'Arm and take off; asks again first' },
+];
+
+export interface CommandEvents {
+  order(what: Exclude<Command, 'goto'>): void;
+  placing(): void;
+  everyone(): void;
+}
+
+export class Commands {
+  private readonly to = html('span', { class: 'to-whom' });
+  private readonly everyone = html('button', { type: 'button', class: 'link-button', hidden: true }, 'All vehicles');
+  private readonly buttons = new Map<Command, HTMLButtonElement>();
+  private readonly confirmTo = html('strong', {});
+  private readonly confirm: HTMLDialogElement;
+
+  constructor(
+    root: HTMLElement,
+    private readonly events: CommandEvents,
+  ) {
+    const row = html('div', { class: 'buttons', role: 'group', 'aria-label': 'Orders to give' });
+    for (const { what, key, title } of BUTTONS) {
+      const hint = key ? [html('kbd', { 'aria-hidden': 'true' }, key)] : [];
+      const button = html('button', { type: 'button', class: `command command-${what}`, title, disabled: true }, orderName(what), ...hint);
+      button.addEventListener('click', () => this.press(what));
+      this.buttons.set(what, button);
+      row.append(button);
+    }
+    this.everyone.addEventListener('click', () => events.everyone());
+    const line = html('p', { class: 'addressees', 'aria-live': 'polite' }, html('span', { class: 'to' }, 'To'), this.to, this.everyone);
+    root.append(line, row);
+    this.confirm = this.makeConfirm();
+    document.body.append(this.confirm);
+  }
+
+  /** Does what pressing the button would do, if it can be pressed. */
+  press(what: Command): void {
+    if (this.buttons.get(what)?.disabled !== false) return;
+    if (what === 'goto') this.events.placing();
+    else if (what === 'launch') this.confirm.showModal();
+    else this.events.order(what);
+  }
+
+  setAddressees(words: string, all: boolean): void {
+    setText(this.to, words);
+    this.to.title = words;
+    setText(this.confirmTo, words);
+    this.everyone.hidden = all;
+  }
+
+  setEnabled(enabled: boolean): void {
+    for (const button of this.buttons.values()) button.disabled = !enabled;
+    if (!enabled) this.confirm.close();
+  }
+
+  setPlacing(placing: boolean): void {
+    this.buttons.get('goto')?.setAttribute('aria-pressed', String(placing));
+  }
+
+  private makeConfirm(): HTMLDialogElement {
+    const cancel = html('button', { type: 'button', class: 'command', autofocus: true }, 'Cancel');
+    const arm = html('button', { type: 'button', class: 'command command-arm' }, 'Arm and take off');
+    const dialog = html(
+      'dialog',
+      { class: 'confirm', 'aria-labelledby': 'confirm-title' },
+      html('h2', { id: 'confirm-title' }, 'Arm motors and take off?'),
+      html('p', {}, this.confirmTo),
+      html('p', { class: 'muted' }, 'Each vehicle takes off when its own checks pass.'),
+      html('div', { class: 'dialog-buttons' }, cancel, arm),
+    );
+    cancel.addEventListener('click', () => dialog.close());
+    arm.addEventListener('click', () => {
+      dialog.close();
+      this.events.order('launch');
+    });
+    return dialog;
+  }
+}

@@ -1,0 +1,233 @@
+/**
+ * The operator's console: joins the parts, and decides what a message or an input changes.
+ */
+
+import './console.css';
+import { Commands } from './commands';
+import { Connection, liveUrl } from './connection';
+import { html, part, setText } from './dom';
+import { EventsPanel } from './events-panel';
+import { Help } from './help';
+import { identities } from './identity';
+import { listenToKeys } from './keys';
+import { Banner, Notices } from './notices';
+import { OrdersPanel } from './orders-panel';
+import { Placing } from './placing';
+import type { Command, Fleet, OrderRequest, Point, Scene, ServerMessage } from './protocol';
+import { addresseeWords, Selection } from './selection';
+import { Theme } from './theme';
+import { VehiclesPanel } from './vehicles-panel';
+import { View } from './view/view';
+import { clockWords, durationWords, orderName, outcomeWords } from './words';
+
+/** The station speaks ten times a second; after this long what is shown is no longer live. */
+const STALE_MS = 2000;
+/** Connecting is not worth a banner before this. */
+const GRACE_MS = 1500;
+/** An order that the station has not taken by then was probably not heard. */
+const ANSWER_MS = 3000;
+
+/** An order that the station has not answered yet. */
+interface Sent {
+  what: Command;
+  timer: number;
+  point?: Point;
+}
+
+const selection: Selection = new Selection(selectionChanged);
+const view = new View(part('view'), {
+  picked: (name, more) => (more ? selection.toggle(name) : selection.pick(name)),
+  placed: goTo,
+});
+const theme = new Theme(() => view.repaint());
+const vehicles = new VehiclesPanel(part('vehicles'), part('vehicles-note'), selection);
+const events = new EventsPanel(part('events-head'), part('events'), selection);
+const orders = new OrdersPanel(part('answers'));
+const notices = new Notices(part('notices'));
+const connectionBanner = new Banner(part('banners'), 'alert');
+const outcomeBanner = new Banner(part('banners'), 'status');
+const help = new Help(part('help-open'));
+const placing = new Placing(part('view').parentElement!, (on) => {
+  view.setPlacing(on);
+  commands.setPlacing(on);
+});
+const commands = new Commands(part('commands'), {
+  order: (what) => order(what),
+  placing: () => placing.toggle(),
+  everyone: () => selection.set([]),
+});
+
+let fleet: Fleet = { type: 'fleet', time: 0, outcome: null, vehicles: [] };
+/** By tag. */
+const unanswered = new Map<string, Sent>();
+let tags = 0;
+/** When the next attempt to connect comes, on the clock of `performance.now()`. */
+let retryAt = 0;
+let everLive = false;
+
+const connection = new Connection(liveUrl(window.location), { message: receive, changed: connectionChanged });
+connectionChanged(false, 0);
+selectionChanged();
+window.setInterval(showConnection, 250);
+
+part('theme').addEventListener('click', () => theme.toggle());
+part('fit').addEventListener('click', () => view.fit());
+listenToKeys(
+  {
+    h: () => commands.press('hold'),
+    r: () => commands.press('resume'),
+    b: () => commands.press('return'),
+    l: () => commands.press('land'),
+    g: () => commands.press('goto'),
+    0: () => selection.set(names()),
+    a: () => selection.set(names()),
+    f: () => view.fit(),
+    t: () => theme.toggle(),
+    '?': () => help.open(),
+    Escape: () => (placing.active ? placing.set(false) : selection.set([])),
+  },
+  (number, more) => {
+    for (const [name, look] of identities(names())) {
+      if (look.number === number) more ? selection.toggle(name) : selection.pick(name);
+    }
+  },
+);
+
+function receive(message: ServerMessage): void {
+  switch (message.type) {
+    case 'scene':
+      showStation(message);
+      view.setScene(message);
+      vehicles.setGround(view.groundZ);
+      break;
+    case 'fleet':
+      fleet = message;
+      showFleet();
+      break;
+    case 'orders':
+      orders.show(message.orders);
+      break;
+    case 'events':
+      events.add(message.events);
+      break;
+    case 'ordered': {
+      const sent = settle(message.tag);
+      if (sent?.point) view.setGoal(sent.point);
+      if (sent?.what === 'return' || sent?.what === 'land') view.setGoal(null);
+      break;
+    }
+    case 'error': {
+      const sent = message.tag === null ? undefined : settle(message.tag);
+      notices.show(sent ? `${orderName(sent.what)} was refused: ${message.message}` : message.message);
+      break;
+    }
+  }
+}
+
+function showStation({ fleet, station, software }: Scene): void {
+  const facts: [string, string][] = [['Fleet', fleet], ['Station', station], ['Version', software]];
+  part('station').replaceChildren(
+    ...facts.filter(([, value]) => value).map(([name, value]) => html('div', {}, html('dt', {}, name), html('dd', {}, value))),
+  );
+  document.title = fleet ? `Skein: ${fleet}` : 'Skein';
+}
+
+function showFleet(): void {
+  const fleetNames = names();
+  setText(part('clock'), clockWords(fleet.time));
+  events.setFleet(fleetNames);
+  orders.setFleet(fleetNames);
+  vehicles.show(fleet);
+  view.setFleet(fleet);
+  showAddressees();
+  if (fleet.outcome) outcomeBanner.show(outcomeWords(fleet.outcome, fleetNames.length), fleet.outcome.succeeded ? 'good' : 'warn');
+  else outcomeBanner.hide();
+}
+
+function names(): string[] {
+  return fleet.vehicles.map(({ name }) => name);
+}
+
+function selectionChanged(): void {
+  vehicles.showSelection();
+  events.showSelection();
+  view.setSelection(selection.names);
+  showAddressees();
+}
+
+function showAddressees(): void {
+  const to = selection.addressees(names());
+  commands.setAddressees(addresseeWords(to, fleet.vehicles.length), selection.names.size === 0);
+}
+
+function order(what: Command, point?: Point): void {
+  tags += 1;
+  const tag = `${Date.now().toString(36)}-${tags}`;
+  const request: OrderRequest = { type: 'order', tag, what, to: selection.addressees(names()), ...(point && { point }) };
+  if (!connection.send(request)) {
+    notices.show(`${orderName(what)} was not sent: there is no connection to the station.`);
+    return;
+  }
+  const timer = window.setTimeout(() => {
+    if (settle(tag)) notices.show(`${orderName(what)}: the station has not answered.`);
+  }, ANSWER_MS);
+  unanswered.set(tag, { what, timer, ...(point && { point }) });
+}
+
+/** An order is answered, or no longer awaited; returns what it was. */
+function settle(tag: string): Sent | undefined {
+  const sent = unanswered.get(tag);
+  if (!sent) return undefined;
+  window.clearTimeout(sent.timer);
+  unanswered.delete(tag);
+  return sent;
+}
+
+function goTo(place: [x: number, y: number]): void {
+  const metres = placing.metres;
+  if (metres === undefined) {
+    notices.show('The height must be a number of metres, or empty.');
+    return;
+  }
+  if (!view.isWithin(place)) {
+    notices.show('That place is outside the bounds.');
+    return;
+  }
+  const [x, y] = place.map((coordinate) => Math.round(coordinate * 100) / 100) as [number, number];
+  const point: Point = [x, y, metres === null ? null : view.groundZ + metres];
+  placing.set(false);
+  order('goto', point);
+}
+
+function connectionChanged(live: boolean, retryMs: number): void {
+  document.body.dataset.connection = live ? 'live' : 'lost';
+  everLive ||= live;
+  retryAt = performance.now() + retryMs;
+  commands.setEnabled(live);
+  if (!live) {
+    placing.set(false);
+    const lost = [...unanswered.keys()].map(settle);
+    if (lost.length > 0) notices.show('The connection was lost before the station answered the last order.');
+  }
+  showConnection();
+}
+
+/** Also called now and then, for what only time changes. */
+function showConnection(): void {
+  const silence = performance.now() - connection.lastHeard;
+  const live = document.body.dataset.connection === 'live';
+  const stale = live && silence > STALE_MS;
+  document.body.classList.toggle('stale', !live || stale);
+  setText(part('connection'), !live ? (everLive ? 'Disconnected' : 'Connecting') : stale ? 'Silent' : 'Live');
+  if (!live && !everLive && performance.now() < GRACE_MS) {
+    connectionBanner.hide();
+  } else if (!live) {
+    const wait = Math.max(0, Math.ceil((retryAt - performance.now()) / 1000));
+    const since = everLive ? `Connection to the station lost ${durationWords(Math.max(1000, silence))} ago. What you see is old.` : 'Not connected to the station yet.';
+    connectionBanner.show(`${since} ${wait > 0 ? `Trying again in ${wait} s.` : 'Trying…'}`, everLive ? 'bad' : 'warn');
+  } else if (stale) {
+    connectionBanner.show(`The station has said nothing for ${durationWords(silence)}. What you see is old.`, 'warn');
+  } else {
+    connectionBanner.hide();
+  }
+}

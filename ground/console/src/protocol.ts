@@ -1,0 +1,305 @@
+/**
+ * What the ground station and the console say to each other, and how its messages are read.
+ *
+ * Reading is forgiving: a field that is missing or of the wrong kind becomes `null` or empty, so that one odd vehicle
+ * never takes the others off the screen. Only a message that is no JSON object of a known type is refused.
+ */
+
+export type Vec3 = [x: number, y: number, z: number];
+export type Quaternion = [x: number, y: number, z: number, w: number];
+
+export interface Bounds {
+  min: Vec3;
+  max: Vec3;
+}
+
+export type Obstacle = { position: Vec3; orientation: Quaternion } & (
+  | { form: 'box'; size: Vec3 }
+  | { form: 'cylinder'; radius: number; height: number }
+  | { form: 'sphere'; radius: number }
+);
+
+export interface Scene {
+  type: 'scene';
+  fleet: string;
+  station: string;
+  software: string;
+  bounds: Bounds | null;
+  obstacles: Obstacle[];
+}
+
+export type MissionState = 'under_way' | 'complete' | 'failed';
+
+export interface Vehicle {
+  name: string;
+  heard: boolean;
+  position: Vec3 | null;
+  velocity: Vec3 | null;
+  yaw: number | null;
+  radius: number;
+  mode: string;
+  armed: boolean;
+  /** Energy left, 0 to 1. */
+  battery: number | null;
+  task: string;
+  waitingFor: string;
+  mission: MissionState | null;
+  path: Vec3[];
+  link: { alive: boolean; ageMs: number | null };
+  notes: string[];
+}
+
+export interface Outcome {
+  succeeded: boolean;
+  /** Why, by vehicle. */
+  failed: Record<string, string>;
+}
+
+export interface Fleet {
+  type: 'fleet';
+  time: number;
+  outcome: Outcome | null;
+  vehicles: Vehicle[];
+}
+
+export type Answer =
+  | { state: 'acknowledged'; afterMs: number | null }
+  | { state: 'pending' }
+  | { state: 'missing' }
+  | { state: 'refused'; why: string };
+
+export interface Order {
+  id: number;
+  what: string;
+  time: number;
+  answers: Record<string, Answer>;
+}
+
+export interface Orders {
+  type: 'orders';
+  orders: Order[];
+}
+
+export interface SwarmEvent {
+  time: number;
+  home: string;
+  /** Place in its home's sequence; 0 for an event that stayed local. */
+  seq: number;
+  name: string;
+  data: Record<string, unknown>;
+  requestedBy: string[];
+  blockedBy: string[];
+  leaseAgeMs: number | null;
+}
+
+export interface Events {
+  type: 'events';
+  events: SwarmEvent[];
+}
+
+export interface Ordered {
+  type: 'ordered';
+  tag: string;
+  id: number | null;
+}
+
+export interface Refusal {
+  type: 'error';
+  tag: string | null;
+  message: string;
+}
+
+export type ServerMessage = Scene | Fleet | Orders | Events | Ordered | Refusal;
+
+export const COMMANDS = ['hold', 'resume', 'return', 'land', 'goto', 'launch'] as const;
+export type Command = (typeof COMMANDS)[number];
+
+/** A go-to's place; without a height every vehicle keeps its own. */
+export type Point = [x: number, y: number, z: number | null];
+
+export interface OrderRequest {
+  type: 'order';
+  tag: string;
+  what: Command;
+  to: 'all' | string[];
+  point?: Point;
+}
+
+/** Reads a message of the station; `null` if it is none that this console knows. */
+export function readMessage(text: string): ServerMessage | null {
+  let json: unknown;
+  try {
+    json = JSON.parse(text);
+  } catch {
+    return null;
+  }
+  if (!isRecord(json)) return null;
+  switch (json.type) {
+    case 'scene':
+      return readScene(json);
+    case 'fleet':
+      return {
+        type: 'fleet',
+        time: number(json.time_s) ?? 0,
+        outcome: readOutcome(json.outcome),
+        vehicles: list(json.vehicles, readVehicle),
+      };
+    case 'orders':
+      return { type: 'orders', orders: list(json.orders, readOrder) };
+    case 'events':
+      return { type: 'events', events: list(json.events, readEvent) };
+    case 'ordered':
+      return { type: 'ordered', tag: string(json.tag), id: number(json.id) };
+    case 'error':
+      return {
+        type: 'error',
+        tag: typeof json.tag === 'string' ? json.tag : null,
+        message: string(json.message) || 'The station refused without saying why.',
+      };
+    default:
+      return null;
+  }
+}
+
+type Json = Record<string, unknown>;
+
+function readScene(json: Json): Scene {
+  const min = isRecord(json.bounds) ? vector(json.bounds.min) : null;
+  const max = isRecord(json.bounds) ? vector(json.bounds.max) : null;
+  return {
+    type: 'scene',
+    fleet: string(json.fleet),
+    station: string(json.station),
+    software: string(json.software),
+    bounds: min && max ? { min, max } : null,
+    obstacles: list(json.obstacles, readObstacle),
+  };
+}
+
+function readObstacle(json: Json): Obstacle | null {
+  const position = vector(json.position);
+  if (!position) return null;
+  const place = { position, orientation: quaternion(json.orientation) };
+  const radius = number(json.radius);
+  if (json.form === 'box') {
+    const size = vector(json.size);
+    return size && { form: 'box', size, ...place };
+  }
+  if (json.form === 'cylinder') {
+    const height = number(json.height);
+    return radius === null || height === null ? null : { form: 'cylinder', radius, height, ...place };
+  }
+  if (json.form === 'sphere') {
+    return radius === null ? null : { form: 'sphere', radius, ...place };
+  }
+  return null;
+}
+
+function readVehicle(json: Json): Vehicle | null {
+  const name = string(json.name);
+  if (!name) return null;
+  const link = isRecord(json.link) ? json.link : {};
+  const heard = json.heard === true;
+  return {
+    name,
+    heard,
+    position: heard ? vector(json.position) : null,
+    velocity: vector(json.velocity),
+    yaw: number(json.yaw_rad),
+    radius: number(json.radius_m) ?? 0.25,
+    mode: string(json.mode),
+    armed: json.armed === true,
+    battery: number(json.battery),
+    task: string(json.task),
+    waitingFor: string(json.waiting_for),
+    mission: json.mission === 'complete' || json.mission === 'failed' || json.mission === 'under_way' ? json.mission : null,
+    path: Array.isArray(json.path) ? json.path.map(vector).filter((point) => point !== null) : [],
+    link: { alive: link.alive === true, ageMs: number(link.age_ms) },
+    notes: strings(json.notes),
+  };
+}
+
+function readOutcome(json: unknown): Outcome | null {
+  if (!isRecord(json)) return null;
+  const failed = isRecord(json.failed) ? json.failed : {};
+  return {
+    succeeded: json.succeeded === true,
+    failed: Object.fromEntries(Object.entries(failed).map(([name, why]) => [name, string(why)])),
+  };
+}
+
+function readOrder(json: Json): Order | null {
+  const id = number(json.id);
+  if (id === null) return null;
+  const answers = isRecord(json.answers) ? json.answers : {};
+  return {
+    id,
+    what: string(json.what),
+    time: number(json.time_s) ?? 0,
+    answers: Object.fromEntries(Object.entries(answers).map(([name, answer]) => [name, readAnswer(answer)])),
+  };
+}
+
+function readAnswer(json: unknown): Answer {
+  const answer = isRecord(json) ? json : {};
+  switch (answer.state) {
+    case 'acknowledged':
+      return { state: 'acknowledged', afterMs: number(answer.after_ms) };
+    case 'missing':
+      return { state: 'missing' };
+    case 'refused':
+      return { state: 'refused', why: string(answer.why) };
+    default:
+      return { state: 'pending' };
+  }
+}
+
+function readEvent(json: Json): SwarmEvent | null {
+  const name = string(json.name);
+  if (!name) return null;
+  return {
+    time: number(json.time_s) ?? 0,
+    home: string(json.home),
+    seq: number(json.seq) ?? 0,
+    name,
+    data: isRecord(json.data) ? json.data : {},
+    requestedBy: strings(json.requested_by),
+    blockedBy: strings(json.blocked_by),
+    leaseAgeMs: number(json.lease_age_ms),
+  };
+}
+
+function isRecord(json: unknown): json is Json {
+  return typeof json === 'object' && json !== null && !Array.isArray(json);
+}
+
+function number(json: unknown): number | null {
+  return typeof json === 'number' && Number.isFinite(json) ? json : null;
+}
+
+function string(json: unknown): string {
+  return typeof json === 'string' ? json : '';
+}
+
+function strings(json: unknown): string[] {
+  return Array.isArray(json) ? json.filter((item) => typeof item === 'string') : [];
+}
+
+function vector(json: unknown): Vec3 | null {
+  if (!Array.isArray(json) || json.length < 3) return null;
+  const [x, y, z] = json.map(number);
+  return x == null || y == null || z == null ? null : [x, y, z];
+}
+
+function quaternion(json: unknown): Quaternion {
+  const [x, y, z, w] = Array.isArray(json) ? json.map(number) : [];
+  return x == null || y == null || z == null || w == null ? [0, 0, 0, 1] : [x, y, z, w];
+}
+
+function list<T>(json: unknown, read: (item: Json) => T | null): T[] {
+  if (!Array.isArray(json)) return [];
+  return json.flatMap((item) => {
+    const value = isRecord(item) ? read(item) : null;
+    return value === null ? [] : [value];
+  });
+}

@@ -1,0 +1,94 @@
+//! What the station records: all that it hears.
+
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use skein_dbp::Happened;
+use skein_ground::GroundCore;
+use skein_ground::recorder::{Level, Recorder, RecorderError};
+use skein_wire::proto::TraceEvent;
+use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
+use skein_wire::{Scene, State};
+
+/// Planned paths are recorded this often.
+const PATH_PERIOD: Duration = Duration::from_millis(500);
+
+/// A `mission.mcap` that grows with the mission.
+pub struct Recording {
+    recorder: Recorder,
+    /// How many vehicles the file shows by now.
+    shown: usize,
+    paths_due: Duration,
+}
+
+impl Recording {
+    /// Begins `mission.mcap` in `folder`. One that is there already is kept, as `mission-<n>.mcap`.
+    pub fn create(folder: &Path) -> anyhow::Result<Self> {
+        let path = folder.join("mission.mcap");
+        if path.exists() {
+            let kept = (1_u32..)
+                .map(|number| folder.join(format!("mission-{number}.mcap")))
+                .find(|path| !path.exists());
+            if let Some(kept) = kept {
+                std::fs::rename(&path, &kept)
+                    .with_context(|| format!("{}: cannot be kept as {}", path.display(), kept.display()))?;
+            }
+        }
+        Ok(Self { recorder: Recorder::create(&path)?, shown: 0, paths_due: Duration::ZERO })
+    }
+
+    /// What stands in the world.
+    pub fn scene(&mut self, now: Duration, scene: &Scene) -> Result<(), RecorderError> {
+        self.recorder.scene(now, &scene.solids)
+    }
+
+    /// What has happened, and where the vehicles are.
+    pub fn take_in(
+        &mut self,
+        now: Duration,
+        station: &GroundCore,
+        happened: &[Happened],
+    ) -> Result<(), RecorderError> {
+        for happened in happened {
+            self.recorder.trace(&TraceEvent::new(station.name(), happened))?;
+            // The trace holds every leave to move; people do not need to read each.
+            if !matches!(happened.event.kind(), ADVANCE | HOMEWARD) {
+                self.recorder.log(now, Level::Info, happened.home.as_str(), &happened.event.to_string())?;
+            }
+        }
+        let heard: Vec<&State> = station.roster().filter_map(|(_, state)| state).collect();
+        if heard.len() > self.shown {
+            self.shown = heard.len();
+            let hulls: Vec<(&str, f64)> =
+                heard.iter().map(|state| (state.node.as_str(), state.radius_m)).collect();
+            self.recorder.vehicles(now, &hulls)?;
+        }
+        let poses: Vec<_> = heard.iter().map(|state| (state.node.as_str(), pose(state))).collect();
+        self.recorder.poses(now, &poses)?;
+        if now >= self.paths_due {
+            self.paths_due = now + PATH_PERIOD;
+            for state in heard {
+                self.recorder.path(now, state.node.as_str(), &state.path)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A line for people.
+    pub fn note(&mut self, now: Duration, level: Level, name: &str, line: &str) -> Result<(), RecorderError> {
+        self.recorder.log(now, level, name, line)
+    }
+
+    /// Completes the file.
+    pub fn finish(self) -> Result<(), RecorderError> {
+        self.recorder.finish()
+    }
+}
+
+/// Where a vehicle says that it is; it does not say how it is tilted.
+fn pose(state: &State) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, state.yaw_rad);
+    Isometry3::from_parts(Translation3::from(state.position), turn)
+}

@@ -1,0 +1,154 @@
+//! What browsers ask for: orders.
+
+use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
+
+use serde::Deserialize;
+use skein_dbp::NodeName;
+use tokio::sync::oneshot;
+
+use crate::{Destination, Order, Who};
+
+/// An operator's order that waits for the station.
+pub struct Wish {
+    /// What to do.
+    pub order: Order,
+    answer: oneshot::Sender<u64>,
+}
+
+impl Wish {
+    /// Tells the browser the number under which the station has given the order.
+    pub fn given_as(self, id: u64) {
+        // Who asked may have closed the page.
+        let _ = self.answer.send(id);
+    }
+}
+
+/// Where browsers put their orders.
+#[derive(Clone)]
+pub(super) struct Mailbox {
+    put: SyncSender<Wish>,
+    wake: Arc<dyn Fn() + Send + Sync>,
+}
+
+impl Mailbox {
+    pub(super) fn new(put: SyncSender<Wish>, wake: impl Fn() + Send + Sync + 'static) -> Self {
+        Self { put, wake: Arc::new(wake) }
+    }
+
+    /// Hands an order to the station; its number follows once it is given.
+    pub(super) fn put(&self, order: Order) -> Result<oneshot::Receiver<u64>, &'static str> {
+        let (answer, number) = oneshot::channel();
+        self.put.try_send(Wish { order, answer }).map_err(|_| "too many orders wait for the station")?;
+        (self.wake)();
+        Ok(number)
+    }
+}
+
+/// A message of a browser.
+#[derive(Deserialize)]
+struct Message {
+    #[serde(rename = "type")]
+    kind: Kind,
+    #[serde(default)]
+    tag: Option<String>,
+    what: What,
+    to: To,
+    #[serde(default)]
+    point: Option<(f64, f64, Option<f64>)>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Kind {
+    Order,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum What {
+    Launch,
+    Hold,
+    Resume,
+    Return,
+    Land,
+    #[serde(rename = "goto")]
+    GoTo,
+    HandBack,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum To {
+    Word(String),
+    Names(Vec<String>),
+}
+
+/// Reads a message: its tag, and the order or what is wrong with it.
+pub(super) fn read(text: &str) -> (Option<String>, Result<Order, String>) {
+    match serde_json::from_str::<Message>(text) {
+        Ok(message) => (message.tag.clone(), order(message)),
+        Err(error) => (None, Err(format!("not an order: {error}"))),
+    }
+}
+
+fn order(Message { kind: Kind::Order, what, to, point, .. }: Message) -> Result<Order, String> {
+    let who = match to {
+        To::Word(word) if word == "all" => Who::All,
+        To::Word(word) => return Err(format!("`to` is {word:?}: expected \"all\" or a list of vehicles")),
+        To::Names(names) if names.is_empty() => return Err("`to` names no vehicle".into()),
+        To::Names(names) => {
+            let names = names.iter().map(|name| NodeName::new(name)).collect::<Result<_, _>>();
+            Who::These(names.map_err(|error| error.to_string())?)
+        }
+    };
+    Ok(match what {
+        What::Launch if who == Who::All => Order::Launch,
+        What::Launch => return Err("a launch is for all: vehicles take off in turn".into()),
+        What::Hold => Order::Hold(who),
+        What::Resume => Order::Resume(who),
+        What::Return => Order::Return(who),
+        What::Land => Order::Land(who),
+        What::HandBack => Order::HandBack(who),
+        What::GoTo => {
+            let (x, y, z) = point.ok_or("`goto` needs a `point`: [x, y, z or null], metres")?;
+            let finite = x.is_finite() && y.is_finite() && z.is_none_or(f64::is_finite);
+            if !finite {
+                return Err("`point` must be finite numbers".into());
+            }
+            Order::GoTo(who, Destination { x, y, z })
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orders_are_read_for_one_for_some_and_for_all() {
+        let (tag, hold) = read(r#"{"type":"order","tag":"7","what":"hold","to":"all"}"#);
+        assert_eq!((tag.as_deref(), hold), (Some("7"), Ok(Order::Hold(Who::All))));
+        let (_, goto) = read(r#"{"type":"order","what":"goto","to":["uav/3"],"point":[1,-2.5,null]}"#);
+        let who = Who::only(NodeName::new("uav/3").unwrap());
+        assert_eq!(goto, Ok(Order::GoTo(who, Destination { x: 1.0, y: -2.5, z: None })));
+    }
+
+    #[test]
+    fn what_is_no_order_is_refused_with_the_field_at_fault() {
+        for (text, fault) in [
+            ("", "not an order"),
+            ("[]", "not an order"),
+            (r#"{"type":"order","what":"explode","to":"all"}"#, "unknown variant `explode`"),
+            (r#"{"type":"order","what":"hold","to":"some"}"#, "`to`"),
+            (r#"{"type":"order","what":"hold","to":[]}"#, "`to`"),
+            (r#"{"type":"order","what":"hold","to":["uav"]}"#, "uav"),
+            (r#"{"type":"order","what":"goto","to":"all"}"#, "`point`"),
+            (r#"{"type":"order","what":"goto","to":"all","point":[1e999,0,0]}"#, "number out of range"),
+            (r#"{"type":"order","what":"launch","to":["uav/1"]}"#, "for all"),
+        ] {
+            let error = read(text).1.expect_err(text);
+            assert!(error.contains(fault), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! Who has heard an order, and who has not.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+use skein_dbp::{Happened, Node, NodeName};
+use skein_wire::vocabulary::{DECLINED, ORDER, TAKEOFF};
+
+use crate::Order;
+use crate::bthreads::Hold;
+
+/// How many orders are remembered.
+const KEPT: usize = 10;
+
+/// An order, and what has become of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OrderRecord {
+    /// Its number at this station, from 1.
+    pub id: u64,
+    /// The order.
+    pub order: Order,
+    /// When it was given, on the station's clock.
+    pub at: Duration,
+    /// What each vehicle that it is for has said to it.
+    pub answers: BTreeMap<NodeName, Answer>,
+}
+
+/// What a vehicle has said to an order.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answer {
+    /// Nothing yet.
+    Pending,
+    /// Nothing, and it is out of reach.
+    Missing,
+    /// It has taken the order in, so long after it was given. A hold is acknowledged once it is sure to be kept.
+    Acknowledged(Duration),
+    /// It does not carry the order out, or will not hear of it any more, and this is why.
+    Refused(String),
+}
+
+impl Answer {
+    fn is_open(&self) -> bool {
+        matches!(self, Self::Pending | Self::Missing)
+    }
+}
+
+/// The latest orders, oldest first.
+#[derive(Debug, Default)]
+pub(crate) struct OrderLog {
+    records: VecDeque<OrderRecord>,
+    given: u64,
+    /// Grows with every change.
+    revision: u64,
+}
+
+impl OrderLog {
+    /// An order is given at `now` to `vehicles`. Whatever they have not taken in before will not be said to them again.
+    pub(crate) fn give(
+        &mut self,
+        now: Duration,
+        order: Order,
+        vehicles: impl Iterator<Item = NodeName>,
+    ) -> u64 {
+        let answers: BTreeMap<_, _> = vehicles.map(|vehicle| (vehicle, Answer::Pending)).collect();
+        let earlier = self.records.iter_mut().flat_map(|record| &mut record.answers);
+        for (_, answer) in
+            earlier.filter(|(vehicle, answer)| answers.contains_key(*vehicle) && answer.is_open())
+        {
+            *answer = Answer::Refused("another order has taken its place".into());
+        }
+        self.given += 1;
+        self.revision += 1;
+        if self.records.len() == KEPT {
+            self.records.pop_front();
+        }
+        self.records.push_back(OrderRecord { id: self.given, order, at: now, answers });
+        self.given
+    }
+
+    /// Takes in what has happened since the last call.
+    pub(crate) fn update(&mut self, now: Duration, node: &Node, happened: &[Happened]) {
+        for record in &mut self.records {
+            let after = now.saturating_sub(record.at);
+            let mut answered = Vec::new();
+            for happened in happened {
+                answered
+                    .extend(answer_in(&record.order, happened, after).map(|answer| (&happened.home, answer)));
+            }
+            if matches!(record.order, Order::Hold(_)) {
+                let kept = node.kept_by(Hold::NAME).filter(|(_, kept)| *kept);
+                answered.extend(kept.map(|(vehicle, _)| (vehicle, Answer::Acknowledged(after))));
+            }
+            for (vehicle, answer) in answered {
+                // A refusal may follow an acknowledgement; nothing else changes what has been said.
+                let open = record.answers.get(vehicle).is_some_and(|known| {
+                    known.is_open()
+                        || matches!((known, &answer), (Answer::Acknowledged(_), Answer::Refused(_)))
+                });
+                if open {
+                    record.answers.insert(vehicle.clone(), answer);
+                    self.revision += 1;
+                }
+            }
+            for (vehicle, answer) in record.answers.iter_mut().filter(|(_, answer)| answer.is_open()) {
+                let alive = node.peers().any(|(peer, state)| peer == vehicle && state.alive);
+                let now_it_is = if alive { Answer::Pending } else { Answer::Missing };
+                if *answer != now_it_is {
+                    *answer = now_it_is;
+                    self.revision += 1;
+                }
+            }
+        }
+    }
+
+    pub(crate) fn records(&self) -> impl Iterator<Item = &OrderRecord> {
+        self.records.iter()
+    }
+
+    pub(crate) fn revision(&self) -> u64 {
+        self.revision
+    }
+}
+
+/// What an event at a vehicle says to an order.
+fn answer_in(order: &Order, happened: &Happened, after: Duration) -> Option<Answer> {
+    let event = &happened.event;
+    let about_it = event.text("what") == Some(order.what());
+    match event.kind() {
+        TAKEOFF if *order == Order::Launch => Some(Answer::Acknowledged(after)),
+        ORDER if about_it => Some(Answer::Acknowledged(after)),
+        DECLINED if about_it => {
+            Some(Answer::Refused(event.text("why").unwrap_or("it says no more").to_owned()))
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,65 @@
+//! What comes in that is of no use, in a line a second at most.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use skein_wire::{NodeLink, NodeName};
+
+use crate::ZenohLink;
+
+/// Between two lines.
+const PERIOD: Duration = Duration::from_secs(1);
+
+/// Looks at what a node could not use, and says so when there is more of it.
+#[derive(Debug, Default)]
+pub struct Complaints {
+    told: [u64; 5],
+    told_versions: BTreeMap<NodeName, u32>,
+    due: Duration,
+}
+
+impl Complaints {
+    /// A line, if there is something new to complain about and the last one is a second ago. Counts are since the start.
+    pub fn check(&mut self, now: Duration, node: &NodeLink, link: &ZenohLink) -> Option<String> {
+        if now < self.due {
+            return None;
+        }
+        let (heard, arrived) = (node.stats(), link.stats());
+        let counts = [heard.undecodable, heard.forged, arrived.oversized, arrived.misnamed, arrived.dropped];
+        let versions: BTreeMap<_, _> = node.skewed().map(|(node, version)| (node.clone(), version)).collect();
+        if counts == self.told && versions == self.told_versions {
+            return None;
+        }
+        let mut line = String::new();
+        let what = [
+            "undecodable",
+            "under a key that is not their sender's",
+            "too long",
+            "under strange keys",
+            "dropped because the node was too slow",
+        ];
+        if counts != self.told {
+            let listed: Vec<String> = counts
+                .iter()
+                .zip(what)
+                .filter(|(count, _)| **count > 0)
+                .map(|(count, what)| format!("{count} {what}"))
+                .collect();
+            let _ = write!(line, "messages passed over so far: {}. ", listed.join(", "));
+        }
+        for (node, version) in
+            versions.iter().filter(|(node, version)| self.told_versions.get(*node) != Some(version))
+        {
+            let own = skein_wire::VERSION;
+            let _ = write!(
+                line,
+                "{node} speaks version {version} of the messages and this node {own}: update one of them. "
+            );
+        }
+        self.told = counts;
+        self.told_versions = versions;
+        self.due = now + PERIOD;
+        (!line.is_empty()).then(|| line.trim_end().to_owned())
+    }
+}

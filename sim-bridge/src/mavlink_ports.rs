@@ -1,0 +1,127 @@
+//! The vehicles' MAVLink links over UDP, as PX4 lays them out.
+//!
+//! | vehicle `i`, from 0 | listens on | sends to | for |
+//! |---|---|---|---|
+//! | companion link | 127.0.0.1:14580 + i | 127.0.0.1:14540 + i, until somebody speaks | agents, MAVSDK, MAVROS |
+//! | ground link | 127.0.0.1:18570 + i | 127.0.0.1:14550, all vehicles | QGroundControl, pymavlink |
+//!
+//! Whoever speaks to a port is answered there too, until silent for ten seconds.
+
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::time::{Duration, Instant};
+
+use anyhow::Context as _;
+
+const COMPANION: (u16, u16) = (14580, 14540);
+const GROUND: (u16, u16) = (18570, 14550);
+/// Who has been silent for longer is no longer sent to.
+const SILENT_AFTER: Duration = Duration::from_secs(10);
+/// Largest datagram taken in; MAVLink's frames are at most 280 bytes.
+const DATAGRAM: usize = 2048;
+/// Most datagrams taken in on one port in one step: a flood delays nobody's control loop.
+const MOST_PER_STEP: usize = 64;
+/// Most clients of one port; a further one takes the place of whoever has been silent the longest.
+const MOST_CLIENTS: usize = 16;
+
+/// The ports of all vehicles of a world.
+pub struct MavlinkPorts {
+    vehicles: Vec<[Port; 2]>,
+}
+
+impl MavlinkPorts {
+    /// Opens two ports for each vehicle, all `offset` further up than by convention.
+    ///
+    /// # Errors
+    /// The port that is taken.
+    pub fn open(vehicles: usize, offset: u16) -> anyhow::Result<Self> {
+        let open = |vehicle| {
+            let index = u16::try_from(vehicle)? + offset;
+            let companion = Port::open(COMPANION.0 + index, COMPANION.1 + index, false)?;
+            Ok([companion, Port::open(GROUND.0 + index, GROUND.1 + offset, true)?])
+        };
+        Ok(Self { vehicles: (0..vehicles).map(open).collect::<anyhow::Result<_>>()? })
+    }
+
+    /// Hands on whatever has come, each for the autopilot of a vehicle.
+    pub fn receive(&mut self, mut take_in: impl FnMut(usize, &[u8])) {
+        for (index, ports) in self.vehicles.iter_mut().enumerate() {
+            for port in ports {
+                port.receive(|bytes| take_in(index, bytes));
+            }
+        }
+    }
+
+    /// Sends what the autopilot of vehicle `index` says.
+    pub fn send(&mut self, index: usize, bytes: &[u8]) {
+        for port in self.vehicles.get_mut(index).into_iter().flatten() {
+            port.send(bytes);
+        }
+    }
+
+    /// Where the companion link of vehicle `index` listens.
+    pub fn companion_port(&self, index: usize) -> Option<u16> {
+        self.vehicles.get(index).map(|[companion, _]| companion.listens_on)
+    }
+}
+
+/// One UDP port, with whoever talks to it.
+struct Port {
+    socket: UdpSocket,
+    listens_on: u16,
+    /// Who is spoken to unasked.
+    audience: SocketAddr,
+    /// Whether it is spoken to even while others speak.
+    always: bool,
+    clients: Vec<(SocketAddr, Instant)>,
+}
+
+impl Port {
+    fn open(listens_on: u16, sends_to: u16, always: bool) -> anyhow::Result<Self> {
+        let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, listens_on)).with_context(|| {
+            format!(
+                "UDP port {listens_on}: is taken; is another simulator running? --port-offset chooses others"
+            )
+        })?;
+        socket.set_nonblocking(true)?;
+        let audience = SocketAddr::from((Ipv4Addr::LOCALHOST, sends_to));
+        Ok(Self { socket, listens_on, audience, always, clients: Vec::new() })
+    }
+
+    /// Hands on every datagram that has come, and remembers who sent it.
+    fn receive(&mut self, mut take_in: impl FnMut(&[u8])) {
+        let mut datagram = [0; DATAGRAM];
+        for _ in 0..MOST_PER_STEP {
+            match self.socket.recv_from(&mut datagram) {
+                Ok((length, from)) => {
+                    self.remember(from);
+                    take_in(&datagram[..length]);
+                }
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
+                // A client that is gone shows as a refused connection here; the next datagram may be another's.
+                Err(_) => {}
+            }
+        }
+    }
+
+    fn remember(&mut self, from: SocketAddr) {
+        self.clients.retain(|(client, heard)| *client != from && heard.elapsed() < SILENT_AFTER);
+        if self.clients.len() == MOST_CLIENTS {
+            self.clients.remove(0);
+        }
+        self.clients.push((from, Instant::now()));
+    }
+
+    fn send(&self, bytes: &[u8]) {
+        if bytes.is_empty() {
+            return;
+        }
+        let spoken = self.clients.iter().any(|(client, _)| *client == self.audience);
+        let unasked = (self.always && !spoken) || self.clients.is_empty();
+        let audience = unasked.then_some(&self.audience);
+        for client in audience.into_iter().chain(self.clients.iter().map(|(client, _)| client)) {
+            // Nobody listening is no error: the vehicle flies on, and its failsafes with it.
+            let _ = self.socket.send_to(bytes, client);
+        }
+    }
+}

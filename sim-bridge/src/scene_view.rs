@@ -1,0 +1,24 @@
+//! A world's obstacles as recordings and the console show them.
+
+use skein_wire::{Form, Solid};
+use skein_world::{Obstacle, Scene, Shape};
+
+/// What stands in `scene`; planes without end are left out.
+#[must_use]
+pub fn view(scene: &Scene) -> skein_wire::Scene {
+    let solid = |obstacle: &Obstacle| {
+        let form = match obstacle.shape {
+            Shape::Box { half_extents } => Form::Box(2.0 * half_extents),
+            Shape::Cylinder { radius, half_height } => Form::Cylinder { radius, height: 2.0 * half_height },
+            Shape::Sphere { radius } => Form::Sphere { radius },
+            Shape::Plane { .. } => return None,
+        };
+        Some(Solid { form, pose: obstacle.pose })
+    };
+    let bounds = scene.bounds();
+    skein_wire::Scene {
+        min: bounds.min,
+        max: bounds.max,
+        solids: scene.obstacles().iter().filter_map(solid).collect(),
+    }
+}

@@ -1,0 +1,254 @@
+//! The world alone, for agents in other processes: autopilots over MAVLink, lidars and the scene over Zenoh.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::{Duration, Instant, SystemTime};
+
+use anyhow::Context as _;
+use serde::Deserialize;
+use skein_agent::Outcome;
+use skein_dbp::{Message, NodeName};
+use skein_wire::{Fleet, Key, Link as _, MissionState, Payload, Scan, State, Topic};
+use skein_world::{LidarScan, STEP, Simulation};
+use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
+
+use crate::fly::{FLEET, report, simulation_config, vehicle_name};
+use crate::mavlink_ports::MavlinkPorts;
+use crate::scenario::Scenario;
+use crate::scene_view;
+use crate::summary::{EventCounts, Traffic};
+
+/// The world's node name unless configured otherwise.
+pub const WORLD: &str = "sim/world";
+/// Where the world listens unless configured otherwise.
+const LISTEN: &str = "tcp/127.0.0.1:7446";
+/// The scene is told this often, for ground stations that start late.
+const SCENE_PERIOD: Duration = Duration::from_secs(1);
+/// A world that is further behind the clock, because it was stopped or cannot keep up, does not hurry to catch up: its
+/// vehicles would fly without their agents.
+const MOST_BEHIND: Duration = Duration::from_millis(40);
+
+/// The configuration file of a world; `sim-bridge/world.toml` explains it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WorldConfig {
+    fleet: String,
+    node: String,
+    network: NetworkSettings,
+}
+
+impl Default for WorldConfig {
+    fn default() -> Self {
+        let network = NetworkSettings { listen: vec![LISTEN.to_owned()], ..NetworkSettings::default() };
+        Self { fleet: FLEET.to_owned(), node: WORLD.to_owned(), network }
+    }
+}
+
+impl WorldConfig {
+    /// Reads a configuration file.
+    ///
+    /// # Errors
+    /// The file and the field at fault.
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        let mut config: Self = toml::from_str(&text).with_context(|| path.display().to_string())?;
+        config.network = config.network.relative_to(path.parent().unwrap_or(Path::new("")));
+        Ok(config)
+    }
+}
+
+/// A world that keeps pace with the clock on the wall.
+pub struct WorldHost {
+    simulation: Simulation,
+    ports: MavlinkPorts,
+    link: ZenohLink,
+    locators: Vec<String>,
+    scan_keys: Vec<Key>,
+    scene_key: Key,
+    scene: Vec<u8>,
+    scene_due: Duration,
+    /// Each vehicle's last word.
+    heard: BTreeMap<NodeName, State>,
+    events: EventCounts,
+    traffic: Traffic,
+    /// When the world's time 0 would have been.
+    began: Instant,
+    speed: f64,
+    lost: Duration,
+}
+
+impl WorldHost {
+    /// A world that nobody has joined yet.
+    ///
+    /// # Errors
+    /// A port that is taken; an endpoint that cannot be used.
+    pub fn open(
+        scenario: &Scenario,
+        config: WorldConfig,
+        speed: f64,
+        port_offset: u16,
+    ) -> anyhow::Result<Self> {
+        let fleet = Fleet::new(&config.fleet)?;
+        let node = NodeName::new(&config.node)?;
+        let ports = MavlinkPorts::open(scenario.vehicles.len(), port_offset)?;
+        let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
+        let occurrences = Key::occurrences(&fleet);
+        let scan_key = |index| {
+            let topic = Topic::Scan { sensor: node.clone(), vehicle: vehicle_name(index) };
+            Key::new(&fleet, topic)
+        };
+        Ok(Self {
+            simulation: Simulation::new(simulation_config(scenario)),
+            ports,
+            link: session.listen(vec![Key::states(&fleet), occurrences])?,
+            locators: session.locators().to_vec(),
+            scan_keys: (0..scenario.vehicles.len()).map(scan_key).collect(),
+            scene: Payload::Scene(scene_view::view(&scenario.scene)).encode(),
+            scene_key: Key::new(&fleet, Topic::Scene { node }),
+            scene_due: Duration::ZERO,
+            heard: BTreeMap::new(),
+            events: EventCounts::default(),
+            traffic: Traffic::default(),
+            began: Instant::now(),
+            speed,
+            lost: Duration::ZERO,
+        })
+    }
+
+    /// Waits for the next step's time, and takes it.
+    pub fn step(&mut self) {
+        self.keep_pace();
+        self.ports.receive(|index, bytes| self.simulation.send(index, bytes));
+        self.simulation.step();
+        for index in 0..self.scan_keys.len() {
+            let bytes = self.simulation.receive(index);
+            self.ports.send(index, &bytes);
+        }
+        for (index, scan) in self.simulation.take_scans() {
+            if let Some(key) = self.scan_keys.get(index) {
+                let scan = timed(scan, self.simulation.now());
+                self.link.put(key, Payload::Scan(scan).encode());
+            }
+        }
+        if self.simulation.now() >= self.scene_due {
+            self.scene_due = self.simulation.now() + SCENE_PERIOD;
+            self.link.put(&self.scene_key, self.scene.clone());
+        }
+        self.listen();
+    }
+
+    fn keep_pace(&mut self) {
+        let due = self.began + (self.simulation.now() + STEP).div_f64(self.speed);
+        match Instant::now().checked_duration_since(due) {
+            None => std::thread::sleep(due.saturating_duration_since(Instant::now())),
+            Some(behind) if behind > MOST_BEHIND => {
+                self.began += behind;
+                self.lost += behind;
+            }
+            Some(_) => {}
+        }
+    }
+
+    fn listen(&mut self) {
+        while let Some((key, payload)) = self.link.poll() {
+            self.traffic.messages += 1;
+            self.traffic.bytes += payload.len() as u64;
+            match Payload::decode(&payload) {
+                Ok(Payload::State(state)) if *key.sender() == state.node => {
+                    self.heard.insert(state.node.clone(), state);
+                }
+                Ok(Payload::Message(Message::Occurrence(occurrence))) => {
+                    self.events.occurred += 1;
+                    let from_afar = occurrence.requested_by.iter().any(|bthread| bthread.contains('#'));
+                    self.events.remote += u64::from(from_afar);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// How each vehicle's mission ended, as far as it has, by its agent's word.
+    fn outcomes(&self) -> impl Iterator<Item = Option<Outcome>> + '_ {
+        (0..self.scan_keys.len()).map(|index| {
+            let state = self.heard.get(&vehicle_name(index))?;
+            match state.mission {
+                MissionState::UnderWay => None,
+                MissionState::Complete => Some(Outcome::Complete),
+                MissionState::Failed => Some(Outcome::Failed(state.task.clone())),
+            }
+        })
+    }
+
+    /// Whether every mission has ended, and nobody is in the air.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        let crashed = |index| self.simulation.vehicle(index).is_some_and(|vehicle| vehicle.crashed);
+        self.is_grounded()
+            && self.outcomes().enumerate().all(|(index, outcome)| outcome.is_some() || crashed(index))
+    }
+
+    /// Whether nobody is in the air.
+    #[must_use]
+    pub fn is_grounded(&self) -> bool {
+        (0..self.scan_keys.len())
+            .all(|index| self.simulation.vehicle(index).is_none_or(|vehicle| !vehicle.airborne))
+    }
+
+    /// What may be said of the run so far.
+    #[must_use]
+    pub fn account(&self) -> report::Account<'_> {
+        report::Account {
+            simulation: &self.simulation,
+            outcomes: self.outcomes().collect(),
+            set_points: Vec::new(),
+            plan_times_ms: &[],
+            events: self.events,
+            network: self.traffic,
+            trace_hash: String::new(),
+        }
+    }
+
+    /// The world.
+    #[must_use]
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// A vehicle's last word.
+    #[must_use]
+    pub fn heard(&self, index: usize) -> Option<&State> {
+        self.heard.get(&vehicle_name(index))
+    }
+
+    /// Where other nodes can connect to this one.
+    #[must_use]
+    pub fn locators(&self) -> &[String] {
+        &self.locators
+    }
+
+    /// The vehicles' MAVLink ports.
+    #[must_use]
+    pub fn ports(&self) -> &MavlinkPorts {
+        &self.ports
+    }
+
+    /// For how long the world stood still because it was stopped or the computer could not keep up.
+    #[must_use]
+    pub fn lost(&self) -> Duration {
+        self.lost
+    }
+}
+
+/// A scan with its time on this computer's clock.
+fn timed(scan: LidarScan, now: Duration) -> Scan {
+    let unix = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
+    Scan {
+        measured_at_unix: unix.saturating_sub(now.saturating_sub(scan.stamp)),
+        angle_min: scan.angle_min,
+        angle_step: scan.angle_step,
+        max_range_m: scan.max_range_m,
+        ranges_m: scan.ranges_m,
+        up_m: scan.up_m,
+        down_m: scan.down_m,
+    }
+}
