@@ -14,7 +14,7 @@ use skein_wire::{Fleet, Link, MissionState, NodeLink, State, vocabulary};
 
 use crate::{
     bthreads,
-    config::{AgentConfig, Controller},
+    config::{AgentConfig, Controller, Envelope},
     failsafes::Failsafes,
     flight::{Flight, FlightPhase},
     me::Me,
@@ -38,6 +38,14 @@ const BELOW_WAYPOINTS_M: f64 = 1.0;
 const LEAST_HEIGHT_M: f64 = 0.6;
 /// An agent that has not run for this long has let its set-points fall silent, and does not take them up by itself.
 const LONGEST_PAUSE: Duration = SILENT_AFTER;
+/// Neighbours are heard this often at least, while they are, s.
+const NEIGHBOUR_PERIOD_S: f64 = 0.5;
+/// One that is silent may fly anywhere, from its last word until this vehicle is up, s.
+const CLIMB_S: f64 = 4.0;
+/// Beyond this it may be anywhere in the arena, s.
+const MOST_UNSEEN_S: f64 = 4.0;
+/// After so long a silence, s, its failsafe has landed it, or its mission is over.
+const SURELY_DOWN_S: f64 = 45.0;
 /// A navigation cycle and a state message to the others begin this often.
 const CYCLE_PERIOD: Duration = Duration::from_millis(100);
 
@@ -276,7 +284,12 @@ impl AgentCore {
     fn watch(&mut self, now: Duration, neighbours: &[Neighbour]) {
         let telemetry = self.companion.telemetry();
         let mut events = Vec::new();
-        events.extend(self.watches.preflight(now, telemetry, self.failsafes.are_sound()));
+        events.extend(self.watches.preflight(
+            now,
+            telemetry,
+            self.failsafes.are_sound(),
+            self.is_overhead_clear(neighbours),
+        ));
         if let (true, Some(position)) = (self.is_airborne(), telemetry.position) {
             if let Some(battery) = telemetry.battery {
                 let home = Vector3::from(self.config.home);
@@ -289,6 +302,21 @@ impl AgentCore {
         for event in events {
             self.node.node_mut().enqueue(event);
         }
+    }
+
+    /// Whether nobody flies where this vehicle would climb, as far as can be known: one that is silent may have come
+    /// closer meanwhile.
+    fn is_overhead_clear(&self, neighbours: &[Neighbour]) -> bool {
+        let Envelope { separation_m, cruise_m_s, .. } = self.config.envelope;
+        let [x, y, _] = self.config.home;
+        neighbours.iter().filter(|neighbour| neighbour.armed).all(|neighbour| {
+            let unseen_s = match neighbour.track.age_s {
+                age_s if age_s < NEIGHBOUR_PERIOD_S || age_s > SURELY_DOWN_S => 0.0,
+                age_s => age_s.min(MOST_UNSEEN_S) + CLIMB_S,
+            };
+            let offset = neighbour.position().xy() - nalgebra::Vector2::new(x, y);
+            offset.norm() > separation_m + unseen_s * cruise_m_s
+        })
     }
 
     /// A navigation cycle: looks along the path, and tells the others where this vehicle is.

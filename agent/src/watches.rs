@@ -74,18 +74,20 @@ impl Watches {
         }
     }
 
-    /// Preflight: the autopilot is heard, ready to arm, charged, and its failsafes are sound.
+    /// Preflight: the autopilot is heard, ready to arm, charged, its failsafes are sound, and nobody is overhead.
     pub fn preflight(
         &mut self,
         now: Duration,
         telemetry: &Telemetry,
         failsafes_sound: bool,
+        overhead_clear: bool,
     ) -> Option<Event> {
         let charged = telemetry.battery.is_some_and(|battery| battery.value.fraction >= BATTERY_TO_START);
         let ready = telemetry.connected
             && telemetry.ready_to_arm
             && telemetry.home.is_some()
-            && (telemetry.landed == Landed::OnGround && !telemetry.armed || self.ready.0 && telemetry.armed)
+            && (telemetry.landed == Landed::OnGround && !telemetry.armed && overhead_clear
+                || self.ready.0 && telemetry.armed)
             && telemetry.is_fresh(now, TELEMETRY_FRESH_FOR)
             && charged
             && failsafes_sound;

@@ -56,6 +56,12 @@ pub enum Command {
     Serve(Serve),
     /// Write the configuration files of a scenario's swarm, for one process each.
     Configure(Configure),
+    /// Run something many times with faults, and judge it: exit 1 if anything was violated.
+    Campaign {
+        /// What.
+        #[command(subcommand)]
+        what: Campaign,
+    },
     /// Measure something, and print it.
     Bench {
         /// What.
@@ -68,6 +74,33 @@ pub enum Command {
     Check {
         /// A scenario (.toml), world (.sdf, .world, .csv) or mission (.plan, .json), or a built-in scenario's name.
         file: PathBuf,
+    },
+}
+
+/// Campaigns.
+#[derive(Debug, Clone, PartialEq, Subcommand)]
+pub enum Campaign {
+    /// A swarm as processes over Zenoh, in real time, with a fault at a random moment of each flight.
+    #[cfg(feature = "zenoh")]
+    Processes {
+        /// How many runs of each fault.
+        #[arg(long, value_name = "N", default_value_t = 10)]
+        seeds: u64,
+        /// Only these faults.
+        #[arg(long = "fault", value_name = "FAULT", value_enum)]
+        faults: Vec<crate::campaign::processes::Fault>,
+        /// How many at once.
+        #[arg(long, value_name = "N", default_value_t = 2)]
+        jobs: u16,
+        /// Folder for configurations, logs and recordings.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// Use network ports so much further up, beside another swarm on this computer.
+        #[arg(long, value_name = "N", default_value_t = 3000)]
+        port_offset: u16,
+        /// How the processes are joined.
+        #[arg(long, value_enum, default_value_t = Network::Peer)]
+        network: Network,
     },
 }
 

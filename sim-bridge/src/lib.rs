@@ -5,6 +5,8 @@
 
 #[cfg(feature = "zenoh")]
 pub mod bench;
+#[cfg(feature = "zenoh")]
+pub mod campaign;
 pub mod check;
 pub mod cli;
 #[cfg(feature = "zenoh")]
@@ -13,6 +15,8 @@ pub mod fly;
 #[cfg(feature = "zenoh")]
 mod mavlink_ports;
 pub mod mission;
+#[cfg(feature = "zenoh")]
+pub mod operator;
 #[cfg(feature = "zenoh")]
 pub mod processes;
 pub mod scenario;

@@ -28,9 +28,31 @@ pub struct Processes {
     world: WorldHost,
     files: Files,
     logs: PathBuf,
-    nodes: BTreeMap<NodeName, Child>,
+    folder: PathBuf,
+    nodes: BTreeMap<NodeName, Running>,
     router: Option<Child>,
     port_offset: u16,
+}
+
+/// A node's process.
+struct Running {
+    child: Child,
+    since: Instant,
+}
+
+/// A second process of a node. It ends with this.
+pub struct Double {
+    child: Child,
+    /// Where it writes what it has to say.
+    pub log: PathBuf,
+}
+
+impl Drop for Double {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
 }
 
 /// How the processes are set up.
@@ -50,6 +72,16 @@ impl Processes {
     /// # Errors
     /// A program that is missing, a port that is taken, a file that cannot be written.
     pub fn start(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result<Self> {
+        let mut processes = Self::prepare(scenario, folder, setup)?;
+        processes.start_all()?;
+        Ok(processes)
+    }
+
+    /// The same, but starts nothing but the world and, where there is one, the router.
+    ///
+    /// # Errors
+    /// A program that is missing, a port that is taken, a file that cannot be written.
+    pub fn prepare(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result<Self> {
         let Setup { network, port_offset, launch_on_order } = setup;
         let files = configure::write(scenario, folder, network, port_offset, launch_on_order)?;
         let logs = folder.join("logs");
@@ -60,12 +92,73 @@ impl Processes {
         };
         let world = WorldHost::open(scenario, WorldConfig::read(&files.world)?, 1.0, port_offset)?;
         let nodes = BTreeMap::new();
-        let mut processes = Self { world, files, logs, nodes, router, port_offset };
-        processes.start_node(&GROUND)?;
-        for index in 0..scenario.vehicles.len() {
-            processes.start_node(&vehicle_name(index))?;
+        let folder = folder.to_owned();
+        Ok(Self { world, files, folder, logs, nodes, router, port_offset })
+    }
+
+    /// Starts the ground station and all agents.
+    ///
+    /// # Errors
+    /// A program that is missing.
+    pub fn start_all(&mut self) -> anyhow::Result<()> {
+        self.start_node(&GROUND)?;
+        (0..self.files.agents.len()).try_for_each(|index| self.start_node(&vehicle_name(index)))
+    }
+
+    /// Leads the agent of vehicle `index` to another port in the place of one that its configuration names.
+    ///
+    /// # Errors
+    /// Its configuration cannot be changed, or does not name that port.
+    pub fn reroute(&self, index: usize, from: u16, to: u16) -> anyhow::Result<()> {
+        let path = self.files.agents.get(index).context("no such vehicle")?;
+        let text = std::fs::read_to_string(path)?;
+        let rerouted = text.replace(&format!("tcp/127.0.0.1:{from}"), &format!("tcp/127.0.0.1:{to}"));
+        anyhow::ensure!(rerouted != text, "{} does not name port {from}", path.display());
+        Ok(std::fs::write(path, rerouted)?)
+    }
+
+    /// Starts a second process with a vehicle's own configuration.
+    ///
+    /// # Errors
+    /// Its program is missing.
+    pub fn start_double(&self, node: &NodeName) -> anyhow::Result<Double> {
+        let log = self.logs.join(format!("{}-double.log", node.as_str().replace('/', "-")));
+        // With a place of its own to listen: only its name is that of the other.
+        let config = self.config_of(node)?;
+        let text = std::fs::read_to_string(config)?;
+        let listens = |line: &&str| line.starts_with("listen = ");
+        let own =
+            text.lines().map(|line| if listens(&line) { "listen = [\"tcp/127.0.0.1:0\"]" } else { line });
+        let double = config.with_extension("double.toml");
+        std::fs::write(&double, own.collect::<Vec<_>>().join("\n"))?;
+        let mut command = Command::new(beside("skein-agent")?);
+        command.arg("run").arg("--config").arg(double);
+        Ok(Double { child: spawn(command, &log)?, log })
+    }
+
+    /// Where configurations, logs and the recording are.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// How much further up than by convention all network ports are.
+    #[must_use]
+    pub fn port_offset(&self) -> u16 {
+        self.port_offset
+    }
+
+    /// For how long a node's process has run.
+    #[must_use]
+    pub fn age_of(&self, node: &NodeName) -> Option<Duration> {
+        self.nodes.get(node).map(|running| running.since.elapsed())
+    }
+
+    fn config_of(&self, node: &NodeName) -> anyhow::Result<&Path> {
+        match node.as_str().strip_prefix("uav/").and_then(|number| number.parse::<usize>().ok()) {
+            None => Ok(&self.files.ground),
+            Some(number) => Ok(self.files.agents.get(number.saturating_sub(1)).context("no such vehicle")?),
         }
-        Ok(processes)
     }
 
     /// Starts a node, for the first time or again.
@@ -73,17 +166,13 @@ impl Processes {
     /// # Errors
     /// Its program is missing.
     pub fn start_node(&mut self, node: &NodeName) -> anyhow::Result<()> {
-        let config = match node.as_str().strip_prefix("uav/").and_then(|number| number.parse::<usize>().ok())
-        {
-            None => &self.files.ground,
-            Some(number) => self.files.agents.get(number.saturating_sub(1)).context("no such vehicle")?,
-        };
+        let config = self.config_of(node)?;
         let (program, verb) =
             if *node == *GROUND { ("skein-ground", "serve") } else { ("skein-agent", "run") };
         let mut command = Command::new(beside(program)?);
         command.arg(verb).arg("--config").arg(config);
         let child = spawn(command, &self.log_of(node))?;
-        self.nodes.insert(node.clone(), child);
+        self.nodes.insert(node.clone(), Running { child, since: Instant::now() });
         Ok(())
     }
 
@@ -115,8 +204,8 @@ impl Processes {
     /// # Errors
     /// There is no such process any more.
     pub fn signal(&self, node: &NodeName, signal: Signal) -> anyhow::Result<()> {
-        let child = self.nodes.get(node).context("no such process")?;
-        kill(pid(child), signal).with_context(|| format!("{node} cannot be sent {signal}"))
+        let running = self.nodes.get(node).context("no such process")?;
+        kill(pid(&running.child), signal).with_context(|| format!("{node} cannot be sent {signal}"))
     }
 
     /// Ends a node's process without warning.
@@ -124,37 +213,37 @@ impl Processes {
     /// # Errors
     /// There is no such process any more.
     pub fn kill(&mut self, node: &NodeName) -> anyhow::Result<()> {
-        let mut child = self.nodes.remove(node).context("no such process")?;
-        child.kill()?;
-        child.wait()?;
+        let mut running = self.nodes.remove(node).context("no such process")?;
+        running.child.kill()?;
+        running.child.wait()?;
         Ok(())
     }
 
     /// A node whose process has ended by itself, with how.
     pub fn ended(&mut self) -> Option<String> {
-        self.nodes.iter_mut().find_map(|(node, child)| {
-            let status = child.try_wait().ok()??;
+        self.nodes.iter_mut().find_map(|(node, running)| {
+            let status = running.child.try_wait().ok()??;
             Some(format!("{node} has ended by itself, {status}"))
         })
     }
 
     /// Asks the agents to land.
     pub fn call_off(&self) {
-        for (_, child) in self.nodes.iter().filter(|(node, _)| **node != *GROUND) {
+        for (_, running) in self.nodes.iter().filter(|(node, _)| **node != *GROUND) {
             // Whoever has ended already needs no asking.
-            let _ = kill(pid(child), Signal::SIGTERM);
+            let _ = kill(pid(&running.child), Signal::SIGTERM);
         }
     }
 
     /// Asks all processes to end, and waits until they have: agents land first what still flies.
     pub fn end(mut self) {
-        for child in self.nodes.values() {
+        for running in self.nodes.values() {
             // Whoever has ended already needs no asking.
-            let _ = kill(pid(child), Signal::SIGTERM);
+            let _ = kill(pid(&running.child), Signal::SIGTERM);
         }
         let deadline = Instant::now() + TIME_TO_END;
         while Instant::now() < deadline
-            && self.nodes.values_mut().any(|child| matches!(child.try_wait(), Ok(None)))
+            && self.nodes.values_mut().any(|running| matches!(running.child.try_wait(), Ok(None)))
         {
             self.world.step();
         }
@@ -163,7 +252,8 @@ impl Processes {
 
 impl Drop for Processes {
     fn drop(&mut self) {
-        for child in self.nodes.values_mut().chain(&mut self.router) {
+        let nodes = self.nodes.values_mut().map(|running| &mut running.child);
+        for child in nodes.chain(&mut self.router) {
             // Nothing is left behind, whatever state it is in.
             let _ = child.kill();
             let _ = child.wait();

@@ -1,6 +1,6 @@
-//! Tools that others wrote read what Skein writes, and fly what it simulates.
+//! Tools that others wrote read what Skein writes, and fly what it simulates; scripts of one's own take part.
 //!
-//! The tests share the UDP ports of `serve`, so they take turns.
+//! The tests share the UDP ports of `serve` or measure times, so they take turns.
 
 #![allow(clippy::expect_used)]
 
@@ -10,18 +10,30 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-static PORTS: Mutex<()> = Mutex::new(());
+static TURN: Mutex<()> = Mutex::new(());
 
 /// The Python that has the packages of `tests/python/requirements.txt`: `SKEIN_PYTHON`, or `python3`.
-fn python_with(package: &str) -> Option<String> {
+fn python_with(packages: &str) -> Option<String> {
     let python = std::env::var("SKEIN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let found =
-        Command::new(&python).args(["-c", &format!("import {package}")]).stderr(Stdio::null()).status();
+        Command::new(&python).args(["-c", &format!("import {packages}")]).stderr(Stdio::null()).status();
     if found.is_ok_and(|status| status.success()) {
         return Some(python);
     }
-    let _ = writeln!(std::io::stderr(), "skipped: needs Python with {package}");
+    let _ = writeln!(std::io::stderr(), "skipped: needs Python with {packages}");
     None
+}
+
+/// Runs a script that starts the simulator itself, if there is a Python that has what it needs.
+fn run_script(name: &str, packages: &str) {
+    let Some(python) = python_with(packages) else { return };
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let status = Command::new(python)
+        .arg(script(name))
+        .env("SKEIN_SIM", env!("CARGO_BIN_EXE_skein-sim"))
+        .status()
+        .expect("python starts");
+    assert!(status.success());
 }
 
 fn script(name: &str) -> String {
@@ -40,14 +52,22 @@ impl Drop for Ended {
 
 #[test]
 fn pymavlink_arms_takes_off_flies_offboard_and_lands() {
-    let Some(python) = python_with("pymavlink") else { return };
-    let _turn = PORTS.lock().unwrap_or_else(PoisonError::into_inner);
-    let status = Command::new(python)
-        .arg(script("test_mavlink.py"))
-        .env("SKEIN_SIM", env!("CARGO_BIN_EXE_skein-sim"))
-        .status()
-        .expect("python starts");
-    assert!(status.success());
+    run_script("test_mavlink.py", "pymavlink");
+}
+
+#[test]
+fn mavsdk_attaches_to_a_flying_vehicle() {
+    run_script("test_mavsdk.py", "mavsdk");
+}
+
+#[test]
+fn a_pilot_with_pymavlink_gets_the_vehicle_at_once() {
+    run_script("test_pilot.py", "pymavlink, zenoh, google.protobuf, grpc_tools");
+}
+
+#[test]
+fn an_operators_script_lists_watches_holds_and_orders() {
+    run_script("test_operator.py", "zenoh, google.protobuf, grpc_tools");
 }
 
 #[test]
@@ -70,7 +90,7 @@ fn pypi_mcap_reads_a_mission() {
 
 #[test]
 fn garbage_on_a_mavlink_socket_has_no_effect() {
-    let _turn = PORTS.lock().unwrap_or_else(PoisonError::into_inner);
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let mut serve = Ended(
         Command::new(env!("CARGO_BIN_EXE_skein-sim"))
             .args(["serve", "open", "--vehicles", "1"])

@@ -5,9 +5,11 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
+use skein_agent::Outcome;
+use skein_dbp::facts::PEER_LOST;
 use skein_ground::{Order, Who};
 use skein_tests::Lockstep;
-use skein_wire::vocabulary::{ENTER, LEAVE, TAKEOFF};
+use skein_wire::vocabulary::{ENTER, LANDED, LEAVE, TAKEOFF};
 
 fn seconds(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds)
@@ -112,4 +114,59 @@ fn a_narrow_passage_never_has_two_holders() {
         }
         assert!(entries >= 6, "seed {seed}: {entries} entries for six vehicles");
     }
+}
+
+/// Flies `window` and cuts the network of its first vehicle at `cut`, for `apart`. Nobody may ever share the passage.
+/// Returns whether it had a claim when it was cut off, and how many others passed meanwhile.
+fn cut_one_off_at_the_window(seed: u64, cut: Duration, apart: Duration) -> (bool, usize) {
+    let mut lockstep = Lockstep::new("window", None, seed);
+    let (alone, rest) = (lockstep.nodes[0].clone(), lockstep.nodes[1..].to_vec());
+    let mut holders = BTreeSet::new();
+    let (mut had_claim, mut through_meanwhile) = (false, 0);
+    while !(lockstep.swarm.is_over() && lockstep.swarm.is_grounded()) {
+        let now = lockstep.swarm.now();
+        let is_cut = now >= cut && now < cut + apart;
+        if is_cut {
+            lockstep.network.partition(&[std::slice::from_ref(&alone), &rest]);
+        } else {
+            lockstep.network.heal();
+        }
+        for selection in lockstep.step().selections {
+            match selection.event.kind() {
+                ENTER => drop(holders.insert(selection.home.clone())),
+                LANDED => drop(holders.remove(&selection.home)),
+                LEAVE => {
+                    holders.remove(&selection.home);
+                    through_meanwhile += usize::from(is_cut && selection.home != alone);
+                }
+                PEER_LOST if selection.event.text("node") == Some(alone.as_str()) => {
+                    had_claim |= selection.event.text("released").is_some_and(|names| !names.is_empty());
+                }
+                _ => {}
+            }
+            assert!(holders.len() <= 1, "seed {seed}: {holders:?} at {now:?}");
+        }
+        assert!(now < seconds(300.0), "seed {seed}: they do not get through");
+    }
+    let truth = lockstep.swarm.truth();
+    assert_eq!((truth.collisions_obstacle, truth.collisions_vehicle), (0, 0), "seed {seed}");
+    // One that hovers before the passage for a minute, unheard, may be in another's way.
+    let arrived =
+        lockstep.swarm.outcomes().flatten().filter(|outcome| **outcome == Outcome::Complete).count();
+    assert!(arrived == rest.len() || apart > seconds(10.0), "seed {seed}: {arrived} arrived");
+    (had_claim, through_meanwhile)
+}
+
+#[test]
+fn a_vehicle_that_is_cut_off_shares_no_passage_and_closes_none() {
+    let mut without_claim = 0;
+    for seed in 1..=8 {
+        let cut = seconds(4.0 + 2.3 * seed as f64);
+        let (had_claim, passed) = cut_one_off_at_the_window(seed, cut, seconds(60.0));
+        // One that was about to enter, or inside, is waited for.
+        assert!(had_claim || passed > 0, "seed {seed}: one that is cut off stops all the others");
+        without_claim += usize::from(!had_claim);
+        cut_one_off_at_the_window(seed, cut, seconds(3.0));
+    }
+    assert!((1..8).contains(&without_claim), "{without_claim} of 8 were cut off without a claim");
 }

@@ -49,7 +49,9 @@ pub fn load(program: &mut Program, config: &AgentConfig) {
     program.add("pilot", Pilot::new(me.clone()));
     program.add("separation", Separation::new(me.clone()));
     program.add("obstacle_avoidance", ObstacleAvoidance::new(me.clone()));
-    program.add(right_of_way::NAME, RightOfWay::new(me.clone()));
+    let with_say = |node: &&String| node.starts_with("uav/") || **node == config.ground;
+    let others = config.roster.iter().filter(with_say).filter(|node| **node != config.node);
+    program.add(right_of_way::NAME, RightOfWay::new(me.clone(), others.map(String::as_str)));
     program.add("preflight", Preflight::new(me.clone()));
     program.add("found_airborne", FoundAirborne::new(me.clone()));
     program.add("one_name", OneName::new(me.clone()));

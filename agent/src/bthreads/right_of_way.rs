@@ -4,13 +4,19 @@
 //! then requests its own `enter` (*block, await confirmation, act*). Two that claim at once block each other; the
 //! one with the higher number then gives way. Nothing but this block keeps the others out, so it is held until the
 //! passage lies behind.
+//!
+//! A vehicle that is lost confirms nothing, and must not close every passage for ever. It is done without while most of
+//! the fleet is in reach, unless it had a claim when it was lost: to claim one since, it would have needed the
+//! confirmation of those who have lost it. So on a cut network one side at most goes on, and whoever was inside is
+//! waited for. Whoever has just heard another again first lets claims cross, for as long as it takes to repeat them.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, STALLED};
-use skein_wire::vocabulary::{ADVANCE, ENTER, HOMEWARD, LANDED, LEAVE, PASSAGE, of_every_vehicle};
+use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, PEER_JOINED, PEER_LOST, STALLED};
+use skein_wire::vocabulary::{ADVANCE, ENTER, HOMEWARD, LANDED, LEAVE, PASSAGE, of, of_every_vehicle};
 
 use crate::{me::Me, precedence};
 
@@ -20,12 +26,31 @@ pub const NAME: &str = "right_of_way";
 const SAME_PASSAGE_M: f64 = 3.0;
 /// A vehicle that gave way claims again when it hears that another has left a passage, or after this long.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// Claims that were made apart are known to both sides this long after they have met again: records are repeated every
+/// tenth of a lease of at most a second.
+const MEETING: Duration = Duration::from_millis(1500);
 
 /// Claims a passage, enters it when the claim is confirmed, and lets go behind it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct RightOfWay {
     me: Me,
+    /// The other vehicles and the ground station.
+    others: BTreeMap<String, Other>,
+    /// No claim counts before this.
+    met: Duration,
     phase: Phase,
+}
+
+/// What is known of another node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+enum Other {
+    /// Not heard yet: it cannot have claimed anything.
+    Unheard,
+    Alive,
+    /// Lost without a claim.
+    Lost,
+    /// Lost with a claim: it may be in a passage.
+    LostClaiming,
 }
 
 /// `passage` is the event that announced it, with the centre in `x`, `y`, `z`.
@@ -39,21 +64,27 @@ enum Phase {
 }
 
 impl RightOfWay {
-    /// The b-thread of vehicle `me`.
+    /// The b-thread of vehicle `me`; `others` are the other vehicles and the ground station.
     #[must_use]
-    pub fn new(me: Me) -> Self {
-        Self { me, phase: Phase::Clear }
+    pub fn new<'a>(me: Me, others: impl IntoIterator<Item = &'a str>) -> Self {
+        let others = others.into_iter().map(|node| (node.to_owned(), Other::Unheard)).collect();
+        Self { me, others, met: Duration::ZERO, phase: Phase::Clear }
     }
 
-    /// Everyone else's `enter` into the same passage.
+    /// `enter` into the same passage, of everyone else.
     fn others_enter(&self, passage: &Event) -> EventSet {
-        let [min, max] = [-SAME_PASSAGE_M, SAME_PASSAGE_M]
-            .map(|margin| centre(passage).map(|coordinate| coordinate + margin));
-        EventSet::And(vec![
-            of_every_vehicle(ENTER),
-            EventSet::Not(Box::new(self.me.any(ENTER))),
-            EventSet::region(min, max),
-        ])
+        of_every_vehicle(ENTER).and(self.me.any(ENTER).not()).and(around(passage))
+    }
+
+    /// The same, without those whose confirmation is not needed.
+    fn claim(&self, passage: &Event) -> EventSet {
+        let alive = 1 + self.others.values().filter(|other| **other == Other::Alive).count();
+        if 2 * alive <= self.others.len() + 1 {
+            return self.others_enter(passage);
+        }
+        let needed =
+            self.others.iter().filter(|(_, other)| matches!(other, Other::Alive | Other::LostClaiming));
+        EventSet::any_of(needed.map(|(node, _)| of(node, ENTER))).and(around(passage))
     }
 
     fn enter(&self, passage: &Event) -> Event {
@@ -68,6 +99,37 @@ impl RightOfWay {
         let rank = |node: &str| node.rsplit('/').next().and_then(|number| number.parse::<u32>().ok());
         (rank(node), node) < (rank(self.me.name()), self.me.name())
     }
+
+    /// Takes in that another node is heard or lost.
+    fn note(&mut self, event: &Event, now: Duration) {
+        let joined = self.me.heard(event, PEER_JOINED);
+        let Some(other) = event.text("node").and_then(|node| self.others.get_mut(node)) else { return };
+        let claiming = event.text("released").is_some_and(|bthreads| bthreads.split(' ').any(|b| b == NAME));
+        *other = match (joined, claiming) {
+            (true, _) => Other::Alive,
+            (false, true) => Other::LostClaiming,
+            (false, false) => Other::Lost,
+        };
+        if joined {
+            self.met = now + MEETING;
+        }
+    }
+
+    /// A claim is made anew, or, where two sides have just met, a little later.
+    fn claim_again(&self, passage: Event, now: Duration) -> Phase {
+        if now < self.met {
+            Phase::Yielding { passage, until: self.met }
+        } else {
+            Phase::Claiming { passage }
+        }
+    }
+}
+
+/// What is about the same passage.
+fn around(passage: &Event) -> EventSet {
+    let [min, max] =
+        [-SAME_PASSAGE_M, SAME_PASSAGE_M].map(|margin| centre(passage).map(|coordinate| coordinate + margin));
+    EventSet::region(min, max)
 }
 
 fn centre(passage: &Event) -> [f64; 3] {
@@ -77,18 +139,18 @@ fn centre(passage: &Event) -> [f64; 3] {
 impl BThread for RightOfWay {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::COLLISION);
+        let bid = Bid::new().priority(precedence::COLLISION).wait_for(me.any_of(&[PEER_JOINED, PEER_LOST]));
         let gone = me.any_of(&[LEAVE, LANDED]);
         Some(match &self.phase {
             Phase::Clear => bid.wait_for(me.any(PASSAGE)),
             Phase::Claiming { passage } => bid
-                .block(self.others_enter(passage))
+                .block(self.claim(passage))
                 .block(me.any_of(&[ADVANCE, HOMEWARD]))
                 .wait_for(me.any(CONFIRMED))
                 .wait_for(gone),
             Phase::Entering { passage } => bid
                 .request(self.enter(passage))
-                .block(self.others_enter(passage))
+                .block(self.claim(passage))
                 .block(me.any_of(&[ADVANCE, HOMEWARD]))
                 .wait_for(me.any_of(&[STALLED, BLOCK_LAPSED]))
                 .wait_for(gone),
@@ -97,15 +159,24 @@ impl BThread for RightOfWay {
                 .wait_for(of_every_vehicle(LEAVE))
                 .deadline(*until)
                 .wait_for(gone),
+            // Whoever comes back meanwhile stays out too.
             Phase::Inside { passage } => bid.block(self.others_enter(passage)).wait_for(gone),
         })
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        let verb = self.me.verb(event);
+        let (now, verb) = (cx.now(), self.me.verb(event));
+        let fleet_changed = matches!(verb, Some(PEER_JOINED | PEER_LOST));
+        if fleet_changed {
+            self.note(event, now);
+        }
         self.phase = match (self.phase.clone(), verb) {
             (_, Some(LEAVE | LANDED)) => Phase::Clear,
-            (Phase::Clear, _) => Phase::Claiming { passage: event.clone() },
+            (Phase::Claiming { passage } | Phase::Entering { passage }, _) if fleet_changed => {
+                self.claim_again(passage, now)
+            }
+            (phase, _) if fleet_changed => phase,
+            (Phase::Clear, _) => self.claim_again(event.clone(), now),
             (Phase::Claiming { passage }, Some(CONFIRMED)) if event.text("bthread") == Some(NAME) => {
                 Phase::Entering { passage }
             }
@@ -117,10 +188,10 @@ impl BThread for RightOfWay {
                 if event.text("event").is_some_and(|stalled| stalled.ends_with(ENTER))
                     && self.goes_before_me(event.text("by").unwrap_or_default()) =>
             {
-                Phase::Yielding { passage, until: cx.now() + PATIENCE }
+                Phase::Yielding { passage, until: now + PATIENCE }
             }
             // Time is up, or a vehicle that is not this one has left.
-            (Phase::Yielding { passage, .. }, None) => Phase::Claiming { passage },
+            (Phase::Yielding { passage, .. }, None) => self.claim_again(passage, now),
             (phase, _) => phase,
         };
     }

@@ -24,7 +24,8 @@ pub const ORPHAN: &str = "orphan";
 pub const GAP: &str = "gap";
 /// `node` is heard, in this `incarnation`.
 pub const PEER_JOINED: &str = "peer_joined";
-/// `node` has not been heard for its lease, or has restarted (G5).
+/// `node` has not been heard for its lease, or has restarted (G5). `released` names, with blanks between, those of its
+/// b-threads whose blocks ended here with that.
 pub const PEER_LOST: &str = "peer_lost";
 /// `event` is requested here and blocked `by` a remote b-thread, `node#bthread`.
 pub const STALLED: &str = "stalled";

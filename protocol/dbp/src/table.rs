@@ -1,7 +1,7 @@
 //! A home's table of remote bids, each of which stands in the program as a proxy b-thread.
 
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::time::Duration;
@@ -69,6 +69,8 @@ struct Bidder {
     /// Whether one of its records was made for this home's present life.
     knows_this_life: bool,
     bids: BTreeMap<String, TakenBid>,
+    /// The b-threads whose blocks lapsed with the lease, until the next record.
+    released: BTreeSet<String>,
     /// Highest synchronisation point of each b-thread at which a request was served (G4).
     served: BTreeMap<String, u64>,
     refused: Vec<Refusal>,
@@ -129,6 +131,7 @@ impl BidTable {
             Ordering::Greater => {}
         }
         bidder.renew(now, record);
+        bidder.released.clear();
         bidder.knows_this_life |= for_this_life;
         let mut taken = BTreeMap::new();
         for (index, bid) in record.bids.iter().enumerate() {
@@ -168,10 +171,19 @@ impl BidTable {
         for (node, bidder) in &mut self.bidders {
             if bidder.live && now >= bidder.heard_at + bidder.lease {
                 bidder.live = false;
+                bidder.released = bidder.blocking().collect();
                 gone.extend(changes(node, &std::mem::take(&mut bidder.bids), &BTreeMap::new()));
             }
         }
         gone
+    }
+
+    /// The b-threads of `node` that block something here, or did when its lease ran out.
+    pub(crate) fn released_by(&self, node: &NodeName) -> BTreeSet<String> {
+        let bidder = self.bidders.get(node);
+        bidder
+            .map(|bidder| bidder.blocking().chain(bidder.released.iter().cloned()).collect())
+            .unwrap_or_default()
     }
 
     /// When the next lease runs out.
@@ -238,6 +250,11 @@ impl BidTable {
 }
 
 impl Bidder {
+    /// Its b-threads that block something.
+    fn blocking(&self) -> impl Iterator<Item = String> + '_ {
+        self.bids.iter().filter(|(_, bid)| !bid.block.is_none()).map(|(bthread, _)| bthread.clone())
+    }
+
     /// Takes over a newer copy's number, age and lease.
     fn renew(&mut self, now: Duration, record: &BidRecord) {
         self.epoch = record.epoch;

@@ -21,7 +21,7 @@ impl Node {
             Word::Back => {}
             Word::Born { was_alive } => {
                 if was_alive {
-                    self.fact(facts::PEER_LOST, |fact| fact.with("node", node.as_str()));
+                    self.tell_loss(node);
                 }
                 self.begin_life(node, incarnation);
             }

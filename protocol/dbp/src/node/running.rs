@@ -9,14 +9,14 @@ use crate::facts::{self, tell};
 use crate::held_blocks::BlockNews;
 use crate::node::{Delivery, Happened, Home, MOST_ROUNDS, Node, NodeError, RESTART_GUARD, confirmation};
 use crate::stalls::StallNews;
-use crate::{Message, Occurrence, Recipient};
+use crate::{Message, NodeName, Occurrence, Recipient};
 
 impl Node {
     pub(super) fn let_go_of_the_lapsed(&mut self) {
         let lapsed = self.table.expire(self.now);
         self.change_proxies(lapsed);
         for node in self.peers.take_lost(self.now) {
-            self.fact(facts::PEER_LOST, |fact| fact.with("node", node.as_str()));
+            self.tell_loss(&node);
         }
         if self.guarding
             && (self.now >= self.guard_ends() || self.peers.names().all(|member| self.table.knows(member)))
@@ -24,6 +24,14 @@ impl Node {
             self.guarding = false;
             self.program.remove_proxy(RESTART_GUARD);
         }
+    }
+
+    /// A node is lost, and with it what its b-threads blocked here.
+    pub(super) fn tell_loss(&mut self, node: &NodeName) {
+        let released: Vec<String> = self.table.released_by(node).into_iter().collect();
+        self.fact(facts::PEER_LOST, |fact| {
+            fact.with("node", node.as_str()).with("released", released.join(" "))
+        });
     }
 
     pub(super) fn guard_ends(&self) -> Duration {
