@@ -311,7 +311,7 @@ impl AgentCore {
         let [x, y, _] = self.config.home;
         neighbours.iter().filter(|neighbour| neighbour.armed).all(|neighbour| {
             let unseen_s = match neighbour.track.age_s {
-                age_s if age_s < NEIGHBOUR_PERIOD_S || age_s > SURELY_DOWN_S => 0.0,
+                age_s if !(NEIGHBOUR_PERIOD_S..=SURELY_DOWN_S).contains(&age_s) => 0.0,
                 age_s => age_s.min(MOST_UNSEEN_S) + CLIMB_S,
             };
             let offset = neighbour.position().xy() - nalgebra::Vector2::new(x, y);

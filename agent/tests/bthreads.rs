@@ -9,7 +9,7 @@ use skein_agent::{
     bthreads::{self, LinkLossPolicy},
 };
 use skein_bp::{Bid, Event, EventSet, Program, ProgramConfig};
-use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, PEER_JOINED, PEER_LOST, STALLED};
+use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, DUPLICATE_NAME, PEER_JOINED, PEER_LOST, STALLED};
 use skein_mav::Datum;
 use skein_wire::vocabulary::{self, *};
 
@@ -627,5 +627,165 @@ mod separation {
         assert_eq!(vehicle.after(SECOND), NOTHING);
         assert!(!vehicle.may(ADVANCE));
         assert_eq!(vehicle.reports(CLEAR), ["clear", "advance"]);
+    }
+}
+
+mod sleep {
+    use super::*;
+
+    #[test]
+    fn an_agent_that_did_not_run_leaves_its_vehicle_alone_until_it_is_handed_back() {
+        let mut vehicle = Vehicle::on_its_way();
+        assert_eq!(vehicle.hears(mine(SLEPT).with("seconds", 3.0)), ["slept"]);
+        assert_eq!(vehicle.after(SECOND), NOTHING);
+        assert!(!vehicle.may(ADVANCE) && !vehicle.may(LAND));
+        assert_eq!(vehicle.is_ordered("hand_back"), ["order hand_back", "hand_back", "advance"]);
+    }
+}
+
+mod one_name {
+    use super::*;
+
+    #[test]
+    fn a_name_that_another_process_has_too_holds_the_vehicle_until_it_is_resumed() {
+        let mut vehicle = Vehicle::on_its_way();
+        let told = vehicle.learns(mine(DUPLICATE_NAME).with("incarnation", 4));
+        let hold = "hold: another process has this vehicle's name; end one of them, then resume";
+        assert_eq!(told, ["duplicate_name", hold]);
+        assert_eq!(vehicle.after(SECOND), NOTHING);
+        assert!(!vehicle.may(ADVANCE) && !vehicle.may(TAKEOFF) && vehicle.may(HOMEWARD));
+        assert_eq!(vehicle.is_ordered("resume"), ["order resume", "advance"]);
+        let again = vehicle.learns(mine(DUPLICATE_NAME).with("incarnation", 4));
+        assert_eq!(again, ["duplicate_name", hold], "it goes on while the other is there");
+    }
+}
+
+mod reposition {
+    use super::*;
+
+    const POINT: [f64; 3] = [4.0, 3.0, 2.0];
+
+    fn goto() -> Event {
+        at(order(ME, "goto"), POINT)
+    }
+
+    #[test]
+    fn the_vehicle_goes_where_it_is_told_hovers_there_and_resumes_its_mission() {
+        let mut vehicle = Vehicle::on_its_way();
+        assert_eq!(vehicle.hears(goto()), ["order goto", "goto -2", "plan: waypoint"]);
+        let [x, y, z] = ["x", "y", "z"].map(|axis| vehicle.last(GOTO).real(axis));
+        assert_eq!([x, y, z], POINT.map(Some));
+        assert_eq!(vehicle.hears(mine(PLANNED).with("leg", -2)), ["planned -2", "advance"]);
+        assert_eq!(vehicle.arrives(-2), ["arrived -2"]);
+        assert_eq!(vehicle.after(10 * SECOND), NOTHING, "it does not go on by itself");
+        assert_eq!(vehicle.is_ordered("resume"), ["order resume", "goto 0", "plan: waypoint"]);
+    }
+
+    #[test]
+    fn a_vehicle_on_hold_is_free_to_go() {
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.is_ordered("hold");
+        assert!(!vehicle.may(ADVANCE));
+        vehicle.hears(goto());
+        assert_eq!(vehicle.hears(mine(PLANNED).with("leg", -2)), ["planned -2", "advance"]);
+    }
+
+    #[test]
+    fn a_point_outside_the_fence_is_declined_and_the_mission_goes_on() {
+        let mut vehicle = Vehicle::on_its_way();
+        assert_eq!(vehicle.hears(at(order(ME, "goto"), [1e4, 0.0, 2.0])), ["order goto"]);
+        let declined = vehicle.after(2 * SECOND);
+        assert!(declined.iter().any(|event| event.starts_with("declined: ")), "{declined:?}");
+        assert!(vehicle.may(ADVANCE));
+    }
+
+    #[test]
+    fn a_point_without_a_way_is_declined_and_the_vehicle_stays_in_the_air() {
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.hears(goto());
+        let unplannable = || mine(UNPLANNABLE).with("leg", -2).with("why", "walled in");
+        for _ in 0..2 {
+            vehicle.hears(unplannable());
+            vehicle.after(SECOND);
+        }
+        assert_eq!(vehicle.hears(unplannable()), ["unplannable: walled in", "declined: walled in"]);
+        assert_eq!(vehicle.is_ordered("resume"), ["order resume", "goto 0", "plan: waypoint"]);
+    }
+
+    #[test]
+    fn a_vehicle_on_the_ground_or_on_its_way_down_declines() {
+        let mut grounded = Vehicle::new(&config());
+        assert!(grounded.hears(goto())[1].starts_with("declined: it is not free"));
+        let mut landing = Vehicle::on_its_way();
+        landing.is_ordered("land");
+        assert!(landing.hears(goto())[1].starts_with("declined: it is not free"));
+    }
+}
+
+mod right_of_way_without_the_lost {
+    use super::*;
+
+    /// In a fleet of five, whose others are all heard.
+    fn in_reach() -> Vehicle {
+        let roster = [ME, LOWER, HIGHER, "uav/12", "ground/1", "script/operator"].map(str::to_owned);
+        let config = AgentConfig { roster: roster.to_vec(), ..config() };
+        let mut vehicle = Vehicle::in_the_air(&config);
+        for other in [LOWER, HIGHER, "uav/12", "ground/1"] {
+            vehicle.learns(mine(PEER_JOINED).with("node", other));
+        }
+        vehicle.after(2 * SECOND);
+        vehicle.reports(PLANNED);
+        vehicle
+    }
+
+    fn loses(vehicle: &mut Vehicle, other: &str, released: &str) {
+        vehicle.learns(mine(PEER_LOST).with("node", other).with("released", released));
+    }
+
+    /// The homes whose confirmation a claim waits for.
+    fn asks(vehicle: &mut Vehicle) -> Vec<&'static str> {
+        vehicle.hears(at(mine(PASSAGE), [5.0, 0.0, 2.0]));
+        let bids = vehicle.program.bids();
+        let claim = bids.into_iter().find(|(name, ..)| *name == "right_of_way").unwrap().1.blocks().clone();
+        let asked = |other: &&str| claim.could_match_home(other);
+        [LOWER, HIGHER, "uav/12"].into_iter().filter(asked).collect()
+    }
+
+    #[test]
+    fn everyone_in_reach_is_asked() {
+        assert_eq!(asks(&mut in_reach()), [LOWER, HIGHER, "uav/12"]);
+    }
+
+    #[test]
+    fn one_that_is_lost_without_a_claim_is_done_without() {
+        let mut vehicle = in_reach();
+        loses(&mut vehicle, HIGHER, "hold");
+        assert_eq!(asks(&mut vehicle), [LOWER, "uav/12"]);
+    }
+
+    #[test]
+    fn one_that_is_lost_with_a_claim_is_waited_for() {
+        let mut vehicle = in_reach();
+        loses(&mut vehicle, HIGHER, "hold right_of_way");
+        assert_eq!(asks(&mut vehicle), [LOWER, HIGHER, "uav/12"]);
+    }
+
+    #[test]
+    fn without_most_of_the_fleet_everyone_is_waited_for() {
+        let mut vehicle = in_reach();
+        for other in [LOWER, HIGHER, "uav/12"] {
+            loses(&mut vehicle, other, "");
+        }
+        assert_eq!(asks(&mut vehicle), [LOWER, HIGHER, "uav/12"]);
+    }
+
+    #[test]
+    fn claims_cross_before_they_count_when_two_sides_meet() {
+        let mut vehicle = in_reach();
+        loses(&mut vehicle, HIGHER, "");
+        vehicle.learns(mine(PEER_JOINED).with("node", HIGHER));
+        assert!(asks(&mut vehicle).is_empty(), "it claims at once");
+        vehicle.after(2 * SECOND);
+        assert!(!vehicle.may(ADVANCE));
     }
 }

@@ -9,7 +9,7 @@ use skein_wire::{Fleet, Link, NodeLink, State};
 
 use crate::bthreads::{self, MissionOutcome, Watch, heard};
 use crate::order_log::OrderLog;
-use crate::{Order, OrderRecord};
+use crate::{Order, OrderRecord, Who};
 
 /// What a ground station must know.
 #[derive(Clone, Debug)]
@@ -56,6 +56,14 @@ impl GroundConfig {
     }
 }
 
+/// An order names a vehicle that the station does not have.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{name}` is no vehicle of this station")]
+pub struct UnknownVehicle {
+    /// The name.
+    pub name: NodeName,
+}
+
 /// The ground station. Tick it every 20 ms with its link.
 pub struct GroundCore {
     name: NodeName,
@@ -95,8 +103,16 @@ impl GroundCore {
     }
 
     /// Says something to the vehicles, as the operator. Returns the order's number: see [`orders`](Self::orders).
-    pub fn order(&mut self, order: &Order) -> u64 {
+    ///
+    /// # Errors
+    /// [`UnknownVehicle`], and then nobody is ordered anything.
+    pub fn order(&mut self, order: &Order) -> Result<u64, UnknownVehicle> {
         let who = order.who();
+        if let Who::These(named) = who
+            && let Some(stranger) = named.iter().find(|name| !self.vehicles.contains(name))
+        {
+            return Err(UnknownVehicle { name: stranger.clone() });
+        }
         let concerned: Vec<_> = self
             .vehicles
             .iter()
@@ -106,7 +122,7 @@ impl GroundCore {
         for event in order.events(&self.name, &concerned) {
             self.node.node_mut().enqueue(event);
         }
-        self.order_log.give(self.now, order.clone(), concerned.into_iter().map(|(vehicle, _)| vehicle))
+        Ok(self.order_log.give(self.now, order.clone(), concerned.into_iter().map(|(vehicle, _)| vehicle)))
     }
 
     /// Hears, decides and answers.
@@ -117,7 +133,8 @@ impl GroundCore {
         self.now = now;
         let due = self.orders.partition_point(|(at, _)| *at <= now);
         for (_, order) in self.orders.drain(..due).collect::<Vec<_>>() {
-            let _number = self.order(&order);
+            // Nobody is there to hear of a vehicle that is not.
+            let _ = self.order(&order);
         }
         let outcome = self.node.pump(now, link);
         for state in self.node.take_states() {

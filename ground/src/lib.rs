@@ -14,7 +14,7 @@
 //! let network = Network::new(NetworkConfig::default(), 0);
 //! let mut link = network.join(&ground);
 //! let mut station = GroundCore::new(GroundConfig::new(Fleet::new("demo")?, ground, vec![vehicle]));
-//! station.order(&Order::Hold(Who::All));
+//! station.order(&Order::Hold(Who::All))?;
 //! station.tick(Duration::ZERO, &mut link)?;
 //! assert_eq!(station.take_selections()[0].event.name(), "ground/main/ordered");
 //! assert!(station.finished().is_none());
@@ -29,7 +29,7 @@ mod order;
 mod order_log;
 pub mod recorder;
 
-pub use crate::core::{GroundConfig, GroundCore};
+pub use crate::core::{GroundConfig, GroundCore, UnknownVehicle};
 pub use bthreads::MissionOutcome;
 pub use order::{Destination, Order, Who};
 pub use order_log::{Answer, OrderRecord};

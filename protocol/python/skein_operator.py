@@ -478,27 +478,32 @@ def vehicle(text):
 
 
 def read_arguments(arguments):
-    common = argparse.ArgumentParser(add_help=False)
-    common.add_argument("--fleet", type=fleet_name, default="sim", help="the fleet's name (default: sim)")
-    common.add_argument(
-        "--connect",
-        type=endpoint,
-        default="tcp/127.0.0.1:7447",
-        metavar="ENDPOINT",
-        help="where a node of the fleet listens (default: tcp/127.0.0.1:7447)",
-    )
-    common.add_argument("--json", action="store_true", help="one JSON object a line on standard output")
+    # They may stand before the command or after it. Defaults are those of the first place, or the second would undo it.
+    def common(**defaults):
+        options = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
+        options.add_argument("--fleet", type=fleet_name, help="the fleet's name (default: sim)")
+        options.add_argument(
+            "--connect",
+            type=endpoint,
+            metavar="ENDPOINT",
+            help="where a node of the fleet listens (default: tcp/127.0.0.1:7447)",
+        )
+        options.add_argument("--json", action="store_true", help="one JSON object a line on standard output")
+        options.set_defaults(**defaults)
+        return options
+
     about, _, rest = __doc__.partition("\n\n")
     parser = argparse.ArgumentParser(
         prog="skein_operator.py",
         description=about,
         epilog=rest,
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        parents=[common(fleet="sim", connect="tcp/127.0.0.1:7447", json=False)],
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     def command(name, run, about):
-        added = commands.add_parser(name, parents=[common], help=about, description=about)
+        added = commands.add_parser(name, parents=[common()], help=about, description=about)
         added.set_defaults(run=run)
         return added
 

@@ -59,6 +59,11 @@ impl MavlinkPorts {
         }
     }
 
+    /// Where ground stations listen for all vehicles.
+    pub fn audience(&self) -> Option<SocketAddr> {
+        self.vehicles.first().map(|[_, ground]| ground.audience)
+    }
+
     /// Where the companion link of vehicle `index` listens.
     pub fn companion_port(&self, index: usize) -> Option<u16> {
         self.vehicles.get(index).map(|[companion, _]| companion.listens_on)

@@ -105,7 +105,8 @@ impl Processes {
         (0..self.files.agents.len()).try_for_each(|index| self.start_node(&vehicle_name(index)))
     }
 
-    /// Leads the agent of vehicle `index` to another port in the place of one that its configuration names.
+    /// Leads the agent of vehicle `index` to another port in the place of one that its configuration names; its lidar,
+    /// which is on board, keeps the old one.
     ///
     /// # Errors
     /// Its configuration cannot be changed, or does not name that port.
@@ -114,6 +115,10 @@ impl Processes {
         let text = std::fs::read_to_string(path)?;
         let rerouted = text.replace(&format!("tcp/127.0.0.1:{from}"), &format!("tcp/127.0.0.1:{to}"));
         anyhow::ensure!(rerouted != text, "{} does not name port {from}", path.display());
+        let on_board = ["#[lidar.network]", "#mode = \"client\"", "#listen = []"];
+        let mut rerouted = on_board.iter().fold(rerouted, |text, line| text.replacen(line, &line[1..], 1));
+        let connect = format!("connect = [\"tcp/127.0.0.1:{from}\"]");
+        rerouted = rerouted.replacen("#connect = [\"tcp/127.0.0.1:7446\"]", &connect, 1);
         Ok(std::fs::write(path, rerouted)?)
     }
 

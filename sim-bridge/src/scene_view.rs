@@ -16,9 +16,8 @@ pub fn view(scene: &Scene) -> skein_wire::Scene {
         Some(Solid { form, pose: obstacle.pose })
     };
     let bounds = scene.bounds();
-    skein_wire::Scene {
-        min: bounds.min,
-        max: bounds.max,
-        solids: scene.obstacles().iter().filter_map(solid).collect(),
-    }
+    // The bounds reach below the ground, which is at 0, so that one who lands stays inside.
+    let mut min = bounds.min;
+    min.z = min.z.max(0.0);
+    skein_wire::Scene { min, max: bounds.max, solids: scene.obstacles().iter().filter_map(solid).collect() }
 }

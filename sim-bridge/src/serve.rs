@@ -46,5 +46,7 @@ fn announce(world: &WorldHost, vehicles: usize, as_json: bool) {
             port - 40
         );
     }
-    println!("Ground stations: MAVLink from all vehicles to udp 127.0.0.1:14550, as QGroundControl expects.");
+    if let Some(audience) = world.ports().audience() {
+        println!("From all vehicles to udp {audience}, for QGroundControl.");
+    }
 }

@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 import harness
-from harness import Failure, Program, expect, wait_until
+from harness import Program, expect, wait_until
 
 try:
     import google.protobuf  # noqa: F401

@@ -65,12 +65,16 @@ async fn answer(socket: &mut WebSocket, message: Message, mailbox: &Mailbox) -> 
     let text = match &message {
         Message::Text(text) => text.as_str(),
         Message::Close(_) => return Err(Gone),
-        Message::Binary(_) | Message::Ping(_) | Message::Pong(_) => return Ok(()),
+        Message::Binary(_) => "a binary message",
+        Message::Ping(_) | Message::Pong(_) => return Ok(()),
     };
     let (tag, order) = request::read(text);
     let number = match order {
         Ok(order) => match mailbox.put(order) {
-            Ok(number) => number.await.map_err(|_| "the station is ending".to_owned()),
+            Ok(given) => match given.await {
+                Ok(given) => given.map_err(|stranger| stranger.to_string()),
+                Err(_) => Err("the station is ending".to_owned()),
+            },
             Err(why) => Err(why.to_owned()),
         },
         Err(why) => Err(why),

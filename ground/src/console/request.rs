@@ -7,20 +7,23 @@ use serde::Deserialize;
 use skein_dbp::NodeName;
 use tokio::sync::oneshot;
 
-use crate::{Destination, Order, Who};
+use crate::{Destination, Order, UnknownVehicle, Who};
 
 /// An operator's order that waits for the station.
 pub struct Wish {
     /// What to do.
     pub order: Order,
-    answer: oneshot::Sender<u64>,
+    answer: oneshot::Sender<Given>,
 }
 
+/// The number under which the station has given an order, or why it has not.
+pub(super) type Given = Result<u64, UnknownVehicle>;
+
 impl Wish {
-    /// Tells the browser the number under which the station has given the order.
-    pub fn given_as(self, id: u64) {
+    /// Tells the browser what the station has made of it.
+    pub fn answer(self, given: Result<u64, UnknownVehicle>) {
         // Who asked may have closed the page.
-        let _ = self.answer.send(id);
+        let _ = self.answer.send(given);
     }
 }
 
@@ -37,7 +40,7 @@ impl Mailbox {
     }
 
     /// Hands an order to the station; its number follows once it is given.
-    pub(super) fn put(&self, order: Order) -> Result<oneshot::Receiver<u64>, &'static str> {
+    pub(super) fn put(&self, order: Order) -> Result<oneshot::Receiver<Given>, &'static str> {
         let (answer, number) = oneshot::channel();
         self.put.try_send(Wish { order, answer }).map_err(|_| "too many orders wait for the station")?;
         (self.wake)();

@@ -114,10 +114,12 @@ async fn live(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Respon
     let Ok(seat) = shared.seats.clone().try_acquire_owned() else {
         return (StatusCode::SERVICE_UNAVAILABLE, "too many browsers watch already").into_response();
     };
-    upgrade.max_message_size(LONGEST_REQUEST).on_upgrade(async move |socket| {
-        client::attend(socket, shared.subscription, &shared.mailbox).await;
-        drop(seat);
-    })
+    upgrade.max_message_size(LONGEST_REQUEST).max_frame_size(LONGEST_REQUEST).on_upgrade(
+        async move |socket| {
+            client::attend(socket, shared.subscription, &shared.mailbox).await;
+            drop(seat);
+        },
+    )
 }
 
 #[cfg(test)]

@@ -124,9 +124,10 @@ impl NetworkSettings {
             ("scouting/delay", "0".into()),
             ("listen/endpoints", json(&listen)),
             ("connect/endpoints", json(&self.connect)),
-            // Who is not there yet is tried again and again, while the node goes on.
-            ("connect/timeout_ms", "-1".into()),
-            ("connect/exit_on_failure", "false".into()),
+            // Peers try those who are not there yet again and again, by themselves. A client's session does not open
+            // without its router; whoever opens it has to try again.
+            ("connect/timeout_ms", "{ router: -1, peer: -1, client: 0 }".into()),
+            ("connect/exit_on_failure", "{ router: false, peer: false, client: true }".into()),
             (
                 "connect/retry",
                 "{ period_init_ms: 200, period_max_ms: 1000, period_increase_factor: 1.5 }".into(),

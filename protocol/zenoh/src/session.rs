@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use skein_wire::{Fleet, Key, NodeName};
 use zenoh::Wait;
@@ -12,10 +13,12 @@ use zenoh::pubsub::Subscriber;
 use zenoh::qos::CongestionControl;
 
 use crate::inbox::Inbox;
-use crate::{ZenohConfig, ZenohError, ZenohLink};
+use crate::{Mode, ZenohConfig, ZenohError, ZenohLink};
 
 /// How often opening is tried when the port that was free has been taken meanwhile.
 const OPENING_TRIES: usize = 8;
+/// A client looks for its router this often.
+const TRY_AGAIN: Duration = Duration::from_millis(200);
 
 /// A session that any number of links of one process share. Cloning gives another handle to the same session, which
 /// closes with its last handle or link.
@@ -43,6 +46,8 @@ struct Shared {
     fleet: Fleet,
     locators: Vec<String>,
     incoming_capacity: usize,
+    /// Whether commands are carried out at once.
+    waits: bool,
     next_port: AtomicU64,
     counters: Arc<Counters>,
     /// Gone only while the session closes.
@@ -69,7 +74,8 @@ enum Command {
 impl ZenohSession {
     /// Opens a session.
     ///
-    /// That it opens does not mean that it is connected: see [`connected_peers`](Self::connected_peers).
+    /// That it opens does not mean that it is connected: see [`connected_peers`](Self::connected_peers). A client whose
+    /// router is not there yet opens all the same, and what it puts until then is dropped.
     ///
     /// # Errors
     /// [`ZenohError`] when an endpoint is none, cannot be listened on, or could reach others without security.
@@ -79,13 +85,16 @@ impl ZenohSession {
         let (answer, opened) = sync_channel(1);
         let thread = std::thread::Builder::new().name("zenoh session".into()).spawn({
             let (config, counters) = (config.clone(), counters.clone());
-            move || match open(&config) {
-                Ok((session, locators)) => {
-                    if answer.send(Ok(locators)).is_ok() {
-                        serve(&session, &queue, &counters);
+            move || match config.network.mode {
+                Mode::Client => await_router(&config, &queue, &counters, &answer),
+                Mode::Peer | Mode::Router => match open(&config) {
+                    Ok((session, locators)) => {
+                        if answer.send(Ok(locators)).is_ok() {
+                            serve(&session, Vec::new(), &queue, &counters);
+                        }
                     }
-                }
-                Err(error) => drop(answer.send(Err(error))),
+                    Err(error) => drop(answer.send(Err(error))),
+                },
             }
         });
         let thread = thread.map_err(|_| ZenohError::ThreadGone)?;
@@ -94,6 +103,7 @@ impl ZenohSession {
             fleet: config.fleet,
             locators,
             incoming_capacity: config.incoming_capacity.max(1),
+            waits: config.network.mode != Mode::Client,
             next_port: AtomicU64::new(0),
             counters,
             commands: Some(commands),
@@ -118,7 +128,10 @@ impl ZenohSession {
         let inbox = Arc::new(Inbox::new(self.0.incoming_capacity));
         let (answer, joined) = sync_channel(1);
         self.ask(Command::Join { port, patterns, inbox: inbox.clone(), answer })?;
-        joined.recv().map_err(|_| ZenohError::ThreadGone)??;
+        // A client joins once its router is there.
+        if self.0.waits {
+            joined.recv().map_err(|_| ZenohError::ThreadGone)??;
+        }
         Ok(ZenohLink::new(self.clone(), port, inbox))
     }
 
@@ -198,10 +211,41 @@ fn open(config: &ZenohConfig) -> Result<(zenoh::Session, Vec<String>), ZenohErro
     }
 }
 
-/// The life of the session's thread, until the last handle is gone.
-fn serve(session: &zenoh::Session, queue: &Receiver<Command>, counters: &Counters) {
+/// The life of a client's thread: without its router it has no session yet, and drops what it is to put.
+fn await_router(
+    config: &ZenohConfig,
+    queue: &Receiver<Command>,
+    counters: &Counters,
+    answer: &SyncSender<Result<Vec<String>, ZenohError>>,
+) {
+    // What is wrong with the configuration is said at once; a router that is not there is not wrong.
+    let checked = config.network.to_zenoh().map(|(_, listen)| listen);
+    if answer.send(checked).is_err() {
+        return;
+    }
+    let mut waiting = Vec::new();
+    loop {
+        match open(config) {
+            Ok((session, _)) => return serve(&session, waiting, queue, counters),
+            Err(error) => tracing::debug!("the router is not there yet: {error}"),
+        }
+        let again = Instant::now() + TRY_AGAIN;
+        loop {
+            match queue.recv_timeout(again.saturating_duration_since(Instant::now())) {
+                Ok(Command::Put { .. }) => drop(counters.dropped.fetch_add(1, Ordering::Relaxed)),
+                Ok(Command::CountPeers { answer }) => drop(answer.send(0)),
+                Ok(command) => waiting.push(command),
+                Err(RecvTimeoutError::Timeout) => break,
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+        }
+    }
+}
+
+/// The life of the session's thread, until the last handle is gone. First it does what has `waited`.
+fn serve(session: &zenoh::Session, waited: Vec<Command>, queue: &Receiver<Command>, counters: &Counters) {
     let mut subscribers: BTreeMap<u64, Vec<Subscriber<()>>> = BTreeMap::new();
-    while let Ok(command) = queue.recv() {
+    for command in waited.into_iter().chain(queue.iter()) {
         match command {
             Command::Put { port, key, payload } => {
                 let key = key.to_string();

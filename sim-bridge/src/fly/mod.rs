@@ -107,6 +107,9 @@ trait Host {
     /// After each step, with what happened in it.
     fn after_step(&mut self, swarm: &Swarm, happenings: &Happenings);
 
+    /// Once the mission is over and told of.
+    fn after_all(&mut self, _: &mut Swarm) {}
+
     /// What has passed between the nodes.
     fn traffic(&self) -> Traffic;
 }
@@ -195,7 +198,10 @@ impl<'a> Flight<'a> {
         }
         self.recording.finish()?;
         let why = self.called_off.map(|called_off| called_off.why);
-        Ok(report::summary(self.scenario, &self.swarm.account(host.traffic()), self.began.elapsed(), why))
+        let account = self.swarm.account(host.traffic());
+        let summary = report::summary(self.scenario, &account, self.began.elapsed(), why);
+        host.after_all(&mut self.swarm);
+        Ok(summary)
     }
 
     fn is_over(&self) -> bool {
@@ -218,7 +224,8 @@ impl<'a> Flight<'a> {
         };
         if self.called_off.is_none() {
             self.called_off = Some(CalledOff { why: why.to_owned(), at: now });
-            self.swarm.order(&Order::Land(Who::All));
+            // All are vehicles that there are.
+            let _ = self.swarm.order(&Order::Land(Who::All));
         }
     }
 

@@ -28,6 +28,8 @@ use crate::{
 
 /// Where other nodes can join.
 const ZENOH_PORT: u16 = 7447;
+/// How long whoever looks on may see how the mission ended.
+const LAST_LOOK: Duration = Duration::from_secs(1);
 /// How long the two sessions may take to find each other.
 const TIME_TO_CONNECT: Duration = Duration::from_secs(10);
 
@@ -58,8 +60,9 @@ pub fn fly(
     table.note(&format!("other nodes: Zenoh on {}", vehicles.locators().join(", ")))?;
     let ports = MavlinkPorts::open(scenario.vehicles.len(), args.port_offset);
     match &ports {
-        Ok(_) => {
-            table.note("MAVLink: from all vehicles to udp 127.0.0.1:14550, as QGroundControl expects")?
+        Ok(ports) => {
+            let audience = ports.audience().map(|audience| audience.to_string()).unwrap_or_default();
+            table.note(&format!("MAVLink: from all vehicles to udp {audience}, for QGroundControl"))?;
         }
         // Two swarms on one computer fly all the same.
         Err(error) => table.note(&format!("no MAVLink for other programs: {error:#}"))?,
@@ -103,8 +106,8 @@ impl Host for RealTime {
             ports.receive(|index, bytes| swarm.send_mavlink(index, bytes));
         }
         for wish in self.console.take_orders() {
-            let number = swarm.order(&wish.order);
-            wish.given_as(number);
+            let given = swarm.order(&wish.order);
+            wish.answer(given);
         }
     }
 
@@ -119,6 +122,15 @@ impl Host for RealTime {
         }
         if happenings.ticked {
             self.console.publish(swarm.now(), swarm.ground(), &happenings.selections);
+        }
+    }
+
+    fn after_all(&mut self, swarm: &mut Swarm) {
+        let until = Instant::now() + LAST_LOOK;
+        while Instant::now() < until {
+            self.before_step(swarm);
+            let happenings = swarm.step();
+            self.after_step(swarm, &happenings);
         }
     }
 

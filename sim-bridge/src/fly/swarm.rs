@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use skein_agent::{AgentConfig, AgentCore, AgentError, Outcome, Scan};
 use skein_dbp::{Happened, NodeName};
-use skein_ground::{GroundConfig, GroundCore, Order};
+use skein_ground::{GroundConfig, GroundCore, Order, UnknownVehicle};
 use skein_wire::Link;
 use skein_world::{LidarScan, Simulation, Truth};
 
@@ -126,7 +126,10 @@ impl Swarm {
     }
 
     /// Says something to the vehicles, as an operator at the ground station.
-    pub fn order(&mut self, order: &Order) -> u64 {
+    ///
+    /// # Errors
+    /// There is no such vehicle.
+    pub fn order(&mut self, order: &Order) -> Result<u64, UnknownVehicle> {
         self.ground.order(order)
     }
 

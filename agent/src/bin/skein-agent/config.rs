@@ -18,10 +18,17 @@ pub struct Config {
     pub agent: AgentConfig,
     pub name: NodeName,
     pub autopilot: Address,
-    /// The node that reads the lidar.
-    pub lidar: Option<NodeName>,
+    pub lidar: Option<LidarSource>,
     pub network: NetworkSettings,
     pub state: PathBuf,
+}
+
+/// Where the lidar's scans come from.
+pub struct LidarSource {
+    /// The node that reads it.
+    pub sensor: NodeName,
+    /// A way of its own, if it has one.
+    pub network: Option<NetworkSettings>,
 }
 
 #[derive(Deserialize)]
@@ -60,6 +67,7 @@ struct Autopilot {
 #[serde(deny_unknown_fields)]
 struct Lidar {
     sensor: String,
+    network: Option<NetworkSettings>,
 }
 
 #[derive(Deserialize)]
@@ -158,8 +166,7 @@ impl File {
         ensure!(self.autopilot.system_id > 0, "`autopilot.system_id` is 0: expected 1 to 255");
         let autopilot: Address = self.autopilot.link.parse().context("`autopilot.link`")?;
         autopilot.check(self.autopilot.cable_is_private).context("`autopilot.link`")?;
-        let lidar =
-            self.lidar.map(|lidar| NodeName::new(&lidar.sensor).context("`lidar.sensor`")).transpose()?;
+        let lidar = self.lidar.map(|lidar| lidar.check(folder)).transpose()?;
         let fence = Fence { min: self.fence.min, max: self.fence.max };
         self.mission.check(&fence)?;
         let agent = AgentConfig {
@@ -188,6 +195,13 @@ impl File {
         };
         let network = self.network.relative_to(folder);
         Ok(Config { agent, name, autopilot, lidar, network, state: folder.join(self.state) })
+    }
+}
+
+impl Lidar {
+    fn check(self, folder: &Path) -> anyhow::Result<LidarSource> {
+        let sensor = NodeName::new(&self.sensor).context("`lidar.sensor`")?;
+        Ok(LidarSource { sensor, network: self.network.map(|network| network.relative_to(folder)) })
     }
 }
 

@@ -11,7 +11,7 @@ use skein_wire::{Fleet, Key, Link as _, Payload, Topic};
 use skein_zenoh::{Bell, Complaints, ZenohConfig, ZenohLink, ZenohSession, next_incarnation};
 
 use crate::autopilot_link::AutopilotLink;
-use crate::config::Config;
+use crate::config::{Config, LidarSource};
 
 /// The control loop's period.
 const TICK: Duration = Duration::from_millis(20);
@@ -68,8 +68,10 @@ impl Driver {
         let fleet = Fleet::new(&config.agent.fleet).context("`fleet`")?;
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
         let link = session.link(&config.name)?;
-        let scans = config.lidar.map(|sensor| {
+        let scans = config.lidar.map(|LidarSource { sensor, network }| {
             let topic = Topic::Scan { sensor, vehicle: config.name.clone() };
+            let own = network.map(|network| ZenohSession::open(ZenohConfig::new(fleet.clone(), network)));
+            let session = own.transpose()?.unwrap_or_else(|| session.clone());
             session.listen(vec![Key::new(&fleet, topic).to_string()])
         });
         tracing::info!(

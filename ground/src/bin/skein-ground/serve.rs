@@ -93,8 +93,8 @@ impl Station {
         let now = self.began.elapsed();
         for wish in self.console.take_orders() {
             tracing::info!("ordered: {} for {}", wish.order.what(), wish.order.who());
-            let number = self.core.order(&wish.order);
-            wish.given_as(number);
+            let given = self.core.order(&wish.order);
+            wish.answer(given);
         }
         if let Err(error) = self.core.tick(now, &mut self.link) {
             tracing::error!("{error}");

@@ -16,7 +16,7 @@ use crate::frame::Address;
 const MIN_INTERVAL: Duration = Duration::from_millis(4);
 /// Interval of a stream that is off.
 const OFF: Duration = Duration::MAX;
-/// How many stations may have wishes about one stream; the wishes of further ones replace the oldest.
+/// How many stations may have wishes about one stream; the wish of a further one replaces the slowest.
 const MAX_WISHES: usize = 8;
 
 /// What a station may ask of a stream.
@@ -120,14 +120,18 @@ impl Streams {
         };
         stream.wishes.retain(|(station, _)| *station != from);
         if stream.wishes.len() == MAX_WISHES {
-            stream.wishes.remove(0);
+            // The slowest gives way: it is served by the faster ones as well.
+            let slowest = (0..MAX_WISHES).max_by_key(|index| stream.wishes[*index].1).unwrap_or(0);
+            stream.wishes.remove(slowest);
         }
         match rate {
             Rate::Default => {}
             Rate::Off => stream.wishes.push((from, OFF)),
             Rate::Every(interval) => stream.wishes.push((from, interval.max(MIN_INTERVAL))),
         }
-        stream.due = now.saturating_add(stream.interval());
+        // Whoever repeats a wish puts nothing off.
+        let due = now.saturating_add(stream.interval());
+        stream.due = if stream.due == OFF || due == OFF { due } else { stream.due.min(due) };
         self.next_due = self.next_due.min(stream.due);
         true
     }
