@@ -93,7 +93,7 @@ fn say_what_to_install(page: &Path, why: &str) -> std::io::Result<()> {
 <main>
 <h1>The console is not part of this build</h1>
 <p>Everything else works: the swarm flies, and the ground station takes orders over Zenoh.</p>
-<p>When this program was built, {why}.</p>
+<p>The reason, when this program was built: {why}.</p>
 <p>Install <b>Node.js 20 or later with npm</b> (Debian: <code>apt install nodejs npm</code>), see that
 <code>npm ci</code> works in <code>ground/console</code>, and build again: <code>cargo build --release --workspace</code>.</p>
 </main>

@@ -171,3 +171,38 @@ fn speaks_for_itself(key: &Key, payload: &Payload) -> bool {
         _ => false,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use prost::Message as _;
+    use skein_bp::{Program, ProgramConfig};
+    use skein_dbp::NodeConfig;
+
+    use super::*;
+    use crate::{Network, NetworkConfig, VERSION, proto};
+
+    #[test]
+    fn a_node_that_speaks_another_version_is_named_until_it_does_not() {
+        let name = |text| NodeName::new(text).unwrap();
+        let (me, other) = (name("uav/1"), name("uav/2"));
+        let fleet = Fleet::new("demo").unwrap();
+        let network = Network::new(NetworkConfig::default(), 1);
+        let (mut mine, mut theirs) = (network.join(&me), network.join(&other));
+        let node = Node::new(NodeConfig::new(me, 1, vec![other.clone()]), Program::new(ProgramConfig::default()));
+        let mut node = NodeLink::new(node, fleet.clone());
+        let key = Key::new(&fleet, Topic::State { node: other.clone() });
+        let newer = proto::Packet { version: VERSION + 1, body: None }.encode_to_vec();
+        let current = Payload::State(State::new(other.clone())).encode();
+        for (sent, named) in [(newer, vec![(&other, VERSION + 1)]), (current, vec![])] {
+            let before = node.stats().received;
+            theirs.put(&key, sent);
+            for tick in 0..50 {
+                let now = Duration::from_millis(20 * (before * 50 + tick));
+                network.advance(now);
+                node.receive(now, &mut mine);
+            }
+            assert_eq!(node.stats().received, before + 1);
+            assert_eq!(node.skewed().collect::<Vec<_>>(), named);
+        }
+    }
+}

@@ -15,9 +15,10 @@ use skein_wire::{Scene, State};
 /// Planned paths are recorded this often.
 const PATH_PERIOD: Duration = Duration::from_millis(500);
 
-/// A `mission.mcap` that grows with the mission.
+/// A `mission.mcap` that grows with the mission. When it cannot grow any more, because the disk is full, the station says
+/// so and goes on without it.
 pub struct Recording {
-    recorder: Recorder,
+    recorder: Option<Recorder>,
     /// How many vehicles the file shows by now.
     shown: usize,
     paths_due: Duration,
@@ -28,34 +29,28 @@ impl Recording {
     pub fn create(folder: &Path) -> anyhow::Result<Self> {
         let path = folder.join("mission.mcap");
         if path.exists() {
-            let kept = (1_u32..)
-                .map(|number| folder.join(format!("mission-{number}.mcap")))
-                .find(|path| !path.exists());
+            let numbered = |number: u32| folder.join(format!("mission-{number}.mcap"));
+            let kept = (1..).map(numbered).find(|path| !path.exists());
             if let Some(kept) = kept {
-                std::fs::rename(&path, &kept)
-                    .with_context(|| format!("{}: cannot be kept as {}", path.display(), kept.display()))?;
+                let why = || format!("{}: cannot be kept as {}", path.display(), kept.display());
+                std::fs::rename(&path, &kept).with_context(why)?;
             }
         }
-        Ok(Self { recorder: Recorder::create(&path)?, shown: 0, paths_due: Duration::ZERO })
+        Ok(Self { recorder: Some(Recorder::create(&path)?), shown: 0, paths_due: Duration::ZERO })
     }
 
     /// What stands in the world.
-    pub fn scene(&mut self, now: Duration, scene: &Scene) -> Result<(), RecorderError> {
-        self.recorder.scene(now, &scene.solids)
+    pub fn scene(&mut self, now: Duration, scene: &Scene) {
+        self.write(|recorder| recorder.scene(now, &scene.solids));
     }
 
     /// What has happened, and where the vehicles are.
-    pub fn take_in(
-        &mut self,
-        now: Duration,
-        station: &GroundCore,
-        happened: &[Happened],
-    ) -> Result<(), RecorderError> {
+    pub fn take_in(&mut self, now: Duration, station: &GroundCore, happened: &[Happened]) {
         for happened in happened {
-            self.recorder.trace(&TraceEvent::new(station.name(), happened))?;
+            self.write(|recorder| recorder.trace(&TraceEvent::new(station.name(), happened)));
             // The trace holds every leave to move; people do not need to read each.
             if !matches!(happened.event.kind(), ADVANCE | HOMEWARD) {
-                self.recorder.log(now, Level::Info, happened.home.as_str(), &happened.event.to_string())?;
+                self.note(now, Level::Info, happened.home.as_str(), &happened.event.to_string());
             }
         }
         let heard: Vec<&State> = station.roster().filter_map(|(_, state)| state).collect();
@@ -63,27 +58,35 @@ impl Recording {
             self.shown = heard.len();
             let hulls: Vec<(&str, f64)> =
                 heard.iter().map(|state| (state.node.as_str(), state.radius_m)).collect();
-            self.recorder.vehicles(now, &hulls)?;
+            self.write(|recorder| recorder.vehicles(now, &hulls));
         }
         let poses: Vec<_> = heard.iter().map(|state| (state.node.as_str(), pose(state))).collect();
-        self.recorder.poses(now, &poses)?;
+        self.write(|recorder| recorder.poses(now, &poses));
         if now >= self.paths_due {
             self.paths_due = now + PATH_PERIOD;
             for state in heard {
-                self.recorder.path(now, state.node.as_str(), &state.path)?;
+                self.write(|recorder| recorder.path(now, state.node.as_str(), &state.path));
             }
         }
-        Ok(())
     }
 
     /// A line for people.
-    pub fn note(&mut self, now: Duration, level: Level, name: &str, line: &str) -> Result<(), RecorderError> {
-        self.recorder.log(now, level, name, line)
+    pub fn note(&mut self, now: Duration, level: Level, name: &str, line: &str) {
+        self.write(|recorder| recorder.log(now, level, name, line));
     }
 
     /// Completes the file.
     pub fn finish(self) -> Result<(), RecorderError> {
-        self.recorder.finish()
+        self.recorder.map_or(Ok(()), Recorder::finish)
+    }
+
+    fn write(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecorderError>) {
+        if let Some(recorder) = &mut self.recorder
+            && let Err(error) = write(recorder)
+        {
+            tracing::error!("{error}; the station goes on, and records no more");
+            self.recorder = None;
+        }
     }
 }
 

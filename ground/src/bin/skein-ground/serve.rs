@@ -23,7 +23,7 @@ pub fn run(config: Config, until_over: bool) -> anyhow::Result<Option<MissionOut
     let mut station = Station::open(config, &stopping)?;
     let mut told = false;
     while !stopping.load(Ordering::Relaxed) {
-        station.go_on()?;
+        station.go_on();
         if let Some(outcome) = station.core.finished().filter(|_| !told) {
             told = true;
             match outcome.succeeded() {
@@ -88,7 +88,7 @@ impl Station {
     }
 
     /// Waits for something to do, and does it.
-    fn go_on(&mut self) -> anyhow::Result<()> {
+    fn go_on(&mut self) {
         self.link.bell().wait(TICK);
         let now = self.began.elapsed();
         for wish in self.console.take_orders() {
@@ -98,29 +98,27 @@ impl Station {
         }
         if let Err(error) = self.core.tick(now, &mut self.link) {
             tracing::error!("{error}");
-            self.recording.note(now, Level::Error, self.core.name().as_str(), &error.to_string())?;
+            self.recording.note(now, Level::Error, self.core.name().as_str(), &error.to_string());
         }
         let happened = self.core.take_selections();
-        self.recording.take_in(now, &self.core, &happened)?;
+        self.recording.take_in(now, &self.core, &happened);
         self.console.publish(now, &self.core, &happened);
-        self.look_at_scene(now)?;
+        self.look_at_scene(now);
         if let Some(line) = self.complaints.check(now, self.core.node(), &self.link) {
             tracing::warn!("{line}");
-            self.recording.note(now, Level::Warning, self.core.name().as_str(), &line)?;
+            self.recording.note(now, Level::Warning, self.core.name().as_str(), &line);
         }
-        Ok(())
     }
 
     /// Takes in what a simulated world says of itself, when it is new.
-    fn look_at_scene(&mut self, now: Duration) -> anyhow::Result<()> {
+    fn look_at_scene(&mut self, now: Duration) {
         while let Some((_, payload)) = skein_wire::Link::poll(&mut self.scenes) {
             let Ok(Payload::Scene(scene)) = Payload::decode(&payload) else { continue };
             if self.scene.as_ref() != Some(&scene) {
-                self.recording.scene(now, &scene)?;
+                self.recording.scene(now, &scene);
                 self.console.show_scene(&self.core, Some(&scene));
                 self.scene = Some(scene);
             }
         }
-        Ok(())
     }
 }
