@@ -22,7 +22,7 @@ use crate::{
     pipeline::{
         guidance::{Guidance, Motion, Surroundings},
         perception::{Perception, Pose, Scan},
-        set_point::{KeepAlive, SILENT_AFTER, keep_alive, oldest_age},
+        set_point::{FRESH_FOR, KeepAlive, SILENT_AFTER, keep_alive, oldest_age},
     },
     precedence,
     watches::Watches,
@@ -204,6 +204,10 @@ impl AgentCore {
 
     /// Takes in a lidar scan.
     pub fn sense(&mut self, now: Duration, scan: &Scan) {
+        // What an old one saw would be drawn where the vehicle is now.
+        if now.saturating_sub(scan.stamp) > FRESH_FOR {
+            return;
+        }
         let Some(pose) = self.pose_at(scan.stamp) else { return };
         // From the ground there is little to see, and much of it is the ground.
         if !self.is_airborne() {
@@ -266,6 +270,8 @@ impl AgentCore {
         {
             self.guidance.rest();
             self.node.node_mut().enqueue(event);
+            // Before anything that was said meanwhile is heard.
+            self.decide(now, &[]);
         }
     }
 
@@ -289,6 +295,7 @@ impl AgentCore {
             telemetry,
             self.failsafes.are_sound(),
             self.is_overhead_clear(neighbours),
+            self.flight.is_taking_off(),
         ));
         if let (true, Some(position)) = (self.is_airborne(), telemetry.position) {
             if let Some(battery) = telemetry.battery {
@@ -458,9 +465,14 @@ impl AgentCore {
         })
     }
 
-    /// Whether the vehicle is in the air, as far as its autopilot has told.
+    /// Whether this agent has the vehicle in the air, or on its way there.
     #[must_use]
-    pub fn is_airborne(&self) -> bool {
+    pub fn is_committed(&self) -> bool {
+        self.flight.is_committed()
+    }
+
+    /// Whether the vehicle is in the air, as far as its autopilot has told.
+    fn is_airborne(&self) -> bool {
         let telemetry = self.companion.telemetry();
         telemetry.armed && telemetry.landed != Landed::OnGround
     }

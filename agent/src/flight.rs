@@ -82,6 +82,18 @@ impl Flight {
         matches!(self.phase, FlightPhase::Engaging { .. } | FlightPhase::Flying)
     }
 
+    /// Whether this agent has armed the vehicle, and it is not up yet.
+    #[must_use]
+    pub fn is_taking_off(&self) -> bool {
+        matches!(self.phase, FlightPhase::Arming | FlightPhase::Climbing)
+    }
+
+    /// Whether this agent, and nobody else, has the vehicle off the ground or on its way.
+    #[must_use]
+    pub fn is_committed(&self) -> bool {
+        !matches!(self.phase, FlightPhase::Grounded | FlightPhase::Taken)
+    }
+
     /// Carries out one selected event.
     pub fn carry_out(&mut self, now: Duration, event: &Event, companion: &mut Companion) {
         match (self.me.verb(event), self.phase) {
@@ -111,8 +123,10 @@ impl Flight {
     /// The agent has not run for `pause`: if it flew the vehicle, it does not any more. Returns what the b-threads
     /// should hear of it.
     pub fn wake(&mut self, pause: Duration) -> Option<Event> {
-        let flew =
-            matches!(self.phase, FlightPhase::Climbing | FlightPhase::Engaging { .. } | FlightPhase::Flying);
+        let flew = matches!(
+            self.phase,
+            FlightPhase::Arming | FlightPhase::Climbing | FlightPhase::Engaging { .. } | FlightPhase::Flying
+        );
         flew.then(|| {
             self.phase = FlightPhase::Taken;
             self.me.event(SLEPT).with("seconds", pause.as_secs_f64())
@@ -183,9 +197,13 @@ impl Flight {
             self.phase = FlightPhase::Adopted;
             self.me.event(FOUND_AIRBORNE)
         } else {
-            self.phase = FlightPhase::Taken;
-            self.me.event(PILOT).with("mode", mode.to_string())
+            self.leave_to_pilot(mode)
         }
+    }
+
+    fn leave_to_pilot(&mut self, mode: FlightMode) -> Event {
+        self.phase = FlightPhase::Taken;
+        self.me.event(PILOT).with("mode", mode.to_string())
     }
 
     /// Moves on to the next phase when the telemetry says so; returns what the b-threads should hear of it.
@@ -197,12 +215,12 @@ impl Flight {
             .as_ref()
             .zip(telemetry.home)
             .map_or(0.0, |(position, home)| position.value.z - home.z);
-        if !self.heard_of && landed != Landed::Unknown {
-            self.heard_of = true;
-            if landed != Landed::OnGround && self.phase == FlightPhase::Grounded {
-                return Some(self.adopt(mode));
-            }
+        if self.phase == FlightPhase::Grounded && !matches!(landed, Landed::OnGround | Landed::Unknown) {
+            // In the air before its agent, or by a pilot's hand.
+            let found = !std::mem::replace(&mut self.heard_of, true);
+            return Some(if found { self.adopt(mode) } else { self.leave_to_pilot(mode) });
         }
+        self.heard_of |= landed != Landed::Unknown;
         self.left_ground |= !matches!(landed, Landed::OnGround | Landed::Unknown);
         match self.phase {
             FlightPhase::Climbing if height_m >= self.takeoff_height_m - TAKEOFF_TOLERANCE_M => {

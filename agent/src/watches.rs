@@ -74,20 +74,22 @@ impl Watches {
         }
     }
 
-    /// Preflight: the autopilot is heard, ready to arm, charged, its failsafes are sound, and nobody is overhead.
+    /// Preflight: the autopilot is heard, ready to arm, charged, its failsafes are sound, and nobody is overhead. Armed by another than
+    /// this agent, which is `taking_off`, it is not ready.
     pub fn preflight(
         &mut self,
         now: Duration,
         telemetry: &Telemetry,
         failsafes_sound: bool,
         overhead_clear: bool,
+        taking_off: bool,
     ) -> Option<Event> {
         let charged = telemetry.battery.is_some_and(|battery| battery.value.fraction >= BATTERY_TO_START);
         let ready = telemetry.connected
             && telemetry.ready_to_arm
             && telemetry.home.is_some()
             && (telemetry.landed == Landed::OnGround && !telemetry.armed && overhead_clear
-                || self.ready.0 && telemetry.armed)
+                || self.ready.0 && telemetry.armed && taking_off)
             && telemetry.is_fresh(now, TELEMETRY_FRESH_FOR)
             && charged
             && failsafes_sound;

@@ -6,8 +6,8 @@ use std::time::Duration;
 use skein_dbp::{Happened, Node, NodeName};
 use skein_wire::vocabulary::{DECLINED, ORDER, TAKEOFF};
 
-use crate::Order;
-use crate::bthreads::Hold;
+use crate::bthreads::{GOING, GOING_LASTS, Hold};
+use crate::{Order, Who};
 
 /// How many orders are remembered.
 const KEPT: usize = 10;
@@ -62,7 +62,8 @@ impl OrderLog {
         vehicles: impl Iterator<Item = NodeName>,
     ) -> u64 {
         let answers: BTreeMap<_, _> = vehicles.map(|vehicle| (vehicle, Answer::Pending)).collect();
-        let earlier = self.records.iter_mut().flat_map(|record| &mut record.answers);
+        let earlier = self.records.iter_mut().filter(|record| supersedes(&order, &record.order));
+        let earlier = earlier.flat_map(|record| &mut record.answers);
         for (_, answer) in
             earlier.filter(|(vehicle, answer)| answers.contains_key(*vehicle) && answer.is_open())
         {
@@ -79,36 +80,62 @@ impl OrderLog {
 
     /// Takes in what has happened since the last call.
     pub(crate) fn update(&mut self, now: Duration, node: &Node, happened: &[Happened]) {
-        for record in &mut self.records {
-            let after = now.saturating_sub(record.at);
-            let mut answered = Vec::new();
-            for happened in happened {
-                answered
-                    .extend(answer_in(&record.order, happened, after).map(|answer| (&happened.home, answer)));
-            }
-            if matches!(record.order, Order::Hold(_)) {
-                let kept = node.kept_by(Hold::NAME).filter(|(_, kept)| *kept);
-                answered.extend(kept.map(|(vehicle, _)| (vehicle, Answer::Acknowledged(after))));
-            }
-            for (vehicle, answer) in answered {
-                // A refusal may follow an acknowledgement; nothing else changes what has been said.
-                let open = record.answers.get(vehicle).is_some_and(|known| {
-                    known.is_open()
-                        || matches!((known, &answer), (Answer::Acknowledged(_), Answer::Refused(_)))
-                });
-                if open {
-                    record.answers.insert(vehicle.clone(), answer);
-                    self.revision += 1;
+        for happened in happened {
+            let vehicle = &happened.home;
+            // Of several orders of a kind, it is the newest that is answered.
+            for record in self.records.iter_mut().rev() {
+                let after = now.saturating_sub(record.at);
+                if let (Some(answer), Some(known)) =
+                    (answer_in(&record.order, happened, after), record.answers.get_mut(vehicle))
+                {
+                    // A refusal may follow an acknowledgement; nothing else changes what has been said.
+                    let declined = matches!((&known, &answer), (Answer::Acknowledged(_), Answer::Refused(_)));
+                    if known.is_open() || declined {
+                        *known = answer;
+                        self.revision += 1;
+                    }
+                    break;
                 }
             }
+        }
+        self.look_at_holds(now, node);
+        for record in &mut self.records {
+            let going = GOING.contains(&record.order.what());
+            let late = going && now > record.at + GOING_LASTS;
             for (vehicle, answer) in record.answers.iter_mut().filter(|(_, answer)| answer.is_open()) {
                 let alive = node.peers().any(|(peer, state)| peer == vehicle && state.alive);
-                let now_it_is = if alive { Answer::Pending } else { Answer::Missing };
+                let now_it_is = match (late, alive) {
+                    (true, _) => Answer::Refused("it was not taken in for too long; order it again".into()),
+                    (false, true) => Answer::Pending,
+                    (false, false) => Answer::Missing,
+                };
                 if *answer != now_it_is {
                     *answer = now_it_is;
                     self.revision += 1;
                 }
             }
+        }
+    }
+
+    /// A hold is acknowledged by those who surely keep it now: a vehicle that was out of reach for a lease does not.
+    fn look_at_holds(&mut self, now: Duration, node: &Node) {
+        for (vehicle, kept) in node.kept_by(Hold::NAME) {
+            let newest = self
+                .records
+                .iter_mut()
+                .rev()
+                .find(|record| record.order != Order::Launch && record.answers.contains_key(vehicle));
+            let Some(record) = newest.filter(|record| matches!(record.order, Order::Hold(_))) else {
+                continue;
+            };
+            let after = now.saturating_sub(record.at);
+            let Some(answer) = record.answers.get_mut(vehicle) else { continue };
+            match (kept, &*answer) {
+                (true, Answer::Pending | Answer::Missing) => *answer = Answer::Acknowledged(after),
+                (false, Answer::Acknowledged(_)) => *answer = Answer::Pending,
+                _ => continue,
+            }
+            self.revision += 1;
         }
     }
 
@@ -118,6 +145,17 @@ impl OrderLog {
 
     pub(crate) fn revision(&self) -> u64 {
         self.revision
+    }
+}
+
+/// Whether whoever has not taken in the `old` order need not any more. A launch is about those on the ground: it takes the
+/// place of no order, and only who calls all down calls it off.
+fn supersedes(new: &Order, old: &Order) -> bool {
+    match (new, old) {
+        (Order::Launch, _) => false,
+        (Order::Land(Who::All) | Order::Return(Who::All), _) => true,
+        (_, Order::Launch) => false,
+        _ => true,
     }
 }
 

@@ -10,7 +10,8 @@ use crate::{me::Me, precedence};
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct Operator {
     me: Me,
-    pending: Option<Event>,
+    /// Until they can happen: what a pilot keeps from happening waits for the vehicle to be handed back.
+    pending: Vec<Event>,
     holding: bool,
 }
 
@@ -18,7 +19,7 @@ impl Operator {
     /// The b-thread of vehicle `me`.
     #[must_use]
     pub fn new(me: Me) -> Self {
-        Self { me, pending: None, holding: false }
+        Self { me, pending: Vec::new(), holding: false }
     }
 }
 
@@ -30,29 +31,28 @@ impl BThread for Operator {
             // Whoever sends the vehicle home or down, it is no longer held.
             bid = bid.block(me.any(ADVANCE)).wait_for(me.any_of(&[RETURN, LAND]));
         }
-        if let Some(event) = &self.pending {
-            bid = bid.request(event.clone());
-        }
-        Some(bid)
+        Some(self.pending.iter().fold(bid, |bid, event| bid.request(event.clone())))
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         if !self.me.heard(event, ORDER) {
-            if self.pending.as_ref() == Some(event) {
-                self.pending = None;
-            }
+            self.pending.retain(|pending| pending != event);
             self.holding &= self.me.heard(event, HOLD);
             return;
         }
         let what = event.text("what").unwrap_or_default();
         let why = "ordered by the operator";
-        self.pending = match what {
+        let event = match what {
             "hold" => Some(self.me.because(HOLD, why)),
             "land" => Some(self.me.because(LAND, why)),
             "return" => Some(self.me.because(RETURN, why)),
             "hand_back" => Some(self.me.event(HAND_BACK)),
             _ => None,
         };
+        if what != "hand_back" {
+            self.pending.clear();
+        }
+        self.pending.extend(event);
         self.holding = (self.holding && !matches!(what, "resume" | "goto")) || what == "hold";
     }
 }

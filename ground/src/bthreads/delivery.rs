@@ -1,11 +1,18 @@
 //! Brings the operator's orders to one vehicle's gateway.
 
+use std::time::Duration;
+
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::{NodeName, facts};
 use skein_wire::vocabulary;
 
 use crate::order::ordered_for;
+
+/// An order that sets a vehicle going is not brought any more after this long: whoever gave it does not look any more.
+pub const GOING_LASTS: Duration = Duration::from_secs(10);
+/// The orders that set a vehicle going.
+pub const GOING: [&str; 3] = ["resume", "goto", "hand_back"];
 
 /// Waits until something is ordered for a vehicle, and requests it at the vehicle's gateway until it is taken, or until
 /// something else is ordered.
@@ -16,13 +23,15 @@ pub struct Delivery {
     ground: NodeName,
     vehicle: NodeName,
     order: Option<Event>,
+    /// Until when, if it is not to be brought at any time.
+    until: Option<Duration>,
 }
 
 impl Delivery {
     /// Brings the orders of the station `ground` to `vehicle`.
     #[must_use]
     pub fn new(ground: NodeName, vehicle: NodeName) -> Self {
-        Self { ground, vehicle, order: None }
+        Self { ground, vehicle, order: None, until: None }
     }
 
     /// The name it runs under.
@@ -39,7 +48,7 @@ impl Delivery {
         Some(place.fold(order, |order, (axis, coordinate)| order.with(axis, coordinate)))
     }
 
-    /// The vehicle has restarted and may have taken the order or not. To repeat it does no harm.
+    /// The vehicle has restarted and may have taken the order or not. To repeat it does no harm if it brings it down.
     fn unknown(&self, order: &Event) -> EventSet {
         facts::of(&self.ground, facts::UNKNOWN).and(EventSet::field_is("event", order.name()))
     }
@@ -48,19 +57,24 @@ impl Delivery {
 impl BThread for Delivery {
     fn bid(&self) -> Option<Bid> {
         let bid = Bid::new().wait_for(ordered_for(&self.ground, &self.vehicle));
-        Some(match &self.order {
-            Some(order) => bid.request(order.clone()).wait_for(self.unknown(order)),
+        let Some(order) = &self.order else { return Some(bid) };
+        let bid = bid.request(order.clone()).wait_for(self.unknown(order));
+        Some(match self.until {
+            Some(until) => bid.deadline(until),
             None => bid,
         })
     }
 
-    fn resume(&mut self, event: &Event, _: &mut Context) {
+    fn resume(&mut self, event: &Event, cx: &mut Context) {
         if event.kind() == "ordered" {
             // A launch is about others too and says nothing against what is on its way to this one.
             if event.text("what") != Some("launch") {
                 self.order = self.to_bring(event);
+                let going = event.text("what").is_some_and(|what| GOING.contains(&what));
+                self.until = going.then(|| cx.now() + GOING_LASTS);
             }
-        } else if self.order.as_ref() == Some(event) {
+        } else if self.order.as_ref() == Some(event) || self.until.is_some() {
+            // It is taken, or has waited too long, or its vehicle begins a life of which its operator knows nothing.
             self.order = None;
         }
     }

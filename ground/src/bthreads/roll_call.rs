@@ -8,6 +8,7 @@ use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::NodeName;
 
 use super::heard::{self, Situation};
+use crate::order::ordered;
 
 /// `<ground>/turn {vehicle}`: it is this vehicle's turn to take off.
 const TURN: &str = "turn";
@@ -61,7 +62,9 @@ impl RollCall {
 impl BThread for RollCall {
     fn bid(&self) -> Option<Bid> {
         let laters = EventSet::named(self.ground.event_name(LATER));
-        let bid = Bid::new().wait_for(heard::of(&self.ground)).wait_for(laters);
+        // Who is ordered down by name stays down.
+        let grounded = EventSet::any_of(["land", "return"].map(|what| ordered(&self.ground, what)));
+        let bid = Bid::new().wait_for(heard::of(&self.ground)).wait_for(laters).wait_for(grounded);
         let among = if self.courtesy.is_some() { 1 } else { self.waiting.len() };
         let next = self.waiting.iter().take(among).find(|vehicle| self.present.contains(*vehicle));
         let bid = match self.courtesy {
@@ -77,6 +80,10 @@ impl BThread for RollCall {
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
+        if event.text("what").is_some() {
+            self.waiting.retain(|vehicle| event.text("who") != Some(vehicle.as_str()));
+            return;
+        }
         let Some(vehicle) = vehicle_of(event) else {
             self.courtesy = None;
             return;

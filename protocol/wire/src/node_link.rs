@@ -188,7 +188,8 @@ mod tests {
         let fleet = Fleet::new("demo").unwrap();
         let network = Network::new(NetworkConfig::default(), 1);
         let (mut mine, mut theirs) = (network.join(&me), network.join(&other));
-        let node = Node::new(NodeConfig::new(me, 1, vec![other.clone()]), Program::new(ProgramConfig::default()));
+        let node =
+            Node::new(NodeConfig::new(me, 1, vec![other.clone()]), Program::new(ProgramConfig::default()));
         let mut node = NodeLink::new(node, fleet.clone());
         let key = Key::new(&fleet, Topic::State { node: other.clone() });
         let newer = proto::Packet { version: VERSION + 1, body: None }.encode_to_vec();

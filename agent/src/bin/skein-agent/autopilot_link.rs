@@ -91,8 +91,17 @@ pub struct AutopilotLink {
 }
 
 enum Open {
-    Udp { socket: UdpSocket, peer: Option<SocketAddr>, heard: Instant, listens: bool },
-    Stream(Box<dyn Stream>),
+    Udp {
+        socket: UdpSocket,
+        peer: Option<SocketAddr>,
+        heard: Instant,
+        listens: bool,
+    },
+    Stream {
+        stream: Box<dyn Stream>,
+        /// The end of a frame that did not fit: the next one follows it.
+        unsent: Vec<u8>,
+    },
 }
 
 /// A TCP connection or a serial line that does not wait.
@@ -149,7 +158,7 @@ impl AutopilotLink {
                     }
                 })
             }
-            Some(Open::Stream(stream)) => receive_stream(stream.as_mut(), &mut buffer, take_in),
+            Some(Open::Stream { stream, .. }) => receive_stream(stream.as_mut(), &mut buffer, take_in),
         };
         if let Err(error) = outcome {
             self.broken(&error.into());
@@ -163,7 +172,7 @@ impl AutopilotLink {
         }
         let outcome = match &mut self.open {
             Some(Open::Udp { socket, peer: Some(peer), .. }) => socket.send_to(bytes, *peer).map(drop),
-            Some(Open::Stream(stream)) => stream.write_all(bytes),
+            Some(Open::Stream { stream, unsent }) => send_stream(stream.as_mut(), unsent, bytes),
             _ => return,
         };
         match outcome {
@@ -199,7 +208,10 @@ impl AutopilotLink {
 fn passes(error: &io::Error) -> bool {
     matches!(
         error.kind(),
-        io::ErrorKind::WouldBlock | io::ErrorKind::ConnectionRefused | io::ErrorKind::Interrupted
+        io::ErrorKind::WouldBlock
+            | io::ErrorKind::TimedOut
+            | io::ErrorKind::ConnectionRefused
+            | io::ErrorKind::Interrupted
     )
 }
 
@@ -222,11 +234,11 @@ fn open(address: &Address) -> anyhow::Result<Open> {
             let stream = TcpStream::connect_timeout(peer, CONNECT)?;
             stream.set_nonblocking(true)?;
             stream.set_nodelay(true)?;
-            Ok(Open::Stream(Box::new(stream)))
+            Ok(Open::Stream { stream: Box::new(stream), unsent: Vec::new() })
         }
         Address::Serial { device, baud } => {
             let port = serialport::new(device.as_str(), *baud).timeout(Duration::from_millis(1)).open()?;
-            Ok(Open::Stream(Box::new(SerialLine(port))))
+            Ok(Open::Stream { stream: Box::new(SerialLine(port)), unsent: Vec::new() })
         }
     }
 }
@@ -241,6 +253,32 @@ fn receive_datagrams(
             Ok((length, from)) => take_in(from, &buffer[..length]),
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
             Err(error) if passes(&error) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+/// Sends as much as fits. What follows a frame that was cut is its end; frames that find no room are dropped whole.
+fn send_stream(stream: &mut dyn Stream, unsent: &mut Vec<u8>, bytes: &[u8]) -> io::Result<()> {
+    let mut untouched = unsent.is_empty();
+    if untouched {
+        unsent.extend_from_slice(bytes);
+    }
+    while !unsent.is_empty() {
+        match stream.write(unsent) {
+            Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+            Ok(length) => {
+                unsent.drain(..length);
+                untouched = false;
+            }
+            Err(error) if passes(&error) => {
+                // Nothing of it has left: it is old by the next time.
+                if untouched {
+                    unsent.clear();
+                }
+                return Ok(());
+            }
             Err(error) => return Err(error),
         }
     }

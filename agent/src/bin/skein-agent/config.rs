@@ -231,6 +231,15 @@ impl Mission {
         ensure!(inside(self.home), "`mission.home`, {:?}, is outside the fence", self.home);
         positive("mission.takeoff_height_m", self.takeoff_height_m)?;
         positive("mission.return_altitude_m", self.return_altitude_m)?;
+        let [x, y, z] = self.home;
+        for (field, height_m) in
+            [("takeoff_height_m", z + self.takeoff_height_m), ("return_altitude_m", self.return_altitude_m)]
+        {
+            ensure!(
+                inside([x, y, height_m]),
+                "`mission.{field}` leads to {height_m} m above the origin, outside the fence"
+            );
+        }
         Ok(())
     }
 }
@@ -308,6 +317,7 @@ mod tests {
             ("[15.0, 20.0, 3.0]", "[15.0, 20.0, 300.0]", "number 2"),
             ("[15.0, 20.0, 3.0]", "[nan, 20.0, 3.0]", "number 2"),
             ("max = [30.0", "max = [-30.0", "`fence`"),
+            ("#return_altitude_m = 4.0", "return_altitude_m = 40.0", "`mission.return_altitude_m`"),
             ("47.397742", "147.0", "`datum.latitude_deg`"),
             ("#cruise_m_s = 3.0", "cruise_m_s = -1.0", "`envelope.cruise_m_s`"),
             ("#cruise_m_s = 3.0", "cruise = 3.0", "unknown field `cruise`"),

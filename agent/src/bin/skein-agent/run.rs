@@ -38,7 +38,7 @@ pub fn run(config: Config) -> anyhow::Result<()> {
         driver.go_on();
         match interruptions.load(Ordering::Relaxed) {
             0 => {}
-            1 if driver.core.is_airborne() => {
+            1 if driver.core.is_committed() => {
                 if !std::mem::replace(&mut landing, true) {
                     tracing::warn!("landing, then ending; Ctrl-C again ends at once");
                     driver.core.order("land");
