@@ -118,20 +118,23 @@ impl Streams {
         let Some(stream) = self.list.iter_mut().find(|stream| stream.message_id == message_id) else {
             return false;
         };
+        let wished = match rate {
+            Rate::Default => None,
+            Rate::Off => Some((from, OFF)),
+            Rate::Every(interval) => Some((from, interval.max(MIN_INTERVAL))),
+        };
+        if wished.is_some_and(|wish| stream.wishes.contains(&wish)) {
+            // Whoever repeats a wish puts nothing off.
+            return true;
+        }
         stream.wishes.retain(|(station, _)| *station != from);
         if stream.wishes.len() == MAX_WISHES {
             // The slowest gives way: it is served by the faster ones as well.
             let slowest = (0..MAX_WISHES).max_by_key(|index| stream.wishes[*index].1).unwrap_or(0);
             stream.wishes.remove(slowest);
         }
-        match rate {
-            Rate::Default => {}
-            Rate::Off => stream.wishes.push((from, OFF)),
-            Rate::Every(interval) => stream.wishes.push((from, interval.max(MIN_INTERVAL))),
-        }
-        // Whoever repeats a wish puts nothing off.
-        let due = now.saturating_add(stream.interval());
-        stream.due = if stream.due == OFF || due == OFF { due } else { stream.due.min(due) };
+        stream.wishes.extend(wished);
+        stream.due = now.saturating_add(stream.interval());
         self.next_due = self.next_due.min(stream.due);
         true
     }
