@@ -113,8 +113,8 @@ fn certificates(folder: &std::path::Path) -> Security {
 
 #[test]
 fn members_of_one_authority_meet_and_others_do_not() {
-    let (ours, theirs) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let (ours, theirs) = (certificates(ours.path()).leak(ours), certificates(theirs.path()).leak(theirs));
+    let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    let [ours, theirs] = [0, 1].map(|authority| certificates(folders[authority].path()));
     let secured = |security: &Security, connect: Vec<String>| NetworkSettings {
         listen: vec!["tls/localhost:0".into()],
         connect,
@@ -129,17 +129,5 @@ fn members_of_one_authority_meet_and_others_do_not() {
     while Instant::now() < deadline {
         assert_eq!(stranger.connected_peers(), 0, "a stranger is let in");
         std::thread::sleep(Duration::from_millis(50));
-    }
-}
-
-/// Keeps a folder for as long as the test runs.
-trait Leak {
-    fn leak(self, folder: tempfile::TempDir) -> Self;
-}
-
-impl Leak for Security {
-    fn leak(self, folder: tempfile::TempDir) -> Self {
-        let _ = folder.keep();
-        self
     }
 }

@@ -149,7 +149,8 @@ pub fn run(
         watches_window: fault == Fault::NodeCut,
     };
     run.until(|run| run.now_s() >= at_s);
-    let victim = run.flying(victim).await_one(&mut run);
+    // A cable has been laid for one vehicle; otherwise any that flies will do.
+    let victim = run.await_flying(victim, if cable.is_some() { 1 } else { vehicles });
     let at = run.now_s();
     run.apply(fault, victim, cable.as_ref())?;
     run.finish(fault, victim);
@@ -166,30 +167,21 @@ struct Run {
     watches_window: bool,
 }
 
-/// The first vehicle from an index on that flies.
-struct Flying(usize);
-
-impl Flying {
-    fn await_one(self, run: &mut Run) -> usize {
-        let mut found = self.0;
-        run.until(|run| {
-            let flying = (0..run.vehicles)
-                .map(|step| (self.0 + step) % run.vehicles)
-                .find(|index| run.is_flying(*index));
-            found = flying.unwrap_or(found);
-            flying.is_some() || run.swarm.world().is_over()
-        });
-        found
-    }
-}
-
 impl Run {
     fn now_s(&self) -> f64 {
         self.swarm.world().simulation().now().as_secs_f64()
     }
 
-    fn flying(&self, index: usize) -> Flying {
-        Flying(index)
+    /// Waits until one of so many vehicles flies, from the first on, or the mission is over.
+    fn await_flying(&mut self, first: usize, among: usize) -> usize {
+        let mut found = first;
+        self.until(|run| {
+            let mut candidates = (0..among).map(|step| (first + step) % run.vehicles);
+            let flying = candidates.find(|index| run.is_flying(*index));
+            found = flying.unwrap_or(first);
+            flying.is_some() || run.swarm.world().is_over()
+        });
+        found
     }
 
     fn is_flying(&self, index: usize) -> bool {

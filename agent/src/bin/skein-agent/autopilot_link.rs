@@ -308,6 +308,17 @@ fn receive_stream(
 mod tests {
     use super::*;
 
+    /// Looks at the link until so many datagrams or pieces have come.
+    fn hear(link: &mut AutopilotLink, pieces: usize) -> Vec<Vec<u8>> {
+        let deadline = Instant::now() + Duration::from_secs(10);
+        let mut heard = Vec::new();
+        while heard.len() < pieces {
+            assert!(Instant::now() < deadline, "only {heard:?} has come");
+            link.receive(|bytes| heard.push(bytes.to_vec()));
+        }
+        heard
+    }
+
     fn local(port: u16) -> SocketAddr {
         ([127, 0, 0, 1], port).into()
     }
@@ -343,17 +354,11 @@ mod tests {
         let mut link = AutopilotLink::new(Address::UdpIn(port));
         link.receive(|_| panic!("nobody has spoken"));
         link.send(b"to nobody");
-        let mut heard = Vec::new();
         autopilot.send_to(b"one", port).unwrap();
-        while heard.is_empty() {
-            link.receive(|bytes| heard.push(bytes.to_vec()));
-        }
+        assert_eq!(hear(&mut link, 1), [b"one"]);
         stranger.send_to(b"two", port).unwrap();
         autopilot.send_to(b"three", port).unwrap();
-        while heard.len() < 2 {
-            link.receive(|bytes| heard.push(bytes.to_vec()));
-        }
-        assert_eq!(heard, [b"one".to_vec(), b"three".to_vec()]);
+        assert_eq!(hear(&mut link, 1), [b"three"]);
         link.send(b"answer");
         let mut buffer = [0; 16];
         let (length, _) = autopilot.recv_from(&mut buffer).unwrap();
@@ -367,19 +372,17 @@ mod tests {
         let mut link = AutopilotLink::new(address);
         link.receive(|_| {});
         drop(listener.accept().unwrap());
-        let mut heard = Vec::new();
+        listener.set_nonblocking(true).unwrap();
+        let deadline = Instant::now() + Duration::from_secs(10);
         let (mut again, _) = loop {
+            assert!(Instant::now() < deadline, "it is not opened again");
             link.receive(|_| panic!("nothing was said"));
-            listener.set_nonblocking(true).unwrap();
             if let Ok(accepted) = listener.accept() {
                 break accepted;
             }
             std::thread::sleep(Duration::from_millis(20));
         };
         again.write_all(b"hello").unwrap();
-        while heard.is_empty() {
-            link.receive(|bytes| heard.extend_from_slice(bytes));
-        }
-        assert_eq!(heard, b"hello");
+        assert_eq!(hear(&mut link, 1), [b"hello"]);
     }
 }
