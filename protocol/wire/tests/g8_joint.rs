@@ -46,8 +46,11 @@ fn fleet(network: NetworkConfig, seed: u64) -> Swarm {
     swarm
 }
 
+/// By node and life: number in the term, the event's own number, and when.
+type Learned = BTreeMap<(String, u64), Vec<(u64, i64, Duration)>>;
+
 /// The decisions that each life of each node has seen, with the times.
-fn learned(swarm: &Swarm) -> BTreeMap<(String, u64), Vec<(u64, i64, Duration)>> {
+fn learned(swarm: &Swarm) -> Learned {
     let mut learned: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for seen in swarm.seen.iter().filter(|seen| seen.happened.event.name() == "swarm/go") {
         let number = seen.happened.event.int("n").unwrap();
