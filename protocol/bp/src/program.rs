@@ -316,12 +316,12 @@ impl Program {
     /// The internal event to select, and how many others tied with it.
     fn draw_internal(&mut self) -> Option<(Event, usize)> {
         self.board.offers(&mut self.offers);
+        let others = self.offers.len().checked_sub(1)?;
         let winner = self.ties.choose(&self.offers);
-        let event = self.offers.get(winner)?.clone();
         if !self.externals.is_empty() {
             self.internal_in_a_row += 1;
         }
-        Some((event, self.offers.len() - 1))
+        Some((self.offers.swap_remove(winner), others))
     }
 
     /// Ends those whom `event` interrupts, then resumes those who requested it or wait for it.

@@ -5,8 +5,8 @@
 mod support;
 
 use serde_json::json;
-use skein_bp::{Event, Program, ProgramConfig, Strategy};
-use support::{START, names, plain, program, superstep};
+use skein_bp::{Bid, Event, Program, ProgramConfig, Strategy};
+use support::{START, names, plain, program, script, superstep};
 
 fn with(strategy: Strategy) -> ProgramConfig {
     ProgramConfig { strategy, ..ProgramConfig::default() }
@@ -33,6 +33,46 @@ fn a_requested_event_resumes_all_who_requested_or_wait_for_it() {
     assert_eq!(selections[0].requested_by, ["asks".into(), "asks too".into()]);
     assert_eq!(selections[0].resumed, ["asks".into(), "asks too".into(), "waits".into()]);
     assert_eq!(program.bids().map(|(name, ..)| name).collect::<Vec<_>>(), ["elsewhere"]);
+}
+
+#[test]
+fn bthreads_that_go_round_are_found_by_their_present_bid_only() {
+    // More loops than the index remembers replaced bids.
+    let round = |n: usize| {
+        let syncs = (n..n + 3)
+            .map(|k| json!({"sync": {"wait": format!("e{}", k % 5), "block": format!("b{}", k % 7)}}));
+        json!([{"repeat": "forever", "do": syncs.collect::<Vec<_>>()}])
+    };
+    let mut program = plain([]);
+    for n in 0..30 {
+        program.add(format!("round {n}"), script(round(n)));
+    }
+    program.add(
+        "asks",
+        script(json!([{"repeat": "forever", "do": [{"sync": {"request": ["b0", "b3"], "wait": "e0"}}]}])),
+    );
+    let mut happened = 0;
+    for step in 0..500 {
+        program.enqueue(format!("e{}", (step * 3 + step / 7) % 5));
+        program.synchronise(START).unwrap();
+        let bids: Vec<_> = program.bids().map(|(name, bid, _)| (name.to_owned(), bid.clone())).collect();
+        let blocked = |event: &str| bids.iter().any(|(_, bid)| bid.blocks().contains(&event.into()));
+        let free: Vec<&str> = ["b0", "b3"].into_iter().filter(|event| !blocked(event)).collect();
+        let Some(selection) = program.step(START).unwrap() else {
+            panic!("an external event is always there")
+        };
+        if !free.is_empty() {
+            assert!(free.contains(&selection.event.name()), "{step}: {}", selection.event);
+        }
+        let concerns =
+            |bid: &Bid| bid.waits().contains(&selection.event) || bid.requests().contains(&selection.event);
+        let mut resumed: Vec<String> = selection.resumed.iter().map(|name| name.to_string()).collect();
+        resumed.sort();
+        let concerned = bids.iter().filter(|(_, bid)| concerns(bid)).map(|(name, _)| name.clone());
+        assert_eq!(resumed, concerned.collect::<Vec<_>>(), "{step}: {}", selection.event);
+        happened += usize::from(!resumed.is_empty());
+    }
+    assert!(happened > 300, "hardly anybody was woken: {happened}");
 }
 
 #[test]
