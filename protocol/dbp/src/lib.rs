@@ -42,6 +42,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod board;
 mod config;
 mod explain;
 pub mod facts;
@@ -56,6 +57,7 @@ mod stalls;
 mod stream;
 mod table;
 
+pub use board::{Board, BoardLease, BoardRequest, BoardRow};
 pub use config::NodeConfig;
 pub use explain::NodeExplanation;
 pub use message::{

@@ -82,6 +82,8 @@ struct TakenBid {
     sync: u64,
     requests: Vec<Event>,
     block: EventSet,
+    /// The block as it was asked for, of which this home honours its own part.
+    asked_block: EventSet,
     priority: Option<i32>,
     /// Whether the requests may still be served.
     open: bool,
@@ -236,6 +238,13 @@ impl BidTable {
         })
     }
 
+    /// What the b-thread behind a proxy asked to block, if it blocks anything here.
+    pub(crate) fn asked_block(&self, proxy: &str) -> Option<&EventSet> {
+        let (node, bthread) = proxy.split_once('#')?;
+        let bid = self.bidders.get(node)?.bids.get(bthread)?;
+        (!bid.block.is_none()).then_some(&bid.asked_block)
+    }
+
     /// Who stands behind a proxy.
     pub(crate) fn party(&self, proxy: &str, now: Duration) -> Option<RemoteParty> {
         let (node, bthread) = proxy.split_once('#')?;
@@ -304,10 +313,8 @@ impl Rights {
         let open = !requests.is_empty();
         let priority =
             bid.priority.map(|priority| priority.max(*self.priority.start()).min(*self.priority.end()));
-        (
-            Some(TakenBid { sync: bid.sync, requests, block: self.honoured_block(bid), priority, open }),
-            reasons,
-        )
+        let (block, asked_block) = (self.honoured_block(bid), bid.block.clone());
+        (Some(TakenBid { sync: bid.sync, requests, block, asked_block, priority, open }), reasons)
     }
 
     /// Why `event` may not be requested from afar, if so.
