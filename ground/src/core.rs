@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use skein_bp::{Program, ProgramConfig};
-use skein_dbp::{Happened, Node, NodeConfig, NodeError, NodeName};
+use skein_dbp::{Board, Happened, Node, NodeConfig, NodeError, NodeName};
 use skein_wire::{Fleet, Link, NodeLink, State};
 
 use crate::bthreads::{self, MissionOutcome, Watch, heard};
+use crate::explain::{Evidence, Explanation, explain};
 use crate::order_log::OrderLog;
 use crate::{Order, OrderRecord, Who};
 
@@ -73,6 +74,7 @@ pub struct GroundCore {
     now: Duration,
     roster: BTreeMap<NodeName, State>,
     order_log: OrderLog,
+    evidence: Evidence,
     selections: Vec<Happened>,
 }
 
@@ -90,14 +92,17 @@ impl GroundCore {
             ..NodeConfig::new(config.name.clone(), config.incarnation, roster)
         };
         config.orders.sort_by_key(|(at, _)| *at);
+        let mut evidence = Evidence::default();
+        config.vehicles.iter().for_each(|vehicle| evidence.note_vehicle(vehicle));
         Self {
-            node: NodeLink::new(Node::new(node_config, program), config.fleet),
+            node: NodeLink::new(Node::new(node_config, program), config.fleet).reading_boards(),
             name: config.name,
             orders: config.orders,
             vehicles: config.vehicles,
             now: Duration::ZERO,
             roster: BTreeMap::new(),
             order_log: OrderLog::default(),
+            evidence,
             selections: Vec::new(),
         }
     }
@@ -140,7 +145,9 @@ impl GroundCore {
         for state in self.node.take_states() {
             self.note(state);
         }
+        self.note_boards(link);
         let happened = self.node.node_mut().take_selections();
+        happened.iter().for_each(|happened| self.evidence.note_event(happened.into()));
         self.order_log.update(now, self.node.node(), &happened);
         self.selections.extend(happened);
         outcome
@@ -155,7 +162,20 @@ impl GroundCore {
         if first_word {
             self.node.node_mut().enqueue(heard::event(&self.name, &state));
         }
+        self.evidence.note_state(self.now, &state);
         self.roster.insert(state.node.clone(), state);
+    }
+
+    /// Takes in what the vehicles have on their boards, and tells what this station has.
+    fn note_boards(&mut self, link: &mut dyn Link) {
+        for board in self.node.take_boards() {
+            if self.vehicles.contains(&board.node) {
+                self.evidence.note_board(self.now, board);
+            }
+        }
+        if let Some(board) = self.node.put_board(self.now, link) {
+            self.evidence.note_board(self.now, board.clone());
+        }
     }
 
     /// How the mission went, once every vehicle is on the ground and knows.
@@ -184,6 +204,17 @@ impl GroundCore {
     /// Every vehicle in the order of take-off, with its last word if it has been heard.
     pub fn roster(&self) -> impl Iterator<Item = (&NodeName, Option<&State>)> {
         self.vehicles.iter().map(|vehicle| (vehicle, self.roster.get(vehicle)))
+    }
+
+    /// The newest board of this station and of each vehicle.
+    pub fn boards(&self) -> impl Iterator<Item = &Board> {
+        self.evidence.boards()
+    }
+
+    /// Why a vehicle of this station does what it does now, or does not move.
+    #[must_use]
+    pub fn explain(&self, vehicle: &NodeName) -> Option<Explanation> {
+        explain(&self.evidence, self.now, vehicle)
     }
 
     /// The latest orders and their answers, oldest first.

@@ -70,16 +70,24 @@ impl Board {
     pub const MAX_ROWS: usize = 128;
     /// Requests in a row, and blockers of a request.
     pub const MAX_REQUESTS: usize = 16;
-    /// Alternatives in one of a row's sets, and the terms of each of them.
-    pub const MAX_TERMS: usize = 32;
     /// Bytes in a name or in a text of an event.
     pub const MAX_TEXT: usize = 160;
+    /// Bytes in one of a row's sets, about.
+    pub const MAX_SET: usize = 2 << 10;
+    /// Bytes in all, about.
+    pub const MAX_SIZE: usize = 128 << 10;
 
     /// A board of these rows, cut to the quotas.
     #[must_use]
     pub fn new(node: NodeName, incarnation: u64, at: Duration, rows: Vec<BoardRow>) -> Self {
-        let left_out = u32::try_from(rows.len().saturating_sub(Self::MAX_ROWS)).unwrap_or(u32::MAX);
-        let rows = rows.into_iter().take(Self::MAX_ROWS).map(BoardRow::cut_to_quotas).collect();
+        let (given, mut room) = (rows.len(), Self::MAX_SIZE);
+        let fits = |row: BoardRow| {
+            let (row, size) = row.cut_to_quotas();
+            room = room.checked_sub(size)?;
+            Some(row)
+        };
+        let rows: Vec<BoardRow> = rows.into_iter().take(Self::MAX_ROWS).map_while(fits).collect();
+        let left_out = u32::try_from(given - rows.len()).unwrap_or(u32::MAX);
         Self { node, incarnation, at, rows, left_out }
     }
 
@@ -119,9 +127,9 @@ impl BoardRow {
         Self {
             bthread: bthread.into(),
             requests: bid.requests().iter().map(request).collect(),
-            waits: bid.waits().clone(),
-            blocks: bid.blocks().clone(),
-            interrupts: bid.interrupts().clone(),
+            waits: plain(bid.waits()),
+            blocks: plain(bid.blocks()),
+            interrupts: plain(bid.interrupts()),
             priority: bid.given_priority(),
             deadline: bid.given_deadline(),
             lease: None,
@@ -144,7 +152,8 @@ impl BoardRow {
                 == (&earlier.waits, &earlier.blocks, &earlier.interrupts)
     }
 
-    fn cut_to_quotas(mut self) -> Self {
+    /// As much of the row as there is room for, and about how many bytes that is.
+    fn cut_to_quotas(mut self) -> (Self, usize) {
         let mut cut = self.cut;
         cut |= shorten(&mut self.bthread);
         cut |= truncate(&mut self.requests);
@@ -158,7 +167,12 @@ impl BoardRow {
         for set in [&mut self.waits, &mut self.blocks, &mut self.interrupts] {
             cut |= shorten_set(set);
         }
-        Self { cut, ..self }
+        let requests = self.requests.iter().map(|request| {
+            size_of_event(&request.event) + request.blocked_by.iter().map(String::len).sum::<usize>()
+        });
+        let sets = [&self.waits, &self.blocks, &self.interrupts].into_iter().map(size_of_set);
+        let size = self.bthread.len() + requests.sum::<usize>() + sets.sum::<usize>();
+        (Self { cut, ..self }, size)
     }
 }
 
@@ -206,44 +220,52 @@ fn shorten_event(event: &mut Event) -> bool {
     true
 }
 
-/// Leaves out alternatives beyond the quota, and any whose terms are too many or too long.
+/// Leaves out the alternatives that there is no room for.
 fn shorten_set(set: &mut EventSet) -> bool {
-    let fits = |set: &EventSet| {
-        let mut terms = Board::MAX_TERMS;
-        has_room(set, &mut terms)
-    };
+    if size_of_set(set) <= Board::MAX_SET {
+        return false;
+    }
     match set {
         EventSet::Or(alternatives) => {
-            let before = alternatives.len();
-            alternatives.retain(fits);
-            alternatives.truncate(Board::MAX_TERMS);
-            alternatives.len() < before
+            let mut room = Board::MAX_SET;
+            alternatives.retain(|set| {
+                let left = room.checked_sub(size_of_set(set));
+                room = left.unwrap_or(room);
+                left.is_some()
+            });
         }
-        set if fits(set) => false,
-        set => {
-            *set = EventSet::None;
-            true
-        }
+        _ => *set = EventSet::None,
+    }
+    *set = plain(set);
+    true
+}
+
+/// The set; if it surely holds nothing, that in one word.
+fn plain(set: &EventSet) -> EventSet {
+    if set.is_none() { EventSet::None } else { set.clone() }
+}
+
+/// About how many bytes a set is on the wire.
+fn size_of_set(set: &EventSet) -> usize {
+    const FORM: usize = 4;
+    FORM + match set {
+        EventSet::None | EventSet::All => 0,
+        EventSet::Exactly(event) => size_of_event(event),
+        EventSet::Named(pattern) => pattern.as_str().len(),
+        EventSet::Prefix(prefix) => prefix.len(),
+        EventSet::FieldRange { key, .. } => key.len() + 16,
+        EventSet::FieldIs(fields) => fields.iter().map(|(key, value)| size_of_datum(key, value)).sum(),
+        EventSet::Region { .. } => 48,
+        EventSet::Not(set) => size_of_set(set),
+        EventSet::And(sets) | EventSet::Or(sets) => sets.iter().map(size_of_set).sum(),
     }
 }
 
-/// Whether there is room for a set among so many `terms` more.
-fn has_room(set: &EventSet, terms: &mut usize) -> bool {
-    let Some(left) = terms.checked_sub(1) else { return false };
-    *terms = left;
-    match set {
-        EventSet::None | EventSet::All | EventSet::Region { .. } => true,
-        EventSet::Exactly(event) => !is_long(event),
-        EventSet::Named(pattern) => pattern.as_str().len() <= Board::MAX_TEXT,
-        EventSet::Prefix(prefix) => prefix.len() <= Board::MAX_TEXT,
-        EventSet::FieldRange { key, .. } => key.len() <= Board::MAX_TEXT,
-        EventSet::FieldIs(fields) => {
-            let event = fields
-                .iter()
-                .fold(Event::new(""), |event, (key, value)| event.with(key.clone(), value.clone()));
-            !is_long(&event)
-        }
-        EventSet::Not(set) => has_room(set, terms),
-        EventSet::And(sets) | EventSet::Or(sets) => sets.iter().all(|set| has_room(set, terms)),
-    }
+fn size_of_event(event: &Event) -> usize {
+    event.name().len() + event.data().map(|(key, value)| size_of_datum(key, value)).sum::<usize>()
+}
+
+fn size_of_datum(key: &str, value: &Value) -> usize {
+    const NUMBER: usize = 12;
+    key.len() + if let Value::Text(text) = value { text.len() } else { NUMBER }
 }
