@@ -266,6 +266,7 @@ impl AgentCore {
         self.decide(now, &neighbours);
         self.steer(now, &neighbours);
         self.node.send(link);
+        self.node.put_board(now, link);
     }
 
     /// Between two ticks: answers at once what other nodes say, without a set-point. Makes the swarm quick to hold.

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use skein_bp::{Program, ProgramConfig};
-use skein_dbp::{Authority, Happened, Kept, Node, NodeConfig, NodeError, NodeName};
+use skein_dbp::{Authority, Board, Happened, Kept, Node, NodeConfig, NodeError, NodeName};
 use skein_wire::{Fleet, Link, NodeLink, State, Store, joint_roster, standard_authority};
 
 use crate::bthreads::{self, MissionOutcome, Watch, heard};
+use crate::explain::{Evidence, Explanation, explain};
 use crate::order_log::OrderLog;
 use crate::{Order, OrderRecord, Who};
 
@@ -82,6 +83,7 @@ pub struct GroundCore {
     now: Duration,
     roster: BTreeMap<NodeName, State>,
     order_log: OrderLog,
+    evidence: Evidence,
     selections: Vec<Happened>,
 }
 
@@ -115,17 +117,21 @@ impl GroundCore {
         };
         config.orders.sort_by_key(|(at, _)| *at);
         let node = Node::new(node_config, program);
+        let mut evidence = Evidence::default();
+        config.vehicles.iter().for_each(|vehicle| evidence.note_vehicle(vehicle));
+        let node = match store {
+            Some(store) => NodeLink::durable(node, config.fleet, store),
+            None => NodeLink::new(node, config.fleet),
+        };
         Self {
-            node: match store {
-                Some(store) => NodeLink::durable(node, config.fleet, store),
-                None => NodeLink::new(node, config.fleet),
-            },
+            node: node.reading_boards(),
             name: config.name,
             orders: config.orders,
             vehicles: config.vehicles,
             now: Duration::ZERO,
             roster: BTreeMap::new(),
             order_log: OrderLog::default(),
+            evidence,
             selections: Vec::new(),
         }
     }
@@ -168,7 +174,9 @@ impl GroundCore {
         for state in self.node.take_states() {
             self.note(state);
         }
+        self.note_boards(link);
         let happened = self.node.node_mut().take_selections();
+        happened.iter().for_each(|happened| self.evidence.note_event(happened.into()));
         self.order_log.update(now, self.node.node(), &happened);
         self.selections.extend(happened);
         outcome
@@ -183,7 +191,20 @@ impl GroundCore {
         if first_word {
             self.node.node_mut().enqueue(heard::event(&self.name, &state));
         }
+        self.evidence.note_state(self.now, &state);
         self.roster.insert(state.node.clone(), state);
+    }
+
+    /// Takes in what the vehicles have on their boards, and tells what this station has.
+    fn note_boards(&mut self, link: &mut dyn Link) {
+        for board in self.node.take_boards() {
+            if self.vehicles.contains(&board.node) {
+                self.evidence.note_board(self.now, board);
+            }
+        }
+        if let Some(board) = self.node.put_board(self.now, link) {
+            self.evidence.note_board(self.now, board.clone());
+        }
     }
 
     /// How the mission went, once every vehicle is on the ground and knows.
@@ -212,6 +233,17 @@ impl GroundCore {
     /// Every vehicle in the order of take-off, with its last word if it has been heard.
     pub fn roster(&self) -> impl Iterator<Item = (&NodeName, Option<&State>)> {
         self.vehicles.iter().map(|vehicle| (vehicle, self.roster.get(vehicle)))
+    }
+
+    /// The newest board of this station and of each vehicle.
+    pub fn boards(&self) -> impl Iterator<Item = &Board> {
+        self.evidence.boards()
+    }
+
+    /// Why a vehicle of this station does what it does now, or does not move.
+    #[must_use]
+    pub fn explain(&self, vehicle: &NodeName) -> Option<Explanation> {
+        explain(&self.evidence, self.now, vehicle)
     }
 
     /// The latest orders and their answers, oldest first.

@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::Vector3;
 use skein_bp::{Event, EventSet};
 use skein_dbp::NodeName;
+use skein_wire::vocabulary;
 
 /// Whom an order is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -92,8 +93,7 @@ impl Order {
         ground: &NodeName,
         positions: &[(NodeName, Option<Vector3<f64>>)],
     ) -> Vec<Event> {
-        let event =
-            |who: &str| Event::new(ground.event_name(ORDERED)).with("what", self.what()).with("who", who);
+        let event = |who: &str| ordered_event(ground, self.what(), who);
         match (self, self.who()) {
             (Self::GoTo(_, destination), _) => places(*destination, positions)
                 .into_iter()
@@ -133,7 +133,12 @@ fn places(
 }
 
 /// What the operator has ordered becomes an event of this name.
-const ORDERED: &str = "ordered";
+pub(crate) const ORDERED: &str = "ordered";
+
+/// The event of the ground station by which `what` is ordered, for a vehicle or for [`ALL`].
+pub(crate) fn ordered_event(ground: impl fmt::Display, what: &str, who: &str) -> Event {
+    vocabulary::event(ground, ORDERED).with("what", what).with("who", who)
+}
 
 /// The events of the ground station by which `what` is ordered, for anyone.
 #[must_use]
@@ -161,7 +166,7 @@ pub fn is_for(event: &Event, vehicle: &NodeName) -> bool {
 }
 
 /// How an event names all vehicles.
-const ALL: &str = "all";
+pub(crate) const ALL: &str = "all";
 
 impl Who {
     /// One vehicle.

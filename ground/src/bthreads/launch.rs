@@ -42,6 +42,9 @@ enum Phase {
 }
 
 impl Launch {
+    /// The name that this b-thread runs under: whoever explains why nobody takes off looks for it.
+    pub const NAME: &'static str = "launch";
+
     /// Launches from the ground station `ground`: at once, or `on_order`.
     #[must_use]
     pub fn new(ground: NodeName, on_order: bool) -> Self {

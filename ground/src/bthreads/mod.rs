@@ -27,7 +27,7 @@ use crate::GroundConfig;
 pub fn load(program: &mut Program, config: &GroundConfig) {
     let (ground, vehicles) = (&config.name, &config.vehicles);
     program.add("roll_call", RollCall::new(ground.clone(), vehicles.clone()));
-    program.add("launch", Launch::new(ground.clone(), config.launch_on_order));
+    program.add(Launch::NAME, Launch::new(ground.clone(), config.launch_on_order));
     program.add("together", Together::new(ground.clone()));
     if config.muster {
         program.add("muster", Muster::new(ground.clone(), vehicles.iter().cloned()));

@@ -96,7 +96,7 @@ impl Bid {
     /// the program is lost. Means nothing in one program.
     #[must_use]
     pub fn hold_when_lost(mut self) -> Self {
-        self.0.hold_when_lost = true;
+        self.statement().hold_when_lost = true;
         self
     }
 

@@ -14,7 +14,7 @@ use crate::event::Event;
 use crate::event_set::EventSet;
 use crate::explain::Explanation;
 use crate::index::Place;
-use crate::selection::{Origin, Selection};
+use crate::selection::{Origin, Rival, Selection};
 use crate::strategy::Strategy;
 use crate::tie::TieBreak;
 
@@ -41,6 +41,8 @@ pub struct ProgramConfig {
     pub passed_over_limit: Option<u32>,
     /// Events that proxies cannot block.
     pub protected: EventSet,
+    /// How many requests that lost are noted with each selection, for people.
+    pub rivals: usize,
 }
 
 impl Default for ProgramConfig {
@@ -52,19 +54,21 @@ impl Default for ProgramConfig {
             settle_limit: None,
             passed_over_limit: Some(PASSED_OVER_LIMIT),
             protected: EventSet::None,
+            rivals: 0,
         }
     }
 }
 
 impl ProgramConfig {
     /// What vehicles fly: priorities of bids, external events after at most 16 internal ones, at most 1000 selections in a
-    /// superstep.
+    /// superstep; four rivals are noted with each.
     pub fn vehicle(seed: u64) -> Self {
         Self {
             strategy: Strategy::SyncPriority,
             seed,
             externals_after: Some(16),
             settle_limit: Some(1000),
+            rivals: 4,
             ..Self::default()
         }
     }
@@ -328,13 +332,15 @@ impl Program {
     fn deliver(&mut self, event: Event, origin: Origin, tied_with: usize, now: Duration) -> Selection {
         let mut resuming = std::mem::take(&mut self.listeners);
         self.board.listeners(&event, &mut resuming);
+        let rivals = if origin == Origin::Internal { self.rivals(&event) } else { Vec::new() };
         let mut requested_by = Vec::with_capacity(resuming.len());
-        let mut ending = Vec::new();
+        let (mut ending, mut priority) = (Vec::new(), None);
         resuming.retain(|place| {
             let Some(Entry { name, bid, .. }) = self.board.get(*place) else { return false };
             let requested = bid.requests().contains(&event);
             if requested {
                 requested_by.push(name.clone());
+                priority = priority.max(bid.given_priority());
             }
             let interrupted = bid.interrupts().contains(&event);
             if interrupted {
@@ -354,7 +360,19 @@ impl Program {
         self.listeners = resuming;
         self.start_added(now);
         self.compact();
-        Selection { event, origin, requested_by, resumed, interrupted, tied_with }
+        Selection { event, origin, requested_by, resumed, interrupted, tied_with, priority, rivals }
+    }
+
+    /// What else is requested while `event` is selected.
+    fn rivals(&self, event: &Event) -> Vec<Rival> {
+        let others = self.board.requests().filter(|(_, requested)| *requested != event);
+        let rival = |(entry, requested): (&Entry, &Event)| Rival {
+            bthread: entry.name.clone(),
+            event: requested.clone(),
+            priority: entry.bid.given_priority(),
+            blocked: self.board.is_blocked(requested),
+        };
+        others.take(self.config.rivals).map(rival).collect()
     }
 
     fn interrupt(&mut self, place: Place, event: &Event, now: Duration) -> Option<Arc<str>> {
@@ -631,6 +649,11 @@ impl Program {
     /// Who requests, blocks and waits for the events of a set: `program.explain("uav/3/takeoff")`.
     pub fn explain(&self, question: impl Into<EventSet>) -> Explanation {
         Explanation::of(question.into(), &self.board, self.externals.iter(), self.selectable())
+    }
+
+    /// Who blocks `event` now, b-threads and proxies, in the order they came.
+    pub fn blockers(&self, event: &Event) -> impl Iterator<Item = &str> {
+        self.board.entries().filter(move |entry| self.board.blocks(entry, event)).map(|entry| &*entry.name)
     }
 
     /// The state of one b-thread, if it runs and is a `T`.

@@ -266,3 +266,25 @@ fn the_revision_changes_when_a_bid_does() {
     assert!(revisions.is_sorted_by(|a, b| a < b), "{revisions:?}");
     assert_eq!(program.revision(), revisions[2], "nothing happened");
 }
+
+#[test]
+fn a_selection_says_at_which_priority_it_went_before_what() {
+    let body = |request: &str, priority: i32| json!([{"sync": {"request": [request], "prio": priority}}]);
+    let config = ProgramConfig { rivals: 2, ..with(Strategy::SyncPriority) };
+    let mut program = program(
+        config,
+        [
+            ("battery", body("land", 50)),
+            ("mission", body("go", 10)),
+            ("navigation", body("advance", 60)),
+            ("hold", json!([{"sync": {"block": "advance", "wait": "land"}}])),
+            ("one too many", body("z", 1)),
+        ],
+    );
+    let selections = program.superstep(START).unwrap();
+    let first = &selections[0];
+    assert_eq!((first.event.name(), first.priority), ("land", Some(50)));
+    let rivals: Vec<String> = first.rivals.iter().map(ToString::to_string).collect();
+    assert_eq!(rivals, ["go by mission (priority 10)", "advance by navigation (blocked)"]);
+    assert_eq!(selections.last().map(|last| last.rivals.len()), Some(0));
+}

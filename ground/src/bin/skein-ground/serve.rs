@@ -60,7 +60,7 @@ impl Station {
         config.station.kept = kept;
         let fleet = config.station.fleet.clone();
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
-        let link = session.link(&config.station.name)?;
+        let link = session.listen(Key::subscriptions_with_boards(&fleet, &config.station.name))?;
         let scenes = session.listen(vec![Key::scenes(&fleet)])?;
         let bell = link.bell();
         let mut console = Console::serve(config.console, {

@@ -44,6 +44,7 @@ impl Node {
             event,
             requests_served: Vec::new(),
             requested_by: Vec::new(),
+            choice: None,
             at: self.now,
         }
     }
