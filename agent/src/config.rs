@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use skein_bp::script::Assignment;
 use skein_mav::Datum;
 
 use crate::bthreads::LinkLossPolicy;
@@ -93,6 +94,8 @@ pub struct AgentConfig {
     pub link_loss: LinkLossPolicy,
     /// Which b-threads to run.
     pub controller: Controller,
+    /// The scripts that run from the start.
+    pub scripts: Vec<Assignment>,
     /// Lease of the bids this node sends.
     pub lease: Duration,
     /// Seed of the program's tie-breaks.
