@@ -76,7 +76,7 @@ impl Scripts {
         let BoundScript { name, about, with, bthread } =
             assignment.bind(self.me.name()).map_err(|error| error.to_string())?;
         self.rights.check(&bthread)?;
-        let runner = Runner::new(self.me.clone(), &name, bthread.clone(), self.rights.block.clone());
+        let runner = Runner::new(self.me.clone(), &name, bthread.clone(), self.rights.block().clone());
         let listens = FACTS.into_iter().filter(|fact| self.listens(&bthread, fact)).collect();
         program.add(Runner::bthread_name(&name), runner);
         let from = from.to_owned();

@@ -2,7 +2,7 @@
 
 use skein_bp::script::Script;
 use skein_bp::{Bid, Event, EventSet, Pattern};
-use skein_dbp::{NodeName, facts};
+use skein_dbp::{Grant, NodeName, facts};
 use skein_wire::vocabulary::{ADVANCE, GOTO, ORDER, TAKEOFF, verbs};
 
 use crate::bthreads::HOME_LEG;
@@ -17,10 +17,7 @@ pub struct ScriptRights {
     me: Me,
     /// The nodes of the fleet.
     nodes: Vec<NodeName>,
-    /// What may be requested.
-    pub request: EventSet,
-    /// What may be blocked.
-    pub block: EventSet,
+    grant: Grant,
 }
 
 impl ScriptRights {
@@ -33,10 +30,18 @@ impl ScriptRights {
         let away = me.any(GOTO).and(EventSet::field_is("leg", HOME_LEG).not());
         Self {
             nodes: roster.iter().filter_map(|node| NodeName::new(node).ok()).collect(),
-            request: me.any(ORDER).and(orders).or(own.clone()),
-            block: me.any_of(&[ADVANCE, TAKEOFF]).or(away).or(own),
+            grant: Grant {
+                request: me.any(ORDER).and(orders).or(own.clone()),
+                block: me.any_of(&[ADVANCE, TAKEOFF]).or(away).or(own),
+            },
             me: me.clone(),
         }
+    }
+
+    /// What may be blocked.
+    #[must_use]
+    pub fn block(&self) -> &EventSet {
+        &self.grant.block
     }
 
     /// Whether a script keeps to its rights, and speaks of events that there are.
@@ -62,7 +67,7 @@ impl ScriptRights {
     }
 
     fn check_request(&self, request: &Event) -> Result<(), String> {
-        if self.request.contains(request) {
+        if self.grant.request.contains(request) {
             return Ok(());
         }
         let gateway = self.me.event(ORDER);
@@ -75,7 +80,7 @@ impl ScriptRights {
     }
 
     fn check_blocks(&self, blocks: &EventSet) -> Result<(), String> {
-        let forbidden = |name: &String| blocks.may_hold_named(name) && !self.block.may_hold_named(name);
+        let forbidden = |name: &String| blocks.may_hold_named(name) && !self.grant.block.may_hold_named(name);
         if let Some(name) = self.own_names().find(forbidden) {
             return Err(format!("it blocks `{name}`, which scripts may not"));
         }
