@@ -2,9 +2,13 @@
 
 use std::fmt;
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
+use skein_bp::script::{Assignment, ScriptFileError};
 use skein_bp::{Event, EventSet};
 use skein_dbp::NodeName;
+use skein_wire::vocabulary::{LOAD, UNLOAD};
 
 /// Whom an order is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,6 +36,34 @@ pub enum Order {
     GoTo(Who, Destination),
     /// Fly again by yourself: the pilot has let go.
     HandBack(Who),
+    /// Run a script beside whatever you do.
+    Load(Who, SentScript),
+    /// Run the script of this name no more.
+    Unload(Who, String),
+}
+
+/// A script as it is sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SentScript {
+    name: String,
+    text: Arc<str>,
+}
+
+impl SentScript {
+    /// Makes a script ready to be sent. Each vehicle checks it again, and more: whether it keeps to its rights there.
+    ///
+    /// # Errors
+    /// [`ScriptFileError`] when an argument is not what its parameter may be, or the script is too long.
+    pub fn new(assignment: &Assignment) -> Result<Self, ScriptFileError> {
+        let bound = assignment.bind("uav/1")?;
+        Ok(Self { name: bound.name, text: assignment.to_json()?.into() })
+    }
+
+    /// The name it will run under.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
 }
 
 /// Where to go, metres ENU. Several vehicles spread out around it.
@@ -51,7 +83,7 @@ const SPREAD_M: f64 = 3.0;
 const LEAST_HEIGHT_M: f64 = 1.0;
 
 impl Order {
-    /// The order as one word: `launch`, `hold`, `resume`, `land`, `return`, `goto` or `hand_back`.
+    /// The order as one word: `launch`, `hold`, `resume`, `land`, `return`, `goto`, `hand_back`, `load` or `unload`.
     #[must_use]
     pub fn what(&self) -> &'static str {
         match self {
@@ -62,6 +94,8 @@ impl Order {
             Self::Return(_) => "return",
             Self::GoTo(..) => "goto",
             Self::HandBack(_) => "hand_back",
+            Self::Load(..) => LOAD,
+            Self::Unload(..) => UNLOAD,
         }
     }
 
@@ -75,7 +109,19 @@ impl Order {
             | Self::Land(who)
             | Self::Return(who)
             | Self::GoTo(who, _)
+            | Self::Load(who, _)
+            | Self::Unload(who, _)
             | Self::HandBack(who) => who,
+        }
+    }
+
+    /// The name of the script that it is about.
+    #[must_use]
+    pub fn script(&self) -> Option<&str> {
+        match self {
+            Self::Load(_, script) => Some(script.name()),
+            Self::Unload(_, name) => Some(name),
+            _ => None,
         }
     }
 
@@ -86,8 +132,12 @@ impl Order {
         ground: &NodeName,
         positions: &[(NodeName, Option<Vector3<f64>>)],
     ) -> Vec<Event> {
-        let event =
-            |who: &str| Event::new(ground.event_name(ORDERED)).with("what", self.what()).with("who", who);
+        let mut order = Event::new(ground.event_name(ORDERED)).with("what", self.what());
+        order = self.script().into_iter().fold(order, |order, name| order.with("name", name));
+        if let Self::Load(_, script) = self {
+            order = order.with("script", script.text.clone());
+        }
+        let event = |who: &str| order.clone().with("who", who);
         match (self, self.who()) {
             (Self::GoTo(_, destination), _) => places(*destination, positions)
                 .into_iter()
@@ -124,6 +174,11 @@ fn places(
         placed.push((vehicle, Vector3::new(x, y, destination.z.unwrap_or(kept))));
     }
     placed
+}
+
+/// Whether an order says nothing against what other orders have set going.
+pub(crate) fn is_beside_flight(what: &str) -> bool {
+    matches!(what, "launch" | LOAD | UNLOAD)
 }
 
 /// What the operator has ordered becomes an event of this name.

@@ -7,7 +7,7 @@ use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::{NodeName, facts};
 use skein_wire::vocabulary;
 
-use crate::order::ordered_for;
+use crate::order::{is_beside_flight, ordered_for};
 
 /// An order that sets a vehicle going is not brought any more after this long: whoever gave it does not look any more.
 pub const GOING_LASTS: Duration = Duration::from_secs(10);
@@ -42,7 +42,7 @@ impl Delivery {
 
     /// What is to be brought, if the order is not carried out by the station itself.
     fn to_bring(&self, ordered: &Event) -> Option<Event> {
-        let what = ordered.text("what").filter(|what| !matches!(*what, "hold" | "launch"))?;
+        let what = ordered.text("what").filter(|what| *what != "hold")?;
         let order = vocabulary::order(&self.vehicle, what);
         let place = ["x", "y", "z"].into_iter().filter_map(|axis| Some((axis, ordered.real(axis)?)));
         Some(place.fold(order, |order, (axis, coordinate)| order.with(axis, coordinate)))
@@ -67,8 +67,8 @@ impl BThread for Delivery {
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         if event.kind() == "ordered" {
-            // A launch is about others too and says nothing against what is on its way to this one.
-            if event.text("what") != Some("launch") {
+            // A launch is about others too, and a script stands beside: neither says anything against what is on its way.
+            if !event.text("what").is_some_and(is_beside_flight) {
                 self.order = self.to_bring(event);
                 let going = event.text("what").is_some_and(|what| GOING.contains(&what));
                 self.until = going.then(|| cx.now() + GOING_LASTS);

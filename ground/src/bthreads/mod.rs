@@ -8,6 +8,7 @@ mod hold;
 mod launch;
 mod muster;
 pub mod roll_call;
+mod script_delivery;
 mod watch;
 
 use skein_bp::Program;
@@ -17,6 +18,7 @@ pub use hold::Hold;
 pub use launch::Launch;
 pub use muster::Muster;
 pub use roll_call::RollCall;
+pub use script_delivery::ScriptDelivery;
 pub use watch::{MissionOutcome, Watch};
 
 use crate::GroundConfig;
@@ -33,5 +35,7 @@ pub fn load(program: &mut Program, config: &GroundConfig) {
     program.add(Watch::NAME, Watch::new(ground.clone(), vehicles.iter().cloned()));
     for vehicle in vehicles {
         program.add(Delivery::name(vehicle), Delivery::new(ground.clone(), vehicle.clone()));
+        let scripts = ScriptDelivery::new(ground.clone(), vehicle.clone());
+        program.add(ScriptDelivery::name(vehicle), scripts);
     }
 }

@@ -4,10 +4,11 @@ use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 
 use serde::Deserialize;
+use skein_bp::script::Assignment;
 use skein_dbp::NodeName;
 use tokio::sync::oneshot;
 
-use crate::{Destination, Order, UnknownVehicle, Who};
+use crate::{Destination, Order, SentScript, UnknownVehicle, Who};
 
 /// An operator's order that waits for the station.
 pub struct Wish {
@@ -59,6 +60,12 @@ struct Message {
     to: To,
     #[serde(default)]
     point: Option<(f64, f64, Option<f64>)>,
+    /// For `load`: a script with values for its parameters.
+    #[serde(default)]
+    script: Option<Assignment>,
+    /// For `unload`: the name that the script runs under.
+    #[serde(default)]
+    name: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -78,6 +85,8 @@ enum What {
     #[serde(rename = "goto")]
     GoTo,
     HandBack,
+    Load,
+    Unload,
 }
 
 #[derive(Deserialize)]
@@ -95,7 +104,7 @@ pub(super) fn read(text: &str) -> (Option<String>, Result<Order, String>) {
     }
 }
 
-fn order(Message { kind: Kind::Order, what, to, point, .. }: Message) -> Result<Order, String> {
+fn order(Message { kind: Kind::Order, what, to, point, script, name, .. }: Message) -> Result<Order, String> {
     let who = match to {
         To::Word(word) if word == "all" => Who::All,
         To::Word(word) => return Err(format!("`to` is {word:?}: expected \"all\" or a list of vehicles")),
@@ -113,6 +122,11 @@ fn order(Message { kind: Kind::Order, what, to, point, .. }: Message) -> Result<
         What::Return => Order::Return(who),
         What::Land => Order::Land(who),
         What::HandBack => Order::HandBack(who),
+        What::Load => {
+            let script = script.ok_or("`load` needs a `script`: {script, with}")?;
+            Order::Load(who, SentScript::new(&script).map_err(|error| error.to_string())?)
+        }
+        What::Unload => Order::Unload(who, name.ok_or("`unload` needs the `name` of a script")?),
         What::GoTo => {
             let (x, y, z) = point.ok_or("`goto` needs a `point`: [x, y, z or null], metres")?;
             let finite = x.is_finite() && y.is_finite() && z.is_none_or(f64::is_finite);
@@ -149,6 +163,12 @@ mod tests {
             (r#"{"type":"order","what":"goto","to":"all"}"#, "`point`"),
             (r#"{"type":"order","what":"goto","to":"all","point":[1e999,0,0]}"#, "number out of range"),
             (r#"{"type":"order","what":"launch","to":["uav/1"]}"#, "for all"),
+            (r#"{"type":"order","what":"load","to":"all"}"#, "needs a `script`"),
+            (r#"{"type":"order","what":"unload","to":"all"}"#, "needs the `name`"),
+            (
+                r#"{"type":"order","what":"load","to":"all","script":{"script":{"name":"a","about":"","body":[{"dance":1}]}}}"#,
+                "a: `body[0]` unknown field `dance`",
+            ),
         ] {
             let error = read(text).1.expect_err(text);
             assert!(error.contains(fault), "{text}: {error}");
