@@ -169,7 +169,7 @@ fn the_way_home_stays_open_whatever_a_script_blocks() {
     let mut vehicle = Vehicle::in_the_air();
     vehicle
         .load(&script(
-            json!([{"sync": {"block": [{"any_data": "uav/1/goto"}, {"any_data": "uav/1/advance"}]}}]),
+            json!([{"sync": {"block": [{"any_data": "uav/1/goto"}, {"any_data": "uav/1/advance"}], "wait": "uav/1/landed"}}]),
         ))
         .unwrap();
     assert!(!vehicle.moves());
@@ -202,7 +202,7 @@ fn a_script_that_speaks_of_what_does_not_exist_is_refused() {
 #[test]
 fn a_script_is_explained_withdrawn_and_may_come_again() {
     let mut vehicle = Vehicle::in_the_air();
-    let hold = script(json!([{"sync": {"block": {"any_data": "uav/1/advance"}}}]));
+    let hold = script(json!([{"sync": {"block": {"any_data": "uav/1/advance"}, "wait": "uav/1/landed"}}]));
     vehicle.load(&hold).unwrap();
     vehicle.load(&hold).unwrap();
     assert!(!vehicle.moves());
@@ -236,10 +236,29 @@ fn a_script_says_how_it_has_ended() {
     );
     let why = ended(json!([{"sync": {"interrupt": {"any_data": "uav/1/arrived"}}}]), arrived());
     assert_eq!(why, "it was ended by uav/1/arrived{leg: 7}");
-    // One that goes round in circles stops neither the vehicle nor a selection.
-    let spinning = json!([{"sync": {"wait": {"any_data": "uav/1/arrived"}}},
-                          {"repeat": "forever", "do": [{"sync": {"request": "uav/1/script/x"}}]}]);
-    assert!(ended(spinning, arrived()).contains("it did not come to rest"));
+}
+
+#[test]
+fn scripts_that_go_round_by_themselves_stop_nobody() {
+    let round = json!({"repeat": "forever", "do": [{"sync": {"request": "uav/1/script/x"}}]});
+    let error = refusal(json!([{"sync": {"wait": {"any_data": "uav/1/arrived"}}}, round]));
+    assert!(
+        error.contains("it goes round without waiting for anything: uav/1/script/x after uav/1/arrived"),
+        "{error}"
+    );
+    // Of two that keep one another going, neither does so alone.
+    let mut vehicle = Vehicle::in_the_air();
+    for (name, hears, says) in [("ping", "a", "b"), ("pong", "b", "a")] {
+        let [hears, says] = [hears, says].map(|event| format!("uav/1/script/{event}"));
+        let body =
+            json!([{"repeat": "forever", "do": [{"sync": {"wait": hears}}, {"sync": {"request": says}}]}]);
+        vehicle.load(&Assignment { called: Some(name.to_owned()), ..script(body) }).unwrap();
+    }
+    let happened = vehicle.hears(mine("script/a"));
+    let report = happened.iter().find(|event| event.kind() == SCRIPT).unwrap();
+    assert!(report.text("why").unwrap().contains("it did not come to rest"), "{report}");
+    assert_eq!(vehicle.scripts.running().count(), 1);
+    assert!(vehicle.moves());
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use skein_bp::script::{Assignment, ScriptFileError};
+use skein_bp::script::{Assignment, ScriptFileError, TrialFault};
 use skein_bp::{Event, EventSet};
 use skein_dbp::NodeName;
 use skein_wire::vocabulary::{LOAD, UNLOAD};
@@ -42,6 +42,20 @@ pub enum Order {
     Unload(Who, String),
 }
 
+/// How many states of a script are looked at before it is sent.
+const STATES_TRIED: usize = 20_000;
+
+/// Why a script is not sent.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UnfitScript {
+    /// It is not sound, or its parameters are not.
+    #[error(transparent)]
+    Unsound(#[from] ScriptFileError),
+    /// What it would do.
+    #[error(transparent)]
+    Trial(#[from] TrialFault),
+}
+
 /// A script as it is sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SentScript {
@@ -53,9 +67,10 @@ impl SentScript {
     /// Makes a script ready to be sent. Each vehicle checks it again, and more: whether it keeps to its rights there.
     ///
     /// # Errors
-    /// [`ScriptFileError`] when an argument is not what its parameter may be, or the script is too long.
-    pub fn new(assignment: &Assignment) -> Result<Self, ScriptFileError> {
+    /// [`UnfitScript`] when an argument is not what its parameter may be, the script is too long, or a trial goes wrong.
+    pub fn new(assignment: &Assignment) -> Result<Self, UnfitScript> {
         let bound = assignment.bind("uav/1")?;
+        bound.bthread.try_out(STATES_TRIED)?;
         Ok(Self { name: bound.name, text: assignment.to_json()?.into() })
     }
 

@@ -67,8 +67,17 @@ impl Lockstep {
     #[allow(clippy::expect_used)]
     #[must_use]
     pub fn new(scenario: &str, vehicles: Option<usize>, seed: u64) -> Self {
-        let scenario = Scenario::built_in(scenario, vehicles, seed).expect("a built-in scenario");
-        let network = Network::new(NetworkConfig::default(), seed);
+        Self::of(Scenario::built_in(scenario, vehicles, seed).expect("a built-in scenario"))
+    }
+
+    /// The swarm of a scenario, on the ground.
+    ///
+    /// # Panics
+    /// When the scenario is not sound.
+    #[allow(clippy::expect_used)]
+    #[must_use]
+    pub fn of(scenario: Scenario) -> Self {
+        let network = Network::new(NetworkConfig::default(), scenario.seed);
         let vehicles: Vec<NodeName> = (0..scenario.vehicles.len()).map(fly::vehicle_name).collect();
         let link = |node: &NodeName| Box::new(network.join(node)) as Box<dyn Link>;
         let links = Links { vehicles: vehicles.iter().map(link).collect(), ground: link(&fly::GROUND) };

@@ -48,6 +48,10 @@ pub struct Scripts {
     running: BTreeMap<String, RunningScript>,
 }
 
+/// How many states of a script a vehicle looks at: no more than there is time for between two ticks. The ground looks at
+/// many more before it sends one, and nothing that is for the vehicle's safety hangs on it.
+const STATES_TRIED: usize = 200;
+
 /// The facts that are told only while a script listens.
 const FACTS: [&str; 4] = [AT, AHEAD, NEIGHBOUR, BATTERY];
 
@@ -76,6 +80,7 @@ impl Scripts {
         let BoundScript { name, about, with, bthread } =
             assignment.bind(self.me.name()).map_err(|error| error.to_string())?;
         self.rights.check(&bthread)?;
+        bthread.try_out(STATES_TRIED).map_err(|fault| fault.to_string())?;
         let runner = Runner::new(self.me.clone(), &name, bthread.clone(), self.rights.block().clone());
         let listens = FACTS.into_iter().filter(|fact| self.listens(&bthread, fact)).collect();
         program.add(Runner::bthread_name(&name), runner);

@@ -167,6 +167,73 @@ fn a_request_takes_data_from_the_event_before() {
     assert_eq!(program, once, "what was said is forgotten once it has been used");
 }
 
+/// What a trial of these ops says.
+fn trial(body: Value) -> String {
+    let text = file(&body).to_string();
+    let script = ScriptFile::parse("test.json", &text).unwrap();
+    let with = [("place", Argument::Point([0.0; 3])), ("way", Argument::Route(vec![[0.0; 3]; 3]))];
+    let with = with.map(|(name, value)| (name.to_owned(), value)).into();
+    match script.bind("uav/1", None, &with).unwrap().bthread.try_out(1000) {
+        Ok(trial) => format!("{} states, complete: {}", trial.states, trial.is_complete),
+        Err(fault) => fault.to_string(),
+    }
+}
+
+#[test]
+fn a_trial_finds_blocks_that_are_never_let_go() {
+    for (body, verdict) in [
+        (
+            json!([{"sync": {"block": {"any_data": "move"}}}]),
+            "it blocks `move` for ever from the start; give it",
+        ),
+        (
+            json!([{"sync": {"wait": "go"}}, {"sync": {"block": {"any_data": "move"}, "wait": {"all": false}}}]),
+            "it blocks `move` for ever after go;",
+        ),
+        (
+            json!([{"repeat": "forever", "do": [{"sync": {"block": "move", "wait": {"any_data": "go", "not": {"data_has": {"by": "me"}}}}}]}]),
+            "it blocks `move` for ever from the start",
+        ),
+        // It waits for what it blocks itself.
+        (json!([{"sync": {"block": "move", "wait": "move"}}]), "it blocks `move` for ever from the start"),
+        (
+            json!([{"sync": {"wait": ["a", "b"]}}, {"on": {"b": [{"sync": {"block": {"any_data": "move", "region": {"min": [0, 0, 0], "max": [2, 2, 2]}}}}]}}]),
+            "it blocks `move{x: 1.0, y: 1.0, z: 1.0}` for ever after b;",
+        ),
+    ] {
+        let said = trial(body);
+        assert!(said.contains(verdict), "{said} does not say {verdict}");
+    }
+    for body in [
+        json!([{"sync": {"block": {"any_data": "move"}, "wait": "go"}}]),
+        json!([{"sync": {"block": {"any_data": "move"}, "interrupt": {"field_range": {"key": "z", "min": 3}}}}]),
+        json!([{"within_s": 9, "do": [{"sync": {"block": {"any_data": "move"}}}]}]),
+        json!([{"repeat": "forever", "do": [{"sync": {"block": "left", "wait": "right"}}, {"sync": {"block": "right", "wait": "left"}}]}]),
+    ] {
+        let said = trial(body.clone());
+        assert!(said.ends_with("complete: true"), "{body}: {said}");
+    }
+}
+
+#[test]
+fn a_trial_finds_rounds_without_a_pause() {
+    let said = trial(
+        json!([{"sync": {"wait": "go"}}, {"repeat": "forever", "do": [{"sync": {"request": "x"}}, {"sync": {"request": "y"}}]}]),
+    );
+    assert!(
+        said.contains("it goes round without waiting for anything: ") && said.contains("after go"),
+        "{said}"
+    );
+    for paused in [json!({"sync": {"wait": "go"}}), json!({"within_s": 1, "do": [{"sync": {}}]})] {
+        let said = trial(json!([{"repeat": "forever", "do": [{"sync": {"request": "x"}}, paused]}]));
+        assert_eq!(said, "2 states, complete: true");
+    }
+    assert_eq!(
+        trial(json!([{"repeat": 5000, "do": [{"sync": {"wait": "go"}}]}])),
+        "1000 states, complete: false"
+    );
+}
+
 #[test]
 fn toml_and_json_say_the_same() {
     let from_toml = ScriptFile::parse("patrol.toml", PATROL).unwrap();

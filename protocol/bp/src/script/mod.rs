@@ -25,6 +25,8 @@ mod code;
 mod file;
 mod op;
 mod parameter;
+mod samples;
+mod trial;
 
 use std::collections::BTreeMap;
 use std::hash::{Hash, Hasher};
@@ -40,6 +42,7 @@ use code::{Code, Step};
 pub use file::{Assignment, BoundScript, MAX_OPS, MAX_TEXT, ScriptFile, ScriptFileError};
 pub use op::{Op, Reply, ScriptSource, Spawn, Times};
 pub use parameter::{Argument, Parameter, ParameterKind};
+pub use trial::{Trial, TrialFault};
 
 /// How many ops a script may run between two synchronisation points.
 const OPS_BETWEEN_SYNCS: usize = 100_000;
