@@ -6,6 +6,8 @@
   skein_operator.py hold                   nobody moves on, until Ctrl-C
   skein_operator.py hold --seconds 5 uav/1 uav/2
   skein_operator.py return uav/3           also: land, resume; `all` for every vehicle
+  skein_operator.py load curfew.toml --with for_s=60 --with 'min=[0,0,0]' --with 'max=[9,9,9]' all
+  skein_operator.py unload curfew all
 
 It speaks as the node `script/operator`, which must be in the vehicles' rosters. Only one such script has a say at a
 time: `hold`, `land`, `return` and `resume` end what an earlier one still holds at the vehicles that they speak to.
@@ -29,6 +31,7 @@ import queue
 import re
 import sys
 import time
+import tomllib
 
 try:
     import zenoh
@@ -361,13 +364,15 @@ def hold(options, output, interrupted):
 
 
 def order(options, output, interrupted):
-    """`land`, `return`, `resume`: requests `uav/N/order`, which the vehicle's operator b-thread turns into its own event.
+    """`land`, `return`, `resume`: requests `uav/N/order`, which the vehicle's operator b-thread turns into its own event;
+    `load` and `unload` request `uav/N/load` and `uav/N/unload`, and the vehicle tells what becomes of the script.
 
     A request counts only for the present life of its home, and together with how far this script has heard the home's
     occurrences. Both are learnt from the answer to an empty record.
     """
     what, wanted = options.command, named(options)
-    outboxes, taken = {}, set()
+    verb, data = ("order", {"what": what}) if what not in ("load", "unload") else (what, script_data(options))
+    outboxes, taken, unwilling = {}, set(), {}
 
     with Swarm(options.fleet, options.connect, ["state/*/*", "occ/*/*", f"occ/*/*/{NODE}", f"ack/*/*/{NODE}"]) as swarm:
 
@@ -395,16 +400,30 @@ def order(options, output, interrupted):
         def take_in_occurrence(node, occurrence):
             outbox = outboxes[node]
             is_new = occurrence.incarnation == outbox.home_incarnation and occurrence.seq > outbox.applied
-            if is_new and occurrence.event == event(node):
+            if not is_new:
+                return
+            if verb == "order":
+                is_taken = occurrence.event == event(node)
+            else:
+                told = {key: value.text for key, value in occurrence.event.data.items()}
+                if occurrence.event.name != f"{node}/script" or told.get("name") != script_name(options):
+                    return
+                if told.get("state") == "refused":
+                    unwilling[node] = told.get("why", "")
+                is_taken = told.get("state") == {"load": "accepted", "unload": "withdrawn"}[verb]
+            if is_taken:
                 taken.add(node)
                 output.tell(f"{node} takes the order: {what}", vehicle=node, order=what, taken=True)
 
         def event(node):
-            return wire.Event(name=f"{node}/order", data={"what": wire.Value(text=what)})
+            return wire.Event(
+                name=f"{node}/{verb}", data={key: wire.Value(text=text) for key, text in data.items()}
+            )
 
         def is_complete():
             # Not named, the vehicles are those that are heard within a second.
-            return outboxes and taken == outboxes.keys() and (wanted or swarm.now_s() > LISTEN_S)
+            settled = taken | unwilling.keys()
+            return outboxes and settled == outboxes.keys() and (wanted or swarm.now_s() > LISTEN_S)
 
         for node in wanted:
             ask(node)
@@ -426,11 +445,46 @@ def order(options, output, interrupted):
             outbox.state()
     missing = ordered(outboxes.keys() - taken)
     for node in missing:
-        why = ", ".join(outboxes[node].refusals) or "no answer"
+        why = unwilling.get(node) or ", ".join(outboxes[node].refusals) or "no answer"
         output.tell(f"{node} has not taken the order: {why}", vehicle=node, order=what, taken=False)
     if not outboxes:
         return nobody(options)
     return f"not taken by {', '.join(missing)}" if missing else None
+
+
+def script_data(options):
+    """What a request of `load` or `unload` carries."""
+    if options.command == "unload":
+        return {"name": options.name}
+    assignment = {"script": options.script, "with": dict(options.values)}
+    if options.called:
+        assignment["as"] = options.called
+    return {"name": script_name(options), "script": json.dumps(assignment)}
+
+
+def script_name(options):
+    """The name that the script runs under."""
+    return options.name if options.command == "unload" else options.called or options.script.get("name")
+
+
+def script_file(path):
+    """A script, from TOML or JSON; the vehicle says what is wrong with it."""
+    try:
+        with open(path, "rb") as file:
+            return json.load(file) if path.endswith(".json") else tomllib.load(file)
+    except (OSError, ValueError) as error:
+        raise argparse.ArgumentTypeError(f"{path}: {error}") from None
+
+
+def script_value(text):
+    """`NAME=VALUE`, with the value in JSON; anything else is a text."""
+    name, separator, value = text.partition("=")
+    if not separator:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected NAME=VALUE")
+    try:
+        return name, json.loads(value)
+    except ValueError:
+        return name, value
 
 
 def named(options):
@@ -519,6 +573,16 @@ def read_arguments(arguments):
         ("resume", "go on after an order to hold"),
     ):
         added = command(what, order, about)
+        added.add_argument("vehicles", type=vehicle, nargs="+", metavar="uav/N", help="these, or `all`")
+    loading = command("load", order, "run a script")
+    loading.add_argument("script", type=script_file, metavar="FILE", help="TOML or JSON, such as agent/scripts/curfew.toml")
+    loading.add_argument(
+        "--with", type=script_value, action="append", default=[], dest="values", metavar="NAME=VALUE", help="a parameter"
+    )
+    loading.add_argument("--as", dest="called", metavar="NAME", help="run it under another name")
+    unloading = command("unload", order, "run a script no more")
+    unloading.add_argument("name", metavar="NAME", help="the name it runs under")
+    for added in (loading, unloading):
         added.add_argument("vehicles", type=vehicle, nargs="+", metavar="uav/N", help="these, or `all`")
     return parser.parse_args(arguments)
 

@@ -2,7 +2,7 @@
  * The connection to the ground station: one WebSocket, opened again with growing patience whenever it is lost.
  */
 
-import { readMessage, type OrderRequest, type ServerMessage } from './protocol';
+import { readMessage, type OrderRequest, type ServerMessage, type WithdrawalRequest } from './protocol';
 
 const FIRST_RETRY_MS = 500;
 const LAST_RETRY_MS = 5000;
@@ -42,7 +42,7 @@ export class Connection {
   }
 
   /** Sends an order; `false` if there is no connection to send it on. */
-  send(order: OrderRequest): boolean {
+  send(order: OrderRequest | WithdrawalRequest): boolean {
     if (!this.socket || !this.live) return false;
     this.socket.send(JSON.stringify(order));
     return true;

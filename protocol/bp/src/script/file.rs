@@ -475,6 +475,9 @@ fn check_bid(bid: &Bid, field: &str) -> Result<(), Fault> {
     if bid.given_deadline().is_some() {
         return fault("deadline", "is not for scripts from files: expected `within_s` around the `sync`");
     }
+    if bid.holds_when_lost() {
+        return fault("hold_when_lost", "is not for scripts from files: they block nothing from afar");
+    }
     if bid.given_priority().is_some() {
         return fault("prio", "is not for scripts from files: all have the priority of a mission");
     }

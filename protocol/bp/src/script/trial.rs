@@ -8,7 +8,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::samples::samples;
 use super::{Op, Script};
 use crate::bid::Bid;
-use crate::bthread::BThread;
 use crate::event::Event;
 use crate::event_set::EventSet;
 use crate::program::{Program, ProgramConfig};
