@@ -37,7 +37,7 @@ impl ScriptDelivery {
     }
 
     fn to_bring(&self, ordered: &Event) -> Option<Event> {
-        let verb = [LOAD, UNLOAD].into_iter().find(|verb| ordered.text("what") == Some(verb))?;
+        let verb = [LOAD, UNLOAD].into_iter().find(|verb| ordered.text("what") == Some(*verb))?;
         let data = ["name", "script"].into_iter().filter_map(|key| Some((key, ordered.text(key)?)));
         Some(data.fold(vocabulary::event(&self.vehicle, verb), |event, (key, text)| event.with(key, text)))
     }

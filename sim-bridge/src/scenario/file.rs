@@ -446,9 +446,7 @@ impl ScenarioFile {
         orders.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
         Ok(orders)
     }
-}
 
-impl ScenarioFile {
     /// The scripts of all vehicles, each tried with its values.
     fn scripts(&self, vehicles: usize) -> Result<Vec<VehicleScript>, ScenarioError> {
         let mut scripts = Vec::new();
