@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use skein_bp::script::Assignment;
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
 
@@ -94,6 +95,8 @@ pub struct AgentConfig {
     pub link_loss: LinkLossPolicy,
     /// Which b-threads to run.
     pub controller: Controller,
+    /// The scripts that run from the start.
+    pub scripts: Vec<Assignment>,
     /// Lease of the bids this node sends.
     pub lease: Duration,
     /// Who of the others may request and block what here.

@@ -3,12 +3,14 @@
 use std::time::Duration;
 
 use nalgebra::{UnitQuaternion, Vector3};
+use skein_bp::script::Assignment;
 use skein_bp::{Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_mav::{Companion, CompanionConfig, Landed, SetPoint};
 use skein_planning::map::MapError;
 use skein_wire::vocabulary::{
-    ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, HOMEWARD, LAND, LANDED, ORDER, PLAN, RETURN,
+    ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, HOMEWARD, LAND, LANDED, LOAD, ORDER, PLAN, RETURN, SCRIPT,
+    UNLOAD,
 };
 use skein_wire::{Fleet, Link, MissionState, NodeLink, State, Store, joint_roster, vocabulary};
 
@@ -25,6 +27,7 @@ use crate::{
         set_point::{FRESH_FOR, KeepAlive, SILENT_AFTER, keep_alive, oldest_age},
     },
     precedence,
+    scripts::{Circumstances, RunningScript, ScriptFacts, Scripts},
     watches::Watches,
 };
 
@@ -69,6 +72,14 @@ pub enum AgentError {
         value: String,
         /// What is wrong with it.
         source: skein_wire::KeyError,
+    },
+    /// A script is not run.
+    #[error("agent configuration: script `{name}`: {why}")]
+    Script {
+        /// Its name.
+        name: String,
+        /// Why.
+        why: String,
     },
     /// The fence is no space to fly in.
     #[error("agent configuration: `fence`: {0}")]
@@ -123,6 +134,8 @@ pub struct AgentCore {
     failsafes: Failsafes,
     flight: Flight,
     guidance: Guidance,
+    scripts: Scripts,
+    script_facts: ScriptFacts,
     next_cycle: Duration,
     last_tick: Option<Duration>,
     task: String,
@@ -161,12 +174,19 @@ impl AgentCore {
         if config.controller == Controller::Bp {
             bthreads::load(&mut program, &config);
         }
+        let mut scripts = Scripts::new(me.clone(), &config.roster);
+        for assignment in &config.scripts {
+            scripts
+                .load(&mut program, assignment, "configuration")
+                .map_err(|why| AgentError::Script { name: assignment.name().to_owned(), why })?;
+        }
         let roster: Vec<_> =
             config.roster.iter().map(|node| name("roster", node)).collect::<Result<_, _>>()?;
         let own_name = name("node", &config.node)?;
         let node_config = NodeConfig {
             lease: config.lease,
             safety: safety_events(&me),
+            gateway: me.any_of(&[ORDER, LOAD, UNLOAD]),
             // What comes from afar never outranks a vehicle's own b-threads for its safety.
             remote_priority: precedence::MISSION..=precedence::LINK,
             authority: config.authority.clone(),
@@ -195,6 +215,8 @@ impl AgentCore {
             failsafes: Failsafes::default(),
             flight: Flight::new(me.clone(), config.takeoff_height_m),
             guidance: Guidance::new(config.envelope, config.fence),
+            scripts,
+            script_facts: ScriptFacts::default(),
             next_cycle: Duration::ZERO,
             last_tick: None,
             task: "on the ground".to_owned(),
@@ -354,9 +376,23 @@ impl AgentCore {
             for report in self.guidance.look_ahead(now, &motion, map, neighbours) {
                 self.node.node_mut().enqueue(report.into_event(&self.me));
             }
+            self.tell_scripts(&motion, neighbours);
         }
         if let Some(state) = self.state(now) {
             self.node.put_state(&state, link);
+        }
+    }
+
+    /// Tells scripts what they listen to.
+    fn tell_scripts(&mut self, motion: &Motion, neighbours: &[Neighbour]) {
+        let circumstances = Circumstances {
+            position: motion.position,
+            ahead: self.guidance.place_ahead(),
+            battery: self.companion.telemetry().battery.map(|battery| battery.value.fraction),
+            neighbours,
+        };
+        for event in self.script_facts.tell(&self.me, &self.scripts, &circumstances) {
+            self.node.node_mut().enqueue(event);
         }
     }
 
@@ -375,6 +411,7 @@ impl AgentCore {
             for selection in &selections {
                 if selection.home == self.name {
                     self.carry_out(now, &selection.event, neighbours);
+                    self.look_after_scripts(selection);
                 }
             }
             self.selections.extend(selections);
@@ -397,6 +434,7 @@ impl AgentCore {
                 if let Some(motion) = self.motion() {
                     let report = self.guidance.plan(why, &motion, self.perception.map_mut(), neighbours);
                     self.node.node_mut().enqueue(report.into_event(&self.me));
+                    self.script_facts.forget_path();
                 }
             }
             Some(ADVANCE | HOMEWARD) => self.guidance.grant_leave(now),
@@ -410,6 +448,45 @@ impl AgentCore {
             Some(FAILED) => self.end(Outcome::Failed(why.to_owned()), why),
             _ => {}
         }
+    }
+
+    /// Runs the scripts that are sent, and answers what cannot be done.
+    fn look_after_scripts(&mut self, selection: &Happened) {
+        let event = &selection.event;
+        let verdict = match self.me.verb(event) {
+            Some(LOAD) => {
+                let (name, outcome) = self.load_script(selection);
+                self.scripts.verdict(&name, outcome)
+            }
+            Some(UNLOAD) => {
+                let name = event.text("name").unwrap_or_default();
+                if self.scripts.runs(name) {
+                    return;
+                }
+                self.scripts.verdict(name, Err("no script of this name runs".to_owned()))
+            }
+            Some(SCRIPT) => return self.scripts.hear(event),
+            _ => return,
+        };
+        self.node.node_mut().enqueue(verdict);
+    }
+
+    /// Runs a script that is sent; gives back its name, and why it is not run if it is not.
+    fn load_script(&mut self, selection: &Happened) -> (String, Result<(), String>) {
+        let text = selection.event.text("script").unwrap_or_default();
+        let assignment = match Assignment::from_json(text) {
+            Ok(assignment) => assignment,
+            Err(error) => return (String::new(), Err(error.to_string())),
+        };
+        let sender = selection.requested_by.iter().find_map(|bthread| bthread.split_once('#'));
+        let from = sender.map_or(self.name.as_str(), |(node, _)| node).to_owned();
+        let outcome = if from.starts_with("uav/") && from != self.name.as_str() {
+            Err(format!("{from} may not send scripts: that is for the ground station and its operators"))
+        } else {
+            self.script_facts.forget();
+            self.scripts.load(self.node.node_mut().program_mut(), &assignment, &from)
+        };
+        (assignment.name().to_owned(), outcome)
     }
 
     fn end(&mut self, outcome: Outcome, task: &str) {
@@ -482,6 +559,7 @@ impl AgentCore {
                 Some(Outcome::Failed(_)) => MissionState::Failed,
             },
             path: self.guidance.path_ahead().take(State::MAX_PATH).collect(),
+            scripts: self.scripts.running().map(|(name, _)| name.to_owned()).collect(),
             ..State::new(self.name.clone())
         })
     }
@@ -533,6 +611,11 @@ impl AgentCore {
     /// Everything selected here or heard of since the last call, in order.
     pub fn take_selections(&mut self) -> Vec<Happened> {
         std::mem::take(&mut self.selections)
+    }
+
+    /// The scripts that run, by name.
+    pub fn scripts(&self) -> impl Iterator<Item = (&str, &RunningScript)> {
+        self.scripts.running()
     }
 
     /// How the mission ended, once it has.

@@ -13,6 +13,7 @@ mod me;
 mod neighbours;
 pub mod pipeline;
 pub mod precedence;
+pub mod scripts;
 mod watches;
 
 pub use self::{

@@ -41,6 +41,7 @@ fn config() -> AgentConfig {
         envelope: Envelope::default(),
         link_loss: LinkLossPolicy::Continue,
         controller: Controller::Bp,
+        scripts: Vec::new(),
         lease: SECOND,
         authority: skein_wire::standard_authority(),
         kept: skein_dbp::Kept::default(),

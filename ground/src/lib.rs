@@ -33,5 +33,5 @@ pub mod recorder;
 
 pub use crate::core::{GroundConfig, GroundCore, UnknownVehicle};
 pub use bthreads::MissionOutcome;
-pub use order::{Destination, Order, Who};
+pub use order::{Destination, Order, SentScript, UnfitScript, Who};
 pub use order_log::{Answer, OrderRecord};

@@ -2,10 +2,13 @@
 
 use std::fmt;
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
+use skein_bp::script::{Assignment, ScriptFileError, TrialFault};
 use skein_bp::{Event, EventSet};
 use skein_dbp::NodeName;
-use skein_wire::vocabulary;
+use skein_wire::vocabulary::{self, LOAD, UNLOAD};
 
 /// Whom an order is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,6 +40,49 @@ pub enum Order {
     GoTo(Who, Destination),
     /// Fly again by yourself: the pilot has let go.
     HandBack(Who),
+    /// Run a script beside whatever you do.
+    Load(Who, SentScript),
+    /// Run the script of this name no more.
+    Unload(Who, String),
+}
+
+/// How many states of a script are looked at before it is sent.
+const STATES_TRIED: usize = 20_000;
+
+/// Why a script is not sent.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UnfitScript {
+    /// It is not sound, or its parameters are not.
+    #[error(transparent)]
+    Unsound(#[from] ScriptFileError),
+    /// What it would do.
+    #[error(transparent)]
+    Trial(#[from] TrialFault),
+}
+
+/// A script as it is sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SentScript {
+    name: String,
+    text: Arc<str>,
+}
+
+impl SentScript {
+    /// Makes a script ready to be sent. Each vehicle checks it again, and more: whether it keeps to its rights there.
+    ///
+    /// # Errors
+    /// [`UnfitScript`] when an argument is not what its parameter may be, the script is too long, or a trial goes wrong.
+    pub fn new(assignment: &Assignment) -> Result<Self, UnfitScript> {
+        let bound = assignment.bind("uav/1")?;
+        bound.bthread.try_out(STATES_TRIED)?;
+        Ok(Self { name: bound.name, text: assignment.to_json()?.into() })
+    }
+
+    /// The name it will run under.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
 }
 
 /// Where to go, metres ENU. Several vehicles spread out around it.
@@ -56,7 +102,7 @@ const SPREAD_M: f64 = 3.0;
 const LEAST_HEIGHT_M: f64 = 1.0;
 
 impl Order {
-    /// The order as one word: `launch`, `launch_together`, `abort`, `hold`, `resume`, `land`, `return`, `goto` or `hand_back`.
+    /// The order as one word: `launch`, `launch_together`, `abort`, `hold`, `resume`, `land`, `return`, `goto`, `hand_back`, `load` or `unload`.
     #[must_use]
     pub fn what(&self) -> &'static str {
         match self {
@@ -69,6 +115,8 @@ impl Order {
             Self::Return(_) => "return",
             Self::GoTo(..) => "goto",
             Self::HandBack(_) => "hand_back",
+            Self::Load(..) => LOAD,
+            Self::Unload(..) => UNLOAD,
         }
     }
 
@@ -82,7 +130,19 @@ impl Order {
             | Self::Land(who)
             | Self::Return(who)
             | Self::GoTo(who, _)
+            | Self::Load(who, _)
+            | Self::Unload(who, _)
             | Self::HandBack(who) => who,
+        }
+    }
+
+    /// The name of the script that it is about.
+    #[must_use]
+    pub fn script(&self) -> Option<&str> {
+        match self {
+            Self::Load(_, script) => Some(script.name()),
+            Self::Unload(_, name) => Some(name),
+            _ => None,
         }
     }
 
@@ -93,7 +153,14 @@ impl Order {
         ground: &NodeName,
         positions: &[(NodeName, Option<Vector3<f64>>)],
     ) -> Vec<Event> {
-        let event = |who: &str| ordered_event(ground, self.what(), who);
+        let event = |who: &str| {
+            let order = ordered_event(ground, self.what(), who);
+            let order = self.script().into_iter().fold(order, |order, name| order.with("name", name));
+            match self {
+                Self::Load(_, script) => order.with("script", script.text.clone()),
+                _ => order,
+            }
+        };
         match (self, self.who()) {
             (Self::GoTo(_, destination), _) => places(*destination, positions)
                 .into_iter()
@@ -130,6 +197,11 @@ fn places(
         placed.push((vehicle, Vector3::new(x, y, destination.z.unwrap_or(kept))));
     }
     placed
+}
+
+/// Whether an order says nothing against what other orders have set going.
+pub(crate) fn is_beside_flight(what: &str) -> bool {
+    matches!(what, "launch" | "launch_together" | LOAD | UNLOAD)
 }
 
 /// What the operator has ordered becomes an event of this name.

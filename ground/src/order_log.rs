@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use skein_dbp::{Happened, Node, NodeName};
-use skein_wire::vocabulary::{DECLINED, HEEDED, ORDER, TAKEOFF};
+use skein_wire::vocabulary::{ACCEPTED, DECLINED, ENDED, HEEDED, ORDER, REFUSED, SCRIPT, TAKEOFF, WITHDRAWN};
 
 use crate::bthreads::{GOING, GOING_LASTS, Hold, LAUNCH_LASTS};
+use crate::order::is_beside_flight;
 use crate::{Order, Who};
 
 /// How many orders are remembered.
@@ -102,7 +103,7 @@ impl OrderLog {
         for record in &mut self.records {
             let lasts = match &record.order {
                 Order::LaunchTogether => Some(LAUNCH_LASTS),
-                order if GOING.contains(&order.what()) => Some(GOING_LASTS),
+                order if GOING.contains(&order.what()) || order.script().is_some() => Some(GOING_LASTS),
                 _ => None,
             };
             let late = lasts.is_some_and(|lasts| now > record.at + lasts);
@@ -124,11 +125,9 @@ impl OrderLog {
     /// A hold is acknowledged by those who surely keep it now: a vehicle that was out of reach for a lease does not.
     fn look_at_holds(&mut self, now: Duration, node: &Node) {
         for (vehicle, kept) in node.kept_by(Hold::NAME) {
-            let newest = self
-                .records
-                .iter_mut()
-                .rev()
-                .find(|record| !is_launch(&record.order) && record.answers.contains_key(vehicle));
+            let newest = self.records.iter_mut().rev().find(|record| {
+                !is_beside_flight(record.order.what()) && record.answers.contains_key(vehicle)
+            });
             let Some(record) = newest.filter(|record| matches!(record.order, Order::Hold(_))) else {
                 continue;
             };
@@ -157,10 +156,11 @@ fn is_launch(order: &Order) -> bool {
 }
 
 /// Whether whoever has not taken in the `old` order need not any more. A launch is about those on the ground: it takes the
-/// place of no order, and only who calls all down calls it off.
+/// place of no order, and only who calls all down calls it off. Scripts are beside all that.
 fn supersedes(new: &Order, old: &Order) -> bool {
     match (new, old) {
         (new, _) if is_launch(new) => false,
+        _ if new.script().is_some() || old.script().is_some() => false,
         (Order::Abort | Order::Land(Who::All) | Order::Return(Who::All), _) => true,
         (_, old) if is_launch(old) => false,
         _ => true,
@@ -170,13 +170,22 @@ fn supersedes(new: &Order, old: &Order) -> bool {
 /// What an event at a vehicle says to an order.
 fn answer_in(order: &Order, happened: &Happened, after: Duration) -> Option<Answer> {
     let event = &happened.event;
-    let about_it = event.text("what") == Some(order.what());
+    // What a script has ordered its own vehicle is nobody's answer.
+    let about_it = event.text("what") == Some(order.what()) && event.text("by").is_none();
+    let about_script = order.script().is_some() && event.text("name") == order.script();
     match event.kind() {
         TAKEOFF if is_launch(order) => Some(Answer::Acknowledged(after)),
         ORDER | HEEDED if about_it => Some(Answer::Acknowledged(after)),
         DECLINED if about_it => {
             Some(Answer::Refused(event.text("why").unwrap_or("it says no more").to_owned()))
         }
+        SCRIPT if about_script => match (order, event.text("state")?) {
+            (_, REFUSED) => Some(Answer::Refused(event.text("why").unwrap_or("it says no more").to_owned())),
+            (Order::Load(..), ACCEPTED) | (Order::Unload(..), WITHDRAWN | ENDED) => {
+                Some(Answer::Acknowledged(after))
+            }
+            _ => None,
+        },
         _ => None,
     }
 }

@@ -7,6 +7,8 @@
   skein_operator.py hold --seconds 5 uav/1 uav/2
   skein_operator.py return uav/3           also: land, resume; `all` for every vehicle
   skein_operator.py roster --term 2 --coordinator ground/main uav/1 uav/2    who decides together from now on
+  skein_operator.py load curfew.toml --with for_s=60 --with 'min=[0,0,0]' --with 'max=[9,9,9]' all
+  skein_operator.py unload curfew all
 
 It speaks as the node `script/operator`, which must be in the vehicles' rosters. Only one such script has a say at a
 time: `hold`, `land`, `return` and `resume` end what an earlier one still holds at the vehicles that they speak to.
@@ -30,6 +32,7 @@ import queue
 import re
 import sys
 import time
+import tomllib
 
 try:
     import zenoh
@@ -362,8 +365,9 @@ def hold(options, output, interrupted):
 
 
 def order(options, output, interrupted):
-    """`land`, `return`, `resume`: requests `uav/N/order`, which the vehicle's operator b-thread turns into its own event.
-    `roster`: requests `<node>/roster` of every member, which begins a new term of joint events there.
+    """`land`, `return`, `resume`: requests `uav/N/order`, which the vehicle's operator b-thread turns into its own event;
+    `load` and `unload` request `uav/N/load` and `uav/N/unload`, and the vehicle tells what becomes of the script;
+    `roster` requests `<node>/roster` of every member, which begins a new term of joint events there.
 
     A request counts only for the present life of its home, and together with how far this script has heard the home's
     occurrences. Both are learnt from the answer to an empty record.
@@ -371,7 +375,8 @@ def order(options, output, interrupted):
     what, wanted = options.command, named(options)
     if what == "roster" and options.coordinator not in wanted:
         wanted.append(options.coordinator)
-    outboxes, taken = {}, set()
+    verb, data = ("order", {"what": what}) if what not in ("load", "unload") else (what, script_data(options))
+    outboxes, taken, unwilling = {}, set(), {}
 
     with Swarm(options.fleet, options.connect, ["state/*/*", "occ/*/*", f"occ/*/*/{NODE}", f"ack/*/*/{NODE}"]) as swarm:
 
@@ -399,23 +404,37 @@ def order(options, output, interrupted):
         def take_in_occurrence(node, occurrence):
             outbox = outboxes[node]
             is_new = occurrence.incarnation == outbox.home_incarnation and occurrence.seq > outbox.applied
-            if is_new and occurrence.event == event(node):
+            if not is_new:
+                return
+            if verb == "order":
+                is_taken = occurrence.event == event(node)
+            else:
+                told = {key: value.text for key, value in occurrence.event.data.items()}
+                if occurrence.event.name != f"{node}/script" or told.get("name") != script_name(options):
+                    return
+                if told.get("state") == "refused":
+                    unwilling[node] = told.get("why", "")
+                is_taken = told.get("state") == {"load": "accepted", "unload": "withdrawn"}[verb]
+            if is_taken:
                 taken.add(node)
                 output.tell(f"{node} takes the order: {what}", vehicle=node, order=what, taken=True)
 
         def event(node):
             if what != "roster":
-                return wire.Event(name=f"{node}/order", data={"what": wire.Value(text=what)})
-            data = {
+                return wire.Event(
+                    name=f"{node}/{verb}", data={key: wire.Value(text=text) for key, text in data.items()}
+                )
+            roster = {
                 "term": wire.Value(integer=options.term),
                 "coordinator": wire.Value(text=options.coordinator),
                 "members": wire.Value(text=" ".join(ordered(wanted))),
             }
-            return wire.Event(name=f"{node}/roster", data=data)
+            return wire.Event(name=f"{node}/roster", data=roster)
 
         def is_complete():
             # Not named, the vehicles are those that are heard within a second.
-            return outboxes and taken == outboxes.keys() and (wanted or swarm.now_s() > LISTEN_S)
+            settled = taken | unwilling.keys()
+            return outboxes and settled == outboxes.keys() and (wanted or swarm.now_s() > LISTEN_S)
 
         for node in wanted:
             ask(node)
@@ -437,11 +456,46 @@ def order(options, output, interrupted):
             outbox.state()
     missing = ordered(outboxes.keys() - taken)
     for node in missing:
-        why = ", ".join(outboxes[node].refusals) or "no answer"
+        why = unwilling.get(node) or ", ".join(outboxes[node].refusals) or "no answer"
         output.tell(f"{node} has not taken the order: {why}", vehicle=node, order=what, taken=False)
     if not outboxes:
         return nobody(options)
     return f"not taken by {', '.join(missing)}" if missing else None
+
+
+def script_data(options):
+    """What a request of `load` or `unload` carries."""
+    if options.command == "unload":
+        return {"name": options.name}
+    assignment = {"script": options.script, "with": dict(options.values)}
+    if options.called:
+        assignment["as"] = options.called
+    return {"name": script_name(options), "script": json.dumps(assignment)}
+
+
+def script_name(options):
+    """The name that the script runs under."""
+    return options.name if options.command == "unload" else options.called or options.script.get("name")
+
+
+def script_file(path):
+    """A script, from TOML or JSON; the vehicle says what is wrong with it."""
+    try:
+        with open(path, "rb") as file:
+            return json.load(file) if path.endswith(".json") else tomllib.load(file)
+    except (OSError, ValueError) as error:
+        raise argparse.ArgumentTypeError(f"{path}: {error}") from None
+
+
+def script_value(text):
+    """`NAME=VALUE`, with the value in JSON; anything else is a text."""
+    name, separator, value = text.partition("=")
+    if not separator:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected NAME=VALUE")
+    try:
+        return name, json.loads(value)
+    except ValueError:
+        return name, value
 
 
 def named(options):
@@ -548,6 +602,16 @@ def read_arguments(arguments):
     electing.add_argument("--term", type=term, required=True, help="the new term: above the present one, which is 1 at first")
     electing.add_argument("--coordinator", type=node, required=True, metavar="NODE", help="where joint events are decided")
     electing.add_argument("vehicles", type=node, nargs="+", metavar="NODE", help="without whom nothing is decided")
+    loading = command("load", order, "run a script")
+    loading.add_argument("script", type=script_file, metavar="FILE", help="TOML or JSON, such as agent/scripts/curfew.toml")
+    loading.add_argument(
+        "--with", type=script_value, action="append", default=[], dest="values", metavar="NAME=VALUE", help="a parameter"
+    )
+    loading.add_argument("--as", dest="called", metavar="NAME", help="run it under another name")
+    unloading = command("unload", order, "run a script no more")
+    unloading.add_argument("name", metavar="NAME", help="the name it runs under")
+    for added in (loading, unloading):
+        added.add_argument("vehicles", type=vehicle, nargs="+", metavar="uav/N", help="these, or `all`")
     return parser.parse_args(arguments)
 
 

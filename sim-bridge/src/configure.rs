@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use serde_json::json;
 use skein_agent::AgentConfig;
+use skein_bp::script::Assignment;
 
 use crate::cli::{self, Network};
 use crate::fly::{FLEET, GROUND, agent_configs, ground_config};
@@ -118,9 +119,23 @@ pub fn write(
     let muster = ground_config(scenario, skein_wire::Fleet::new(FLEET)?, cli::Controller::Bp).muster;
     let ground = save("ground.toml", plan.ground(&agents, muster, launch_on_order))?;
     let agents = (0..).zip(&agents).map(|(index, agent)| {
-        save(&format!("{}.toml", agent.node.replace('/', "-")), plan.agent(index, agent))
+        let stem = agent.node.replace('/', "-");
+        let mut text = plan.agent(index, agent);
+        for assignment in &agent.scripts {
+            let file = format!("{stem}-{}.json", assignment.name());
+            save(&file, serde_json::to_string_pretty(&assignment.script)?)?;
+            text += &script_table(&file, assignment);
+        }
+        save(&format!("{stem}.toml"), text)
     });
     Ok(Files { world, ground, agents: agents.collect::<anyhow::Result<_>>()? })
+}
+
+/// A script in an agent's configuration. Names, texts, numbers and lists are written in JSON as in TOML.
+fn script_table(file: &str, assignment: &Assignment) -> String {
+    let with: Vec<String> = assignment.with.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    let name = assignment.name();
+    format!("\n[[script]]\nfile = {file:?}\nwith = {{ {} }}\nas = {name:?}\n", with.join(", "))
 }
 
 /// Who listens where, and how they are joined.

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ADVANCE, ARRIVED, GOTO, HOMEWARD, LAND, LANDED, PLANNED};
+use skein_wire::vocabulary::{ADVANCE, AHEAD, ARRIVED, GOTO, HOMEWARD, LAND, LANDED, PLANNED};
 
 use crate::bthreads::HOME_LEG;
 use crate::{me::Me, precedence};
@@ -19,6 +19,8 @@ const CYCLE: Duration = Duration::from_millis(100);
 pub struct Navigation {
     me: Me,
     homeward: bool,
+    /// Where leave to move leads, as long as somebody wants to know.
+    ahead: Option<Event>,
     phase: Phase,
 }
 
@@ -33,27 +35,42 @@ impl Navigation {
     /// The b-thread of vehicle `me`.
     #[must_use]
     pub fn new(me: Me) -> Self {
-        Self { me, homeward: false, phase: Phase::Idle }
+        Self { me, homeward: false, ahead: None, phase: Phase::Idle }
+    }
+
+    /// The leave that is asked for: with the place where it leads, so that whoever minds only some places can say so.
+    fn leave(&self) -> Event {
+        if self.homeward {
+            return self.me.event(HOMEWARD);
+        }
+        let place = self.ahead.iter().flat_map(Event::data);
+        place.fold(self.me.event(ADVANCE), |leave, (axis, coordinate)| leave.with(axis, coordinate.clone()))
     }
 }
 
 impl BThread for Navigation {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::MISSION);
+        let bid = Bid::new().priority(precedence::MISSION).wait_for(me.any(AHEAD));
         let no_path_left = me.any_of(&[ARRIVED, GOTO, LAND, LANDED]);
         Some(match self.phase {
             Phase::Idle => bid.wait_for(me.any(PLANNED)),
-            Phase::Asking => {
-                bid.request(me.event(if self.homeward { HOMEWARD } else { ADVANCE })).wait_for(no_path_left)
-            }
+            Phase::Asking => bid.request(self.leave()).wait_for(no_path_left),
             Phase::Moving { until } => bid.wait_for(no_path_left).deadline(until),
         })
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        if self.me.heard(event, PLANNED) {
-            self.homeward = event.int("leg") == Some(HOME_LEG);
+        match self.me.verb(event) {
+            Some(AHEAD) => {
+                self.ahead = Some(event.clone());
+                return;
+            }
+            Some(PLANNED) => {
+                self.homeward = event.int("leg") == Some(HOME_LEG);
+                self.ahead = None;
+            }
+            _ => {}
         }
         self.phase = match self.me.verb(event) {
             Some(PLANNED) | None => Phase::Asking,

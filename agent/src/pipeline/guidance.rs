@@ -69,6 +69,8 @@ const POSITION_SIGMA_M: f64 = 0.05;
 const GHOST_SLACK_M: f64 = 0.3;
 /// A hovering vehicle that others have pushed this far does not come back, m.
 const GIVES_WAY_M: f64 = 1.0;
+/// From where a vehicle that is held stops to the place that it was held from, at least, m.
+const ROOM_AHEAD_M: f64 = 1.5;
 /// Speed at which a hovering vehicle goes back to its place, at most, m/s.
 const STATION_KEEPING_M_S: f64 = 0.5;
 
@@ -246,6 +248,16 @@ impl Guidance {
             });
             std::iter::once(here).chain(ahead)
         })
+    }
+
+    /// A place on the path so far ahead that a vehicle whose leave to move ends now stops well before it; none without a path.
+    #[must_use]
+    pub fn place_ahead(&self) -> Option<Vector3<f64>> {
+        let following = self.following.as_ref()?;
+        let Envelope { cruise_m_s, brake_m_s2, latency_s, .. } = self.envelope;
+        let unheld_s = latency_s + LEAVE_LASTS.as_secs_f64();
+        let reach_m = cruise_m_s * unheld_s + cruise_m_s.powi(2) / (2.0 * brake_m_s2) + ROOM_AHEAD_M;
+        Some(following.path.point_at((following.station_m + reach_m).min(following.path.length_m())))
     }
 
     /// Plans a path to the waypoint. `why` is `stuck` when the vehicle made no way: neighbours that stand around are then

@@ -13,12 +13,15 @@ import { listenToKeys } from './keys';
 import { Banner, Notices } from './notices';
 import { OrdersPanel } from './orders-panel';
 import { Placing } from './placing';
-import type { Command, Fleet, OrderRequest, Point, Question, Scene, ServerMessage } from './protocol';
+import type {
+  Command, Fleet, OrderRequest, Point, Question, Scene, ServerMessage, WithdrawalRequest,
+} from './protocol';
 import { addresseeWords, Selection } from './selection';
 import { Theme } from './theme';
 import { VehiclesPanel } from './vehicles-panel';
 import { View } from './view/view';
 import { WhyPanel } from './why-panel';
+import { ScriptsPanel } from './scripts-panel';
 import { clockWords, durationWords, orderName, outcomeWords } from './words';
 
 /** The station speaks ten times a second; after this long what is shown is no longer live. */
@@ -30,7 +33,7 @@ const ANSWER_MS = 3000;
 
 /** An order that the station has not answered yet. */
 interface Sent {
-  what: Command;
+  what: Command | 'unload';
   timer: number;
   point?: Point;
 }
@@ -45,6 +48,7 @@ const vehicles = new VehiclesPanel(part('vehicles'), part('vehicles-note'), sele
 const events = new EventsPanel(part('events-head'), part('events'), selection);
 const why = new WhyPanel(part('why'), part('why-title'), part('why-note'), part('why-body'));
 const orders = new OrdersPanel(part('answers'));
+const scripts = new ScriptsPanel(part('vehicles'), withdraw);
 const notices = new Notices(part('notices'));
 const connectionBanner = new Banner(part('banners'), 'alert');
 const outcomeBanner = new Banner(part('banners'), 'status');
@@ -144,6 +148,7 @@ function showFleet(): void {
   events.setFleet(fleetNames);
   orders.setFleet(fleetNames);
   vehicles.show(fleet);
+  scripts.show(fleet);
   view.setFleet(fleet);
   showAddressees();
   if (fleet.outcome) outcomeBanner.show(outcomeWords(fleet.outcome, fleetNames.length), fleet.outcome.succeeded ? 'good' : 'warn');
@@ -176,9 +181,21 @@ function showAddressees(): void {
 }
 
 function order(what: Command, point?: Point): void {
+  send({ type: 'order', tag: newTag(), what, to: selection.addressees(names()), ...(point && { point }) });
+}
+
+function withdraw(name: string, to: string[]): void {
+  send({ type: 'order', tag: newTag(), what: 'unload', name, to });
+}
+
+function newTag(): string {
   tags += 1;
-  const tag = `${Date.now().toString(36)}-${tags}`;
-  const request: OrderRequest = { type: 'order', tag, what, to: selection.addressees(names()), ...(point && { point }) };
+  return `${Date.now().toString(36)}-${tags}`;
+}
+
+function send(request: OrderRequest | WithdrawalRequest): void {
+  const { tag, what } = request;
+  const point = 'point' in request ? request.point : undefined;
   if (!connection.send(request)) {
     notices.show(`${orderName(what)} was not sent: there is no connection to the station.`);
     return;

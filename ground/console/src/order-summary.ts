@@ -17,7 +17,8 @@ export function orderSummary(order: Order): string {
     if (names.length > 0) parts.push(`${nameWords(names)} ${state}`);
   }
   if (pending > 0) parts.push(`${pending} pending`);
-  return `${orderName(order.what)}: ${parts.join(', ')}`;
+  const what = [orderName(order.what), order.script].filter(Boolean).join(' ');
+  return `${what}: ${parts.join(', ')}`;
 }
 
 /** How an order stands as a whole: the worst of its answers. */

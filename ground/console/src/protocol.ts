@@ -45,6 +45,8 @@ export interface Vehicle {
   waitingFor: string;
   mission: MissionState | null;
   path: Vec3[];
+  /** The names of the scripts that run on it. */
+  scripts: string[];
   link: { alive: boolean; ageMs: number | null };
   notes: string[];
 }
@@ -71,6 +73,8 @@ export type Answer =
 export interface Order {
   id: number;
   what: string;
+  /** The script that it is about. */
+  script: string;
   time: number;
   answers: Record<string, Answer>;
 }
@@ -176,6 +180,15 @@ export interface Question {
   vehicle: string | null;
 }
 
+/** Takes a script back. */
+export interface WithdrawalRequest {
+  type: 'order';
+  tag: string;
+  what: 'unload';
+  name: string;
+  to: string[];
+}
+
 /** Reads a message of the station; `null` if it is none that this console knows. */
 export function readMessage(text: string): ServerMessage | null {
   let json: unknown;
@@ -267,6 +280,7 @@ function readVehicle(json: Json): Vehicle | null {
     waitingFor: string(json.waiting_for),
     mission: json.mission === 'complete' || json.mission === 'failed' || json.mission === 'under_way' ? json.mission : null,
     path: Array.isArray(json.path) ? json.path.map(vector).filter((point) => point !== null) : [],
+    scripts: strings(json.scripts),
     link: { alive: link.alive === true, ageMs: number(link.age_ms) },
     notes: strings(json.notes),
   };
@@ -288,6 +302,7 @@ function readOrder(json: Json): Order | null {
   return {
     id,
     what: string(json.what),
+    script: string(json.script),
     time: number(json.time_s) ?? 0,
     answers: Object.fromEntries(Object.entries(answers).map(([name, answer]) => [name, readAnswer(answer)])),
   };

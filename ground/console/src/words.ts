@@ -4,7 +4,7 @@
 
 import type { Command, Outcome } from './protocol';
 
-const ORDER_NAMES: Record<string, string> = { goto: 'Go to', hand_back: 'Hand back' };
+const ORDER_NAMES: Record<string, string> = { goto: 'Go to', hand_back: 'Hand back', load: 'Script', unload: 'Withdraw' };
 
 /** An order's name as its button shows it: `goto` is `Go to`. */
 export function orderName(what: Command | string): string {

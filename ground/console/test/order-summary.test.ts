@@ -6,7 +6,7 @@ import type { Answer } from '../src/protocol';
 const acknowledged: Answer = { state: 'acknowledged', afterMs: 12 };
 
 function order(answers: Record<string, Answer>) {
-  return { id: 1, what: 'hold', time: 0, answers };
+  return { id: 1, what: 'hold', script: '', time: 0, answers };
 }
 
 test('who is missing is named', () => {

@@ -7,7 +7,7 @@ use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::{NodeName, facts};
 use skein_wire::vocabulary;
 
-use crate::order::ordered_for;
+use crate::order::{is_beside_flight, ordered_for};
 
 /// An order that sets a vehicle going is not brought any more after this long: whoever gave it does not look any more.
 pub const GOING_LASTS: Duration = Duration::from_secs(10);
@@ -70,8 +70,8 @@ impl BThread for Delivery {
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         if event.kind() == "ordered" {
-            // A launch is about others too and says nothing against what is on its way to this one.
-            if !matches!(event.text("what"), Some("launch" | "launch_together")) {
+            // A launch is about others too, and a script stands beside: neither says anything against what is on its way.
+            if !event.text("what").is_some_and(is_beside_flight) {
                 self.order = self.to_bring(event);
                 let going = event.text("what").is_some_and(|what| GOING.contains(&what));
                 self.until = going.then(|| cx.now() + GOING_LASTS);

@@ -8,6 +8,7 @@ mod hold;
 mod launch;
 mod muster;
 pub mod roll_call;
+mod script_delivery;
 mod together;
 mod watch;
 
@@ -18,6 +19,7 @@ pub use hold::Hold;
 pub use launch::Launch;
 pub use muster::Muster;
 pub use roll_call::RollCall;
+pub use script_delivery::ScriptDelivery;
 pub use together::{LAUNCH_LASTS, Together};
 pub use watch::{MissionOutcome, Watch};
 
@@ -36,5 +38,7 @@ pub fn load(program: &mut Program, config: &GroundConfig) {
     program.add(Watch::NAME, Watch::new(ground.clone(), vehicles.iter().cloned()));
     for vehicle in vehicles {
         program.add(Delivery::name(vehicle), Delivery::new(ground.clone(), vehicle.clone()));
+        let scripts = ScriptDelivery::new(ground.clone(), vehicle.clone());
+        program.add(ScriptDelivery::name(vehicle), scripts);
     }
 }

@@ -196,12 +196,15 @@ struct StateView<'a> {
     waiting_for: &'a str,
     mission: &'static str,
     path: Vec<[f64; 3]>,
+    scripts: &'a [String],
 }
 
 #[derive(Serialize)]
 struct OrderView<'a> {
     id: u64,
     what: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    script: Option<&'a str>,
     time_s: f64,
     answers: BTreeMap<&'a str, AnswerView<'a>>,
 }
@@ -400,6 +403,7 @@ fn state_view(state: &State) -> StateView<'_> {
             MissionState::Failed => "failed",
         },
         path: state.path.iter().map(array).collect(),
+        scripts: &state.scripts,
     }
 }
 
@@ -413,6 +417,7 @@ fn order_view(record: &OrderRecord) -> OrderView<'_> {
     OrderView {
         id: record.id,
         what: record.order.what(),
+        script: record.order.script(),
         time_s: record.at.as_secs_f64(),
         answers: record.answers.iter().map(|(vehicle, said)| (vehicle.as_str(), answer(said))).collect(),
     }

@@ -4,10 +4,11 @@ use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 
 use serde::Deserialize;
+use skein_bp::script::Assignment;
 use skein_dbp::NodeName;
 use tokio::sync::oneshot;
 
-use crate::{Destination, Order, UnknownVehicle, Who};
+use crate::{Destination, Order, SentScript, UnknownVehicle, Who};
 
 /// An operator's order that waits for the station.
 pub struct Wish {
@@ -73,6 +74,12 @@ struct OrderMessage {
     to: To,
     #[serde(default)]
     point: Option<(f64, f64, Option<f64>)>,
+    /// For `load`: a script with values for its parameters.
+    #[serde(default)]
+    script: Option<Assignment>,
+    /// For `unload`: the name that the script runs under.
+    #[serde(default)]
+    name: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -88,6 +95,8 @@ enum What {
     #[serde(rename = "goto")]
     GoTo,
     HandBack,
+    Load,
+    Unload,
 }
 
 #[derive(Deserialize)]
@@ -106,7 +115,7 @@ pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
     }
 }
 
-fn order(OrderMessage { what, to, point, .. }: OrderMessage) -> Result<Order, String> {
+fn order(OrderMessage { what, to, point, script, name, .. }: OrderMessage) -> Result<Order, String> {
     let who = match to {
         To::Word(word) if word == "all" => Who::All,
         To::Word(word) => return Err(format!("`to` is {word:?}: expected \"all\" or a list of vehicles")),
@@ -127,6 +136,11 @@ fn order(OrderMessage { what, to, point, .. }: OrderMessage) -> Result<Order, St
         What::Return => Order::Return(who),
         What::Land => Order::Land(who),
         What::HandBack => Order::HandBack(who),
+        What::Load => {
+            let script = script.ok_or("`load` needs a `script`: {script, with}")?;
+            Order::Load(who, SentScript::new(&script).map_err(|error| error.to_string())?)
+        }
+        What::Unload => Order::Unload(who, name.ok_or("`unload` needs the `name` of a script")?),
         What::GoTo => {
             let (x, y, z) = point.ok_or("`goto` needs a `point`: [x, y, z or null], metres")?;
             let finite = x.is_finite() && y.is_finite() && z.is_none_or(f64::is_finite);
@@ -172,6 +186,12 @@ mod tests {
             (r#"{"type":"order","what":"launch","to":["uav/1"]}"#, "for all"),
             (r#"{"type":"order","what":"abort","to":["uav/1"]}"#, "for all"),
             (r#"{"type":"why","vehicle":"uav"}"#, "`uav` is not a node name"),
+            (r#"{"type":"order","what":"load","to":"all"}"#, "needs a `script`"),
+            (r#"{"type":"order","what":"unload","to":"all"}"#, "needs the `name`"),
+            (
+                r#"{"type":"order","what":"load","to":"all","script":{"script":{"name":"a","about":"","body":[{"dance":1}]}}}"#,
+                "a: `body[0]` unknown field `dance`",
+            ),
         ] {
             let error = read(text).1.expect_err(text);
             assert!(error.contains(fault), "{text}: {error}");

@@ -157,6 +157,13 @@ impl Bid {
         self.0.deadline
     }
 
+    /// The same bid with other requests in the place of each.
+    pub(crate) fn map_requests(mut self, map: impl FnMut(&Event) -> Event) -> Self {
+        let requests = self.0.requests.iter().map(map).collect();
+        self.statement().requests = requests;
+        self
+    }
+
     /// The part that counts when a channel states the bid for a b-thread elsewhere, which sees to its own waits.
     pub(crate) fn for_proxy(&self) -> Self {
         let Statement { requests, blocks, priority, .. } = &*self.0;

@@ -182,6 +182,35 @@ impl EventSet {
         overlap
     }
 
+    /// Whether the set may hold an event of this name, with whatever data. Errs towards yes, only where what data it needs
+    /// contradicts itself.
+    pub fn may_hold_named(&self, name: &str) -> bool {
+        match self {
+            Self::None => false,
+            Self::All | Self::FieldRange { .. } | Self::FieldIs(_) | Self::Region { .. } => true,
+            Self::Exactly(only) => only.name() == name,
+            Self::Named(pattern) => pattern.matches(name),
+            Self::Prefix(prefix) => name.starts_with(&**prefix),
+            Self::Not(set) => !set.holds_all_named(name),
+            Self::And(sets) => sets.iter().all(|set| set.may_hold_named(name)),
+            Self::Or(sets) => sets.iter().any(|set| set.may_hold_named(name)),
+        }
+    }
+
+    /// Whether the set surely holds every event of this name, whatever its data. Errs towards no.
+    pub fn holds_all_named(&self, name: &str) -> bool {
+        match self {
+            Self::All => true,
+            Self::None | Self::Exactly(_) | Self::FieldRange { .. } | Self::Region { .. } => false,
+            Self::FieldIs(fields) => fields.is_empty(),
+            Self::Named(pattern) => pattern.matches(name),
+            Self::Prefix(prefix) => name.starts_with(&**prefix),
+            Self::Not(set) => !set.may_hold_named(name),
+            Self::And(sets) => sets.iter().all(|set| set.holds_all_named(name)),
+            Self::Or(sets) => sets.iter().any(|set| set.holds_all_named(name)),
+        }
+    }
+
     /// Whether every event of this set is surely in `other`. Errs towards no.
     pub fn is_within(&self, other: &EventSet) -> bool {
         match (self, other) {

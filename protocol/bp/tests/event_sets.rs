@@ -63,6 +63,16 @@ fn homes_are_matched_with_care() {
 }
 
 #[test]
+fn a_name_is_enough_to_tell_what_data_cannot_change() {
+    let inside = EventSet::region([0.0; 3], [1.0; 3]);
+    let goto = EventSet::named("uav/3/goto").and(inside.not());
+    assert!(goto.may_hold_named("uav/3/goto") && !goto.holds_all_named("uav/3/goto"));
+    assert!(!goto.may_hold_named("uav/3/land"), "one of another name");
+    let but_land = EventSet::from("uav/3/**").and(EventSet::named("uav/3/land").not());
+    assert!(but_land.holds_all_named("uav/3/goto") && !but_land.may_hold_named("uav/3/land"));
+}
+
+#[test]
 fn the_written_forms_are_those_of_the_notation() {
     let forms = [
         (json!("e"), EventSet::Exactly("e".into())),
@@ -187,6 +197,8 @@ proptest! {
         prop_assert!(!(in_a && in_b) || a.may_overlap(&b), "they share {}", e);
         prop_assert!(!in_a || a.could_match_home(e.home()));
         prop_assert_eq!(a.about(&b).contains(&e) && in_b, in_a && in_b);
+        prop_assert!(!in_a || a.may_hold_named(e.name()));
+        prop_assert!(in_a || !a.holds_all_named(e.name()));
         prop_assert!(!a.is_within(&b) || !in_a || in_b, "{} is not in {}", e, b);
     }
 

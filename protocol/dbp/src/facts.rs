@@ -67,6 +67,11 @@ const ALL: [&str; 17] = [
     MISDIRECTED,
 ];
 
+/// The names of all facts.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    ALL.into_iter()
+}
+
 /// All facts of `node`.
 #[must_use]
 pub fn all(node: &NodeName) -> EventSet {

@@ -484,6 +484,7 @@ impl From<&State> for proto::State {
                 MissionState::Failed => proto::Mission::Failed,
             }
             .into(),
+            scripts: state.scripts.iter().take(State::MAX_SCRIPTS).cloned().collect(),
         }
     }
 }
@@ -493,6 +494,7 @@ impl TryFrom<proto::State> for State {
 
     fn try_from(state: proto::State) -> Result<Self> {
         at_most("State.path", state.path.len(), Self::MAX_PATH, "at most 32 points")?;
+        at_most("State.scripts", state.scripts.len(), Self::MAX_SCRIPTS, "at most 8 names")?;
         if !(0.0..=1.0).contains(&state.battery) {
             let given = state.battery.to_string();
             return Err(DecodeError::Range {
@@ -522,6 +524,7 @@ impl TryFrom<proto::State> for State {
                 proto::Mission::Complete => MissionState::Complete,
                 proto::Mission::Failed => MissionState::Failed,
             },
+            scripts: state.scripts,
         })
     }
 }

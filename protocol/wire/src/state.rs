@@ -38,6 +38,8 @@ pub struct State {
     pub path: Vec<Vector3<f64>>,
     /// How far its mission is.
     pub mission: MissionState,
+    /// The names of the scripts that run on it; only the first [`State::MAX_SCRIPTS`] travel.
+    pub scripts: Vec<String>,
 }
 
 /// How far a vehicle's mission is.
@@ -55,6 +57,8 @@ pub enum MissionState {
 impl State {
     /// How many points of a path travel.
     pub const MAX_PATH: usize = 32;
+    /// How many names of scripts travel.
+    pub const MAX_SCRIPTS: usize = 8;
 
     /// A vehicle that stands disarmed at the origin with a full battery: a start to fill in.
     #[must_use]
@@ -75,6 +79,7 @@ impl State {
             waiting_for: String::new(),
             path: Vec::new(),
             mission: MissionState::default(),
+            scripts: Vec::new(),
         }
     }
 }

@@ -60,6 +60,10 @@ pub const RETURN: &str = "return";
 pub const LAND: &str = "land";
 /// What an operator wants: data `what` (text). The one gateway for remote safety requests.
 pub const ORDER: &str = "order";
+/// Run a script: data `script` (text), a [`skein_bp::script::Assignment`] as JSON.
+pub const LOAD: &str = "load";
+/// Withdraw the script that runs under `name` (text).
+pub const UNLOAD: &str = "unload";
 /// An operator gives the vehicle back to its agent after a pilot had it.
 pub const HAND_BACK: &str = "hand_back";
 /// An order is not carried out: data `what`, `why` (texts).
@@ -103,6 +107,18 @@ pub const BATTERY_CRITICAL: &str = "battery_critical";
 pub const FENCE_BREACHED: &str = "fence_breached";
 /// Somebody else changed the flight mode: data `mode` (text).
 pub const PILOT: &str = "pilot";
+/// What has become of the script `name` (text): data `state` ([`ACCEPTED`], [`REFUSED`], [`WITHDRAWN`] or [`ENDED`]) and
+/// `why` (text).
+pub const SCRIPT: &str = "script";
+/// Where the vehicle is: data `x`, `y`, `z`. Like the next three, told only while a script listens, in the air, and when it
+/// has changed by a metre.
+pub const AT: &str = "at";
+/// Where leave to move will have led in a moment, with room to stop before: data `x`, `y`, `z`. Then [`ADVANCE`] has them too.
+pub const AHEAD: &str = "ahead";
+/// Where another vehicle in the air is: data `node` (text), `x`, `y`, `z`, and `distance_m` from this one.
+pub const NEIGHBOUR: &str = "neighbour";
+/// What is left in the battery has passed a multiple of 5 %: data `percent` (int).
+pub const BATTERY: &str = "battery";
 /// The agent did not run for `seconds` (real), too long for what it knew and what it had said to count.
 pub const SLEPT: &str = "slept";
 /// The agent started while its vehicle was in the air.
@@ -110,8 +126,22 @@ pub const FOUND_AIRBORNE: &str = "found_airborne";
 /// The autopilot refused or never answered a command: data `why` (text).
 pub const COMMAND_FAILED: &str = "command_failed";
 
+/// The state of a script that runs from now on.
+pub const ACCEPTED: &str = "accepted";
+/// The state of a script that is not run.
+pub const REFUSED: &str = "refused";
+/// The state of a script that was taken back.
+pub const WITHDRAWN: &str = "withdrawn";
+/// The state of a script that has come to an end.
+pub const ENDED: &str = "ended";
+
+/// Every verb of a vehicle's events.
+pub fn verbs() -> impl Iterator<Item = &'static str> {
+    OWN.into_iter().chain([TAKEOFF, GOTO, ADVANCE, ENTER, ORDER, LOAD, UNLOAD, COMPLETE, FAILED])
+}
+
 /// What only the vehicle itself can say or decide: from afar these are neither blocked nor requested (G6).
-pub const OWN: [&str; 28] = [
+pub const OWN: [&str; 33] = [
     HOLD,
     RETURN,
     LAND,
@@ -140,4 +170,9 @@ pub const OWN: [&str; 28] = [
     PILOT,
     FOUND_AIRBORNE,
     COMMAND_FAILED,
+    SCRIPT,
+    AT,
+    AHEAD,
+    NEIGHBOUR,
+    BATTERY,
 ];

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{AgentConfig, Controller, Envelope, Fence};
+use skein_bp::script::Assignment;
 use skein_dbp::{Kept, NodeName};
 use skein_ground::{GroundConfig, Order, Who};
 use skein_wire::{Fleet, standard_authority};
@@ -103,12 +104,19 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
                 cli::Controller::Bp => Controller::Bp,
                 cli::Controller::None => Controller::None,
             },
+            scripts: scripts_of(scenario, index + 1),
             lease: LEASE,
             authority: standard_authority(),
             kept: Kept::default(),
             seed: scenario.seed.wrapping_mul(1000).wrapping_add(index as u64),
         })
         .collect()
+}
+
+/// The scripts of the vehicle with this number, from 1.
+fn scripts_of(scenario: &Scenario, number: usize) -> Vec<Assignment> {
+    let own = scenario.scripts.iter().filter(|script| script.vehicle == number);
+    own.map(|script| script.assignment.clone()).collect()
 }
 
 /// Whether a vehicle's goal is where another stands before it takes off.

@@ -1,11 +1,13 @@
 //! The scenario file: what its TOML may say, and how a scenario comes out of it.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
+use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_world::{Aabb, Obstacle, Scene, Shape, VehicleModel, WindConfig};
 
 use super::antipodal::Antipodal;
@@ -15,8 +17,8 @@ use super::layout::Layout;
 use super::open::Open;
 use super::window::Window;
 use super::{
-    DEFAULT_TIME_LIMIT_S, Network, Order, OrderKind, Scenario, ScenarioError, VehiclePlan, Who, check_count,
-    read, read_world, stated_datum,
+    DEFAULT_TIME_LIMIT_S, Network, Order, OrderKind, Scenario, ScenarioError, VehiclePlan, VehicleScript,
+    Who, check_count, read, read_world, stated_datum,
 };
 use crate::mission;
 
@@ -60,6 +62,8 @@ struct FileTable {
     gps: Option<GpsTable>,
     #[serde(default)]
     order: Vec<OrderTable>,
+    #[serde(default)]
+    script: Vec<ScriptTable>,
     #[serde(default)]
     vehicle: Vec<VehicleTable>,
     #[serde(default)]
@@ -114,6 +118,17 @@ struct OrderTable {
     at_s: f64,
     order: OrderKind,
     vehicle: Option<usize>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ScriptTable {
+    file: PathBuf,
+    vehicles: Option<Vec<usize>>,
+    #[serde(default)]
+    with: BTreeMap<String, Argument>,
+    #[serde(rename = "as")]
+    called: Option<String>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -203,6 +218,7 @@ impl ScenarioFile {
         let replaced = world.is_some() && layout.is_some();
         let (scene, notes) = self.scene(&name, layout, world)?;
         let orders = self.orders(count)?;
+        let scripts = self.scripts(count)?;
         let fixed_bounds = self.fixed_bounds();
         let table = self.table;
         let mut scenario = Scenario {
@@ -217,6 +233,7 @@ impl ScenarioFile {
             time_limit_s: table.time_limit_s.unwrap_or(DEFAULT_TIME_LIMIT_S),
             wind: table.wind.map(WindConfig::from).unwrap_or_default(),
             orders,
+            scripts,
             network: table.network,
             notes,
         };
@@ -433,6 +450,29 @@ impl ScenarioFile {
         let mut orders = self.table.order.iter().enumerate().map(order).collect::<Result<Vec<_>, _>>()?;
         orders.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
         Ok(orders)
+    }
+
+    /// The scripts of all vehicles, each tried with its values.
+    fn scripts(&self, vehicles: usize) -> Result<Vec<VehicleScript>, ScenarioError> {
+        let mut scripts = Vec::new();
+        for (i, table) in self.table.script.iter().enumerate() {
+            let field = |name: &str| format!("script[{i}].{name}");
+            let path = self.beside(&table.file);
+            let script = ScriptFile::parse(&path.display().to_string(), &read(&path)?)
+                .map_err(|error| self.contradiction(field("file"), error.to_string()))?;
+            let assignment = Assignment { script, with: table.with.clone(), called: table.called.clone() };
+            for vehicle in table.vehicles.clone().unwrap_or_else(|| (1..=vehicles).collect()) {
+                if !(1..=vehicles).contains(&vehicle) {
+                    let message = format!("there is no vehicle {vehicle}: expected 1 to {vehicles}");
+                    return Err(self.contradiction(field("vehicles"), message));
+                }
+                assignment
+                    .bind(&format!("uav/{vehicle}"))
+                    .map_err(|error| self.contradiction(field("with"), error.to_string()))?;
+                scripts.push(VehicleScript { vehicle, assignment: assignment.clone() });
+            }
+        }
+        Ok(scripts)
     }
 }
 

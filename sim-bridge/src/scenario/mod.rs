@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use serde::Deserialize;
+use skein_bp::script::Assignment;
 use skein_mav::Datum;
 use skein_world::{Aabb, Scene, VehicleModel, WindConfig};
 
@@ -71,6 +72,8 @@ pub struct Scenario {
     pub wind: WindConfig,
     /// What an operator says during the mission, in order of time.
     pub orders: Vec<Order>,
+    /// Scripts that run on vehicles from the start.
+    pub scripts: Vec<VehicleScript>,
     /// What the in-memory network does to messages.
     pub network: Network,
     /// What the user should be told: parameters that gave way, parts of files that were not understood.
@@ -142,6 +145,15 @@ pub enum OrderKind {
     Land,
     /// Fly home and land.
     Return,
+}
+
+/// A script on one vehicle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VehicleScript {
+    /// The vehicle's number, from 1.
+    pub vehicle: usize,
+    /// The script, with values for its parameters.
+    pub assignment: Assignment,
 }
 
 /// Whom an order is for.

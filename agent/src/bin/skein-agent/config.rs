@@ -1,5 +1,6 @@
 //! The configuration file of an agent. `agent/agent.toml` explains every field.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -7,6 +8,7 @@ use anyhow::{Context as _, ensure};
 use serde::Deserialize;
 use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{AgentConfig, Controller, Envelope, Fence};
+use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
 use skein_wire::{NodeName, standard_authority};
@@ -49,6 +51,8 @@ struct File {
     lidar: Option<Lidar>,
     datum: DatumTable,
     mission: Mission,
+    #[serde(default)]
+    script: Vec<ScriptTable>,
     fence: FenceTable,
     #[serde(default)]
     envelope: EnvelopeTable,
@@ -91,6 +95,16 @@ struct Mission {
     return_altitude_m: f64,
     #[serde(default)]
     without_ground: WithoutGround,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ScriptTable {
+    file: PathBuf,
+    #[serde(default)]
+    with: BTreeMap<String, Argument>,
+    #[serde(rename = "as")]
+    called: Option<String>,
 }
 
 #[derive(Default, Deserialize)]
@@ -192,6 +206,7 @@ impl File {
                 WithoutGround::Land => LinkLossPolicy::Land,
             },
             controller: Controller::Bp,
+            scripts: self.script.iter().map(|script| script.read(folder)).collect::<anyhow::Result<_>>()?,
             lease: Duration::from_millis(self.lease_ms),
             authority: self.authority.unwrap_or_else(standard_authority),
             kept: Kept::default(),
@@ -199,6 +214,15 @@ impl File {
         };
         let network = self.network.relative_to(folder);
         Ok(Config { agent, name, autopilot, lidar, network, state: folder.join(self.state) })
+    }
+}
+
+impl ScriptTable {
+    fn read(&self, folder: &Path) -> anyhow::Result<Assignment> {
+        let path = folder.join(&self.file);
+        let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        let script = ScriptFile::parse(&path.display().to_string(), &text)?;
+        Ok(Assignment { script, with: self.with.clone(), called: self.called.clone() })
     }
 }
 

@@ -2,25 +2,51 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::ScriptError;
 use super::op::{Op, Reply, ScriptSource, Spawn, Times};
 use crate::bid::Bid;
 use crate::bthread::DEFAULT_BTHREAD_PRIORITY;
 use crate::event::Event;
+use crate::event_set::EventSet;
+use crate::value::Value;
 
 /// A compiled script.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Code {
     pub(super) steps: Vec<Step>,
     pub(super) loop_depth: usize,
+    /// The `until` blocks in the order in which they begin.
+    pub(super) scopes: Vec<Scope>,
     pub(super) priority: i32,
+}
+
+/// An `until` block.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Scope {
+    pub(super) set: EventSet,
+    pub(super) within: Option<Duration>,
+    /// Where the script goes on behind it.
+    pub(super) end: usize,
+    /// How many loops it stands in.
+    pub(super) loop_depth: usize,
 }
 
 /// One step; numbers are places in the code.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Step {
-    Sync(Bid),
+    Sync {
+        bid: Bid,
+        /// The blocks it stands in, outermost first.
+        scopes: Vec<usize>,
+        /// Whether its requests take data from the event that ended the last sync.
+        refers: bool,
+    },
+    /// The beginning of a block that may take so long only.
+    Open(usize),
+    /// Its end.
+    Close(usize),
     /// The end of a loop's body.
     Again {
         depth: usize,
@@ -48,16 +74,21 @@ impl Code {
         priority: Option<i32>,
         templates: &[String],
     ) -> Result<Arc<Self>, ScriptError> {
-        let mut compiler = Compiler { steps: Vec::new(), loop_depth: 0, templates };
+        let mut compiler =
+            Compiler { steps: Vec::new(), loop_depth: 0, scopes: Vec::new(), open: Vec::new(), templates };
         compiler.body(body, 0)?;
         let priority = priority.unwrap_or(DEFAULT_BTHREAD_PRIORITY);
-        Ok(Arc::new(Self { steps: compiler.steps, loop_depth: compiler.loop_depth, priority }))
+        let Compiler { steps, loop_depth, scopes, .. } = compiler;
+        Ok(Arc::new(Self { steps, loop_depth, scopes, priority }))
     }
 }
 
 struct Compiler<'a> {
     steps: Vec<Step>,
     loop_depth: usize,
+    scopes: Vec<Scope>,
+    /// The blocks around what is being compiled, outermost first.
+    open: Vec<usize>,
     templates: &'a [String],
 }
 
@@ -69,9 +100,10 @@ impl Compiler<'_> {
     fn op(&mut self, op: &Op, depth: usize) -> Result<(), ScriptError> {
         let step = match op {
             Op::Repeat { times, body } => return self.repeat(*times, body, depth),
+            Op::Until { set, within, body } => return self.until(set, *within, body, depth),
             Op::On(arms) => return self.branch(arms, depth),
             Op::Spawn(spawn) => self.spawn(spawn)?,
-            Op::Sync(bid) => Step::Sync(bid.clone()),
+            Op::Sync(bid) => self.sync(bid),
             Op::AssertFail(message) => Step::Fail(message.clone()),
             Op::Enqueue(events) => Step::Enqueue(events.clone()),
             Op::Daemon(daemon) => Step::Daemon(*daemon),
@@ -95,6 +127,40 @@ impl Compiler<'_> {
         self.body(body, depth + 1)?;
         self.steps.push(Step::Again { depth, times, start });
         Ok(())
+    }
+
+    fn until(
+        &mut self,
+        set: &EventSet,
+        within: Option<Duration>,
+        body: &[Op],
+        depth: usize,
+    ) -> Result<(), ScriptError> {
+        let number = self.scopes.len();
+        self.scopes.push(Scope { set: set.clone(), within, end: 0, loop_depth: depth });
+        if within.is_some() {
+            self.steps.push(Step::Open(number));
+        }
+        self.open.push(number);
+        self.body(body, depth)?;
+        self.open.pop();
+        if within.is_some() {
+            self.steps.push(Step::Close(number));
+        }
+        if let Some(scope) = self.scopes.get_mut(number) {
+            scope.end = self.steps.len();
+        }
+        Ok(())
+    }
+
+    /// The bid also waits for what ends the blocks around it.
+    fn sync(&self, bid: &Bid) -> Step {
+        let sets = self.open.iter().filter_map(|scope| self.scopes.get(*scope)).map(|scope| &scope.set);
+        Step::Sync {
+            bid: sets.fold(bid.clone(), |bid, set| bid.wait_for(set)),
+            scopes: self.open.clone(),
+            refers: bid.requests().iter().flat_map(Event::data).any(|(_, value)| reference(value).is_some()),
+        }
     }
 
     /// Branch, then the arms one after another, each with a jump behind the last.
@@ -134,4 +200,21 @@ impl Compiler<'_> {
             }
         }
     }
+}
+
+/// The datum of the last event that `value` stands for: `x` where it is the text `$x`.
+pub(super) fn reference(value: &Value) -> Option<&str> {
+    match value {
+        Value::Text(text) => text.strip_prefix('$'),
+        _ => None,
+    }
+}
+
+/// A request in which each `$key` is replaced by what the event `last` has under `key`, or left out where it has nothing.
+pub(super) fn refer(request: &Event, last: Option<&Event>) -> Event {
+    let data = request.data().filter_map(|(key, value)| match reference(value) {
+        Some(wanted) => Some((key, last?.get(wanted)?)),
+        None => Some((key, value)),
+    });
+    data.fold(Event::new(request.name()), |event, (key, value)| event.with(key, value.clone()))
 }

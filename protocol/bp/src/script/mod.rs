@@ -6,6 +6,7 @@
 //! |---|---|
 //! | `{"sync": {"request": [..], "wait": .., "block": .., "interrupt": .., "hot": true, "prio": 5}}` | states a bid |
 //! | `{"repeat": 3, "do": [..]}`, `{"repeat": "forever", "do": [..]}` | repeats |
+//! | `{"until": set, "within_s": 5.0, "do": [..]}` | runs the body until an event of the set, or for so long; one of both suffices |
 //! | `{"on": {"name": [..], ..}}` | goes on by the name of the event that ended the last sync |
 //! | `{"assert_fail": "why"}` | fails an assertion and ends |
 //! | `{"enqueue": [..]}` | puts events in the external queue |
@@ -14,14 +15,23 @@
 //! | `{"on_interrupt_enqueue": ["$event", ..]}` | from here on, enqueues these when interrupted; `$event` is what interrupts |
 //! | `{"stop": true}` | ends |
 //!
-//! Events and sets are written as in [`crate::notation`].
+//! Events and sets are written as in [`crate::notation`]. A datum `"$x"` of a requested event stands for the datum `x` of the
+//! event that ended the last sync; `timeout` is the event by which time ends a block.
+//!
+//! A [`ScriptFile`] is a script for people: with a name, a purpose and parameters, and without the ops that only a whole
+//! program should have.
 
 mod code;
+mod file;
 mod op;
+mod parameter;
+mod samples;
+mod trial;
 
 use std::collections::BTreeMap;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
+use std::time::Duration;
 
 use serde::Serialize;
 
@@ -29,7 +39,10 @@ use crate::bid::Bid;
 use crate::bthread::{BThread, Context};
 use crate::event::Event;
 use code::{Code, Step};
+pub use file::{Assignment, BoundScript, MAX_OPS, MAX_TEXT, ScriptFile, ScriptFileError};
 pub use op::{Op, Reply, ScriptSource, Spawn, Times};
+pub use parameter::{Argument, Parameter, ParameterKind};
+pub use trial::{Trial, TrialFault};
 
 /// How many ops a script may run between two synchronisation points.
 const OPS_BETWEEN_SYNCS: usize = 100_000;
@@ -92,6 +105,12 @@ pub struct Script {
     rounds: Vec<u32>,
     /// The step that said what to do when interrupted.
     on_interrupt: Option<usize>,
+    /// When time ends each block that may take so long only; none for blocks that are not open.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    deadlines: Vec<Option<Duration>>,
+    /// The event that ended the last sync, where the present one refers to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    last: Option<Event>,
 }
 
 impl Script {
@@ -114,7 +133,17 @@ impl Script {
 
     fn at_start(code: Arc<Code>, library: Library) -> Self {
         let rounds = vec![0; code.loop_depth];
-        Self { code, library, at: 0, rounds, on_interrupt: None }
+        let deadlines = vec![None; code.scopes.len()];
+        Self { code, library, at: 0, rounds, on_interrupt: None, deadlines, last: None }
+    }
+
+    /// The bid of every synchronisation point, in the order in which they are written. What a bid takes from an event shows
+    /// as `$key`.
+    pub fn bids(&self) -> impl Iterator<Item = &Bid> {
+        self.code.steps.iter().filter_map(|step| match step {
+            Step::Sync { bid, .. } => Some(bid),
+            _ => None,
+        })
     }
 
     /// Runs to the next sync or the end. `last` is the event that ended the last sync.
@@ -124,10 +153,16 @@ impl Script {
             let here = self.at;
             self.at += 1;
             match step {
-                Step::Sync(_) => {
+                Step::Sync { refers, .. } => {
                     self.at = here;
+                    self.last = last.filter(|_| *refers).cloned();
                     return;
                 }
+                Step::Open(scope) => {
+                    let within = self.code.scopes.get(*scope).and_then(|scope| scope.within);
+                    self.set_deadline(*scope, within.map(|within| cx.now() + within));
+                }
+                Step::Close(scope) => self.set_deadline(*scope, None),
                 Step::Again { depth, times, start } => self.go_round(*depth, *times, *start),
                 Step::Branch { arms, otherwise } => {
                     let arm = last.and_then(|event| arms.get(event.name()));
@@ -168,20 +203,56 @@ impl Script {
         }
     }
 
+    fn set_deadline(&mut self, scope: usize, at: Option<Duration>) {
+        if let Some(deadline) = self.deadlines.get_mut(scope) {
+            *deadline = at;
+        }
+    }
+
+    /// The outermost block around the present sync that `event` ends.
+    fn ended_by(&self, event: &Event, now: Duration) -> Option<usize> {
+        let Some(Step::Sync { scopes, .. }) = self.code.steps.get(self.at) else { return None };
+        let deadline = |scope: &usize| self.deadlines.get(*scope).copied().flatten();
+        if *event == Event::timeout() {
+            let due = scopes.iter().find(|scope| deadline(scope).is_some_and(|at| at <= now));
+            // Whoever lets a timer fire before its time means the one that fires first.
+            let first =
+                || scopes.iter().filter(|scope| deadline(scope).is_some()).min_by_key(|s| deadline(s));
+            return due.or_else(first).copied();
+        }
+        let ends =
+            |scope: &&usize| self.code.scopes.get(**scope).is_some_and(|scope| scope.set.contains(event));
+        scopes.iter().find(ends).copied()
+    }
+
+    /// Goes on behind a block, whose loops and timers are over.
+    fn leave(&mut self, scope: usize) {
+        let code = self.code.clone();
+        let Some(left) = code.scopes.get(scope) else { return };
+        self.at = left.end;
+        self.rounds.iter_mut().skip(left.loop_depth).for_each(|rounds| *rounds = 0);
+        // Blocks that began later and are still open stand inside.
+        self.deadlines.iter_mut().skip(scope).for_each(|deadline| *deadline = None);
+    }
+
     /// Goes to the one state that all ended scripts share.
     fn end(&mut self) {
         self.at = self.code.steps.len();
         self.rounds.fill(0);
+        self.deadlines.fill(None);
         self.on_interrupt = None;
+        self.last = None;
     }
 }
 
 impl BThread for Script {
     fn bid(&self) -> Option<Bid> {
-        match self.code.steps.get(self.at)? {
-            Step::Sync(bid) => Some(bid.clone()),
-            _ => None,
+        let Step::Sync { bid, refers, .. } = self.code.steps.get(self.at)? else { return None };
+        let mut bid = bid.clone();
+        if *refers {
+            bid = bid.map_requests(|request| code::refer(request, self.last.as_ref()));
         }
+        Some(self.deadlines.iter().flatten().fold(bid, |bid, at| bid.deadline(*at)))
     }
 
     fn start(&mut self, cx: &mut Context) {
@@ -189,7 +260,10 @@ impl BThread for Script {
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        self.at += 1;
+        match self.ended_by(event, cx.now()) {
+            Some(scope) => self.leave(scope),
+            None => self.at += 1,
+        }
         self.run(Some(event), cx);
     }
 
@@ -216,6 +290,8 @@ impl PartialEq for Script {
         self.at == other.at
             && self.rounds == other.rounds
             && self.on_interrupt == other.on_interrupt
+            && self.deadlines == other.deadlines
+            && self.last == other.last
             && (Arc::ptr_eq(&self.code, &other.code) || self.code == other.code)
             && (Arc::ptr_eq(&self.library.0, &other.library.0) || self.library.0 == other.library.0)
     }
@@ -228,5 +304,7 @@ impl Hash for Script {
         self.at.hash(state);
         self.rounds.hash(state);
         self.on_interrupt.hash(state);
+        self.deadlines.hash(state);
+        self.last.hash(state);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::time::Duration;
 
 use serde::de::{Error, MapAccess, Visitor};
 use serde::ser::SerializeMap;
@@ -9,6 +10,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::bid::Bid;
 use crate::event::Event;
+use crate::event_set::EventSet;
 use crate::notation::Many;
 
 /// One op of a script; the [module](super) lists their JSON forms.
@@ -20,6 +22,15 @@ pub enum Op {
     Repeat {
         /// How often.
         times: Times,
+        /// What.
+        body: Vec<Op>,
+    },
+    /// Runs the body until an event of `set` happens or so much time has passed, and goes on behind it.
+    Until {
+        /// What ends it at any synchronisation point inside.
+        set: EventSet,
+        /// How long it may take.
+        within: Option<Duration>,
         /// What.
         body: Vec<Op>,
     },
@@ -54,7 +65,7 @@ impl Op {
     pub(super) fn may_pause(&self) -> bool {
         match self {
             Self::Sync(_) | Self::Stop | Self::AssertFail(_) => true,
-            Self::Repeat { body, .. } => body.iter().any(Self::may_pause),
+            Self::Repeat { body, .. } | Self::Until { body, .. } => body.iter().any(Self::may_pause),
             Self::On(arms) => arms.values().flatten().any(Self::may_pause),
             Self::Enqueue(_) | Self::Spawn(_) | Self::Daemon(_) | Self::OnInterruptEnqueue(_) => false,
         }
@@ -166,6 +177,15 @@ impl Serialize for Op {
                 map.serialize_entry("repeat", times)?;
                 map.serialize_entry("do", body)?;
             }
+            Self::Until { set, within, body } => {
+                if !set.is_none() {
+                    map.serialize_entry("until", set)?;
+                }
+                if let Some(within) = within {
+                    map.serialize_entry("within_s", &within.as_secs_f64())?;
+                }
+                map.serialize_entry("do", body)?;
+            }
             Self::On(arms) => map.serialize_entry("on", arms)?,
             Self::AssertFail(message) => map.serialize_entry("assert_fail", message)?,
             Self::Enqueue(events) => map.serialize_entry("enqueue", events)?,
@@ -187,6 +207,8 @@ impl<'de> Deserialize<'de> for Op {
 const OPS: &[&str] = &[
     "sync",
     "repeat",
+    "until",
+    "within_s",
     "do",
     "on",
     "assert_fail",
@@ -207,17 +229,13 @@ impl<'de> Visitor<'de> for OpVisitor {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Op, A::Error> {
-        let (mut times, mut body, mut op) = (None, None, None);
+        let mut block = Block::default();
+        let mut op = None;
         while let Some(key) = map.next_key::<String>()? {
+            if block.take(&key, &mut map)? {
+                continue;
+            }
             let other = match &*key {
-                "repeat" => {
-                    times = Some(map.next_value()?);
-                    continue;
-                }
-                "do" => {
-                    body = Some(map.next_value()?);
-                    continue;
-                }
                 "sync" => Op::Sync(map.next_value()?),
                 "on" => Op::On(map.next_value()?),
                 "assert_fail" => Op::AssertFail(map.next_value()?),
@@ -235,13 +253,52 @@ impl<'de> Visitor<'de> for OpVisitor {
                 return Err(Error::custom(format_args!("one op per object; `{key}` is the second")));
             }
         }
-        match (op, times, body) {
-            (Some(op), None, None) => Ok(op),
-            (None, Some(times), Some(body)) => Ok(Op::Repeat { times, body }),
-            (None, Some(_), None) => Err(Error::missing_field("do")),
-            (None, None, Some(_)) => Err(Error::missing_field("repeat")),
-            (None, None, None) => Err(Error::custom(format_args!("an op needs one of the keys {OPS:?}"))),
-            (Some(_), _, _) => Err(Error::custom("`repeat` and `do` go with no other op")),
+        match (op, block.into_op()?) {
+            (Some(op), None) | (None, Some(op)) => Ok(op),
+            (None, None) => Err(Error::custom(format_args!("an op needs one of the keys {OPS:?}"))),
+            (Some(_), Some(_)) => Err(Error::custom("what has a `do` goes with no other op")),
         }
     }
+}
+
+/// What has been read of an op that has a body.
+#[derive(Default)]
+struct Block {
+    times: Option<Times>,
+    set: Option<EventSet>,
+    within: Option<Duration>,
+    body: Option<Vec<Op>>,
+}
+
+impl Block {
+    /// Reads the value of `key` if it is a block's; says whether it was.
+    fn take<'de, A: MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<bool, A::Error> {
+        match key {
+            "repeat" => self.times = Some(map.next_value()?),
+            "until" => self.set = Some(map.next_value()?),
+            "within_s" => self.within = Some(read_seconds(map.next_value()?)?),
+            "do" => self.body = Some(map.next_value()?),
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    fn into_op<E: Error>(self) -> Result<Option<Op>, E> {
+        let Self { times, set, within, body } = self;
+        match (times, set.is_some() || within.is_some(), body) {
+            (None, false, None) => Ok(None),
+            (None, false, Some(_)) => Err(E::missing_field("repeat")),
+            (_, _, None) => Err(E::missing_field("do")),
+            (Some(times), false, Some(body)) => Ok(Some(Op::Repeat { times, body })),
+            (None, true, Some(body)) => Ok(Some(Op::Until { set: set.unwrap_or_default(), within, body })),
+            (Some(_), true, _) => {
+                Err(E::custom("`repeat` goes with no `until` or `within_s`; put one inside the other"))
+            }
+        }
+    }
+}
+
+fn read_seconds<E: Error>(seconds: f64) -> Result<Duration, E> {
+    Duration::try_from_secs_f64(seconds)
+        .map_err(|_| E::custom(format_args!("`within_s` is {seconds}: expected seconds, 0 or more")))
 }

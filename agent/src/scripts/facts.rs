@@ -1,0 +1,99 @@
+//! What is told to scripts about places and energy, and to nobody while none listens.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use skein_bp::Event;
+use skein_wire::NodeName;
+use skein_wire::vocabulary::{AHEAD, AT, BATTERY, NEIGHBOUR};
+
+use super::Scripts;
+use crate::{me::Me, neighbours::Neighbour};
+
+/// A place is told again when it has changed by so much, m.
+const STEP_M: f64 = 1.0;
+/// Energy is told in steps of so many per cent.
+const STEP_PERCENT: i64 = 5;
+
+/// What a vehicle knows of itself and of the others at one time.
+#[derive(Clone, Copy, Debug)]
+pub struct Circumstances<'a> {
+    /// Where it is, m.
+    pub position: Vector3<f64>,
+    /// Where leave to move will have led in a moment, m, if there is a path.
+    pub ahead: Option<Vector3<f64>>,
+    /// Share of the battery's energy left.
+    pub battery: Option<f64>,
+    /// The others.
+    pub neighbours: &'a [Neighbour],
+}
+
+/// What was told last.
+#[derive(Debug, Default)]
+pub struct ScriptFacts {
+    at: Option<Vector3<f64>>,
+    ahead: Option<Vector3<f64>>,
+    percent: Option<i64>,
+    /// Where each was, and where this vehicle was then.
+    neighbours: BTreeMap<NodeName, (Vector3<f64>, Vector3<f64>)>,
+}
+
+impl ScriptFacts {
+    /// Says everything anew: somebody has begun to listen.
+    pub fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// The path has changed.
+    pub fn forget_path(&mut self) {
+        self.ahead = None;
+    }
+
+    /// What has changed since it was told last, as far as a script listens.
+    pub fn tell(&mut self, me: &Me, scripts: &Scripts, now: &Circumstances<'_>) -> Vec<Event> {
+        let mut events = Vec::new();
+        if scripts.listen_to(BATTERY)
+            && let Some(fraction) = now.battery
+        {
+            // Rounded up, so that 40 is told at 40 % and not at 44 %.
+            let percent = (fraction * 100.0).round() as i64;
+            let step = (percent + STEP_PERCENT - 1) / STEP_PERCENT * STEP_PERCENT;
+            if self.percent.replace(step) != Some(step) {
+                events.push(me.event(BATTERY).with("percent", step));
+            }
+        }
+        for neighbour in
+            now.neighbours.iter().filter(|neighbour| neighbour.armed && neighbour.track.cooperative)
+        {
+            if !scripts.listen_to(NEIGHBOUR) {
+                break;
+            }
+            let place = neighbour.position();
+            let told = self.neighbours.get(&neighbour.node);
+            if told.is_none_or(|(there, here)| moved(there, &place) || moved(here, &now.position)) {
+                self.neighbours.insert(neighbour.node.clone(), (place, now.position));
+                let event = me.event(NEIGHBOUR).with("node", neighbour.node.as_str());
+                events.push(at(event, place).with("distance_m", (place - now.position).norm()));
+            }
+        }
+        if scripts.listen_to(AT) && self.at.is_none_or(|told| moved(&told, &now.position)) {
+            self.at = Some(now.position);
+            events.push(at(me.event(AT), now.position));
+        }
+        if let (true, Some(ahead)) = (scripts.listen_to(AHEAD), now.ahead)
+            && self.ahead.is_none_or(|told| moved(&told, &ahead))
+        {
+            self.ahead = Some(ahead);
+            events.push(at(me.event(AHEAD), ahead));
+        }
+        events
+    }
+}
+
+fn moved(from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
+    (to - from).norm() >= STEP_M
+}
+
+fn at(event: Event, place: Vector3<f64>) -> Event {
+    event.with("x", place.x).with("y", place.y).with("z", place.z)
+}

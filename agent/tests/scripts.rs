@@ -1,0 +1,401 @@
+//! Scripts on a vehicle: what they may, what becomes of them, and what those do that come with the agent.
+
+#![allow(clippy::unwrap_used)] // A test fails by panicking.
+
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use skein_agent::{
+    AgentConfig, Controller, Envelope, Fence, Me,
+    bthreads::{self, LinkLossPolicy},
+    scripts::{Runner, Scripts},
+};
+use skein_bp::script::{Argument, Assignment, ScriptFile};
+use skein_bp::{Event, Program, ProgramConfig};
+use skein_mav::Datum;
+use skein_wire::vocabulary::{self, *};
+
+const ME: &str = "uav/1";
+const ROSTER: [&str; 4] = ["uav/1", "uav/2", "ground/main", "script/operator"];
+const SHIPPED: [(&str, &str); 4] = [
+    ("patrol", include_str!("../scripts/patrol.toml")),
+    ("curfew", include_str!("../scripts/curfew.toml")),
+    ("alternate", include_str!("../scripts/alternate.toml")),
+    ("follow", include_str!("../scripts/follow.toml")),
+];
+
+fn config() -> AgentConfig {
+    AgentConfig {
+        fleet: "test".to_owned(),
+        node: ME.to_owned(),
+        ground: "ground/main".to_owned(),
+        roster: ROSTER.map(str::to_owned).to_vec(),
+        incarnation: 1,
+        system_id: 1,
+        datum: Datum::from_degrees(47.4, 8.5, 400.0),
+        home: [0.0; 3],
+        waypoints: vec![[50.0, 0.0, 3.0]],
+        takeoff_height_m: 2.0,
+        return_altitude_m: 4.0,
+        lidar: true,
+        fence: Fence { min: [-60.0, -60.0, -1.0], max: [60.0, 60.0, 20.0] },
+        envelope: Envelope::default(),
+        link_loss: LinkLossPolicy::Continue,
+        controller: Controller::Bp,
+        scripts: Vec::new(),
+        lease: Duration::from_secs(1),
+        seed: 1,
+    }
+}
+
+/// A vehicle's b-threads and its scripts.
+struct Vehicle {
+    program: Program,
+    scripts: Scripts,
+    now: Duration,
+}
+
+impl Vehicle {
+    fn on_the_ground() -> Self {
+        let config = config();
+        let mut program = Program::new(ProgramConfig::vehicle(1));
+        bthreads::load(&mut program, &config);
+        Self { program, scripts: Scripts::new(Me::new(ME), &config.roster), now: Duration::ZERO }
+    }
+
+    /// In the air, with a path to its waypoint.
+    fn in_the_air() -> Self {
+        let mut vehicle = Self::on_the_ground();
+        for verb in [READY, TAKEOFF, AIRBORNE, PLANNED] {
+            vehicle.hears(mine(verb));
+        }
+        vehicle
+    }
+
+    fn load(&mut self, assignment: &Assignment) -> Result<(), String> {
+        self.scripts.load(&mut self.program, assignment, "ground/main")
+    }
+
+    /// Everything that happens after an event from outside, itself first.
+    fn hears(&mut self, event: Event) -> Vec<Event> {
+        self.program.enqueue(event);
+        self.happens()
+    }
+
+    fn happens(&mut self) -> Vec<Event> {
+        let selections = self.program.superstep(self.now).unwrap();
+        let events: Vec<Event> = selections.into_iter().map(|selection| selection.event).collect();
+        events.iter().for_each(|event| self.scripts.hear(event));
+        events
+    }
+
+    fn verbs_after(&mut self, event: Event) -> Vec<String> {
+        self.hears(event).iter().map(|event| event.kind().to_owned()).collect()
+    }
+
+    /// Whether it asks for leave to move, and gets it, a navigation cycle later.
+    fn moves(&mut self) -> bool {
+        self.now += Duration::from_millis(100);
+        self.happens().iter().any(|event| event.kind() == ADVANCE)
+    }
+}
+
+fn mine(verb: &str) -> Event {
+    vocabulary::event(ME, verb)
+}
+
+fn at(verb: &str, [x, y, z]: [f64; 3]) -> Event {
+    mine(verb).with("x", x).with("y", y).with("z", z)
+}
+
+fn shipped(name: &str, with: Value) -> Assignment {
+    let (_, text) = SHIPPED.iter().find(|(known, _)| *known == name).unwrap();
+    let script = ScriptFile::parse(&format!("{name}.toml"), text).unwrap();
+    Assignment { script, with: serde_json::from_value(with).unwrap(), called: None }
+}
+
+/// A script of these ops, without parameters.
+fn script(body: Value) -> Assignment {
+    let text = json!({"name": "test", "about": "A test.", "body": body}).to_string();
+    Assignment { script: ScriptFile::parse("test.json", &text).unwrap(), with: [].into(), called: None }
+}
+
+fn refusal(body: Value) -> String {
+    Vehicle::in_the_air().load(&script(body)).unwrap_err()
+}
+
+#[test]
+fn a_script_requests_only_what_it_may() {
+    for (request, why) in [
+        (json!("uav/1/land"), "it requests `uav/1/land`, which scripts may not"),
+        (json!({"name": "uav/1/goto", "data": {"x": 0.0}}), "it requests `uav/1/goto"),
+        (json!({"name": "uav/1/order", "data": {"what": "hand_back"}}), "hand_back"),
+        (json!({"name": "uav/1/order", "data": {"what": "$what"}}), "$what"),
+        (json!({"name": "uav/2/order", "data": {"what": "land"}}), "uav/2/order"),
+        (json!("uav/1/scripted"), "they may request `uav/1/order` with `what` one of goto"),
+        (json!("uav/1/battery"), "uav/1/battery"),
+    ] {
+        let error = refusal(json!([{"sync": {"request": request}}]));
+        assert!(error.contains(why), "{error} does not say {why}");
+    }
+    for request in [json!({"name": "uav/1/order", "data": {"what": "land"}}), json!("uav/1/script/done")] {
+        Vehicle::in_the_air().load(&script(json!([{"sync": {"request": request}}]))).unwrap();
+    }
+}
+
+#[test]
+fn a_script_blocks_no_safety_event_however_it_is_named() {
+    let never = OWN.iter().chain(&[ORDER, LOAD, UNLOAD, ENTER, "confirmed", "peer_lost"]);
+    for verb in never {
+        for set in [
+            json!({"any_data": format!("uav/1/{verb}")}),
+            json!({"name": format!("uav/1/{verb}"), "data": {"why": "x"}}),
+            json!({"prefix": "uav/1/"}),
+            json!({"named": "uav/*/*"}),
+            json!({"region": {"min": [0, 0, 0], "max": [1, 1, 1]}}),
+            json!({"not": "uav/1/advance"}),
+            json!({"all": true}),
+        ] {
+            let error = refusal(json!([{"sync": {"block": set, "wait": "uav/1/landed"}}]));
+            assert!(error.contains("which scripts may not"), "{set}: {error}");
+        }
+    }
+    let error = refusal(json!([{"sync": {"block": {"named": "uav/*/advance"}}}]));
+    assert!(error.contains("it blocks events of uav/2"), "{error}");
+}
+
+#[test]
+fn the_way_home_stays_open_whatever_a_script_blocks() {
+    let mut vehicle = Vehicle::in_the_air();
+    vehicle
+        .load(&script(
+            json!([{"sync": {"block": [{"any_data": "uav/1/goto"}, {"any_data": "uav/1/advance"}], "wait": "uav/1/landed"}}]),
+        ))
+        .unwrap();
+    assert!(!vehicle.moves());
+    let verbs = vehicle.verbs_after(order(ME, "return"));
+    assert_eq!(verbs, ["order", "return", "goto", "plan"]);
+    let planned = mine(PLANNED).with("leg", bthreads::HOME_LEG);
+    assert_eq!(vehicle.verbs_after(planned), ["planned", "homeward"]);
+}
+
+#[test]
+fn a_script_that_speaks_of_what_does_not_exist_is_refused() {
+    for (sync, why) in [
+        (
+            json!({"wait": {"any_data": "uav/1/landet"}}),
+            "it waits for `uav/1/landet`, and there is no such event",
+        ),
+        (json!({"interrupt": "uav/7/landed"}), "it is ended by `uav/7/landed`"),
+        (json!({"wait": {"and": [{"named": "uav/*/lands"}, {"data_has": {"x": 1}}]}}), "`uav/*/lands`"),
+        (json!({"wait": {"prefix": "boat/"}}), "`boat/..`"),
+        (json!({"wait": {"not": "landed"}}), "`landed`"),
+    ] {
+        let error = refusal(json!([{"sync": sync}]));
+        assert!(error.contains(why), "{error} does not say {why}");
+    }
+    let wait =
+        json!(["uav/2/landed", {"named": "uav/*/peer_lost"}, "ground/main/ordered", "uav/2/script/turn"]);
+    Vehicle::in_the_air().load(&script(json!([{"sync": {"wait": wait}}]))).unwrap();
+}
+
+#[test]
+fn a_script_is_explained_withdrawn_and_may_come_again() {
+    let mut vehicle = Vehicle::in_the_air();
+    let hold = script(json!([{"sync": {"block": {"any_data": "uav/1/advance"}, "wait": "uav/1/landed"}}]));
+    vehicle.load(&hold).unwrap();
+    vehicle.load(&hold).unwrap();
+    assert!(!vehicle.moves());
+    let explained = vehicle.program.explain(mine(ADVANCE));
+    assert!(explained.blocked.iter().any(|(bthread, _)| &**bthread == "script/test"), "{explained:?}");
+    let other = script(json!([{"sync": {}}]));
+    assert!(vehicle.load(&other).unwrap_err().contains("withdraw it first"));
+    let happened = vehicle.hears(mine(UNLOAD).with("name", "test"));
+    assert_eq!(happened.iter().filter_map(|event| event.text("state")).collect::<Vec<_>>(), [WITHDRAWN]);
+    assert!(vehicle.moves());
+    assert_eq!(vehicle.scripts.running().count(), 0);
+    vehicle.load(&other).unwrap();
+}
+
+#[test]
+fn a_script_says_how_it_has_ended() {
+    let ended = |body: Value, event: Event| {
+        let mut vehicle = Vehicle::in_the_air();
+        vehicle.load(&script(body)).unwrap();
+        let happened = vehicle.hears(event);
+        let report = happened.iter().find(|event| event.kind() == SCRIPT).unwrap();
+        assert_eq!((report.text("name"), report.text("state")), (Some("test"), Some(ENDED)));
+        assert_eq!(vehicle.scripts.running().count(), 0);
+        assert!(vehicle.program.bid(&Runner::bthread_name("test")).is_none());
+        report.text("why").unwrap().to_owned()
+    };
+    let arrived = || mine(ARRIVED).with("leg", 7_i64);
+    assert_eq!(
+        ended(json!([{"sync": {"wait": {"any_data": "uav/1/arrived"}}}]), arrived()),
+        "it has come to its end"
+    );
+    let why = ended(json!([{"sync": {"interrupt": {"any_data": "uav/1/arrived"}}}]), arrived());
+    assert_eq!(why, "it was ended by uav/1/arrived{leg: 7}");
+}
+
+#[test]
+fn scripts_that_go_round_by_themselves_stop_nobody() {
+    let round = json!({"repeat": "forever", "do": [{"sync": {"request": "uav/1/script/x"}}]});
+    let error = refusal(json!([{"sync": {"wait": {"any_data": "uav/1/arrived"}}}, round]));
+    assert!(
+        error.contains("it goes round without waiting for anything: uav/1/script/x after uav/1/arrived"),
+        "{error}"
+    );
+    // Of two that keep one another going, neither does so alone.
+    let mut vehicle = Vehicle::in_the_air();
+    for (name, hears, says) in [("ping", "a", "b"), ("pong", "b", "a")] {
+        let [hears, says] = [hears, says].map(|event| format!("uav/1/script/{event}"));
+        let body =
+            json!([{"repeat": "forever", "do": [{"sync": {"wait": hears}}, {"sync": {"request": says}}]}]);
+        vehicle.load(&Assignment { called: Some(name.to_owned()), ..script(body) }).unwrap();
+    }
+    let happened = vehicle.hears(mine("script/a"));
+    let report = happened.iter().find(|event| event.kind() == SCRIPT).unwrap();
+    assert!(report.text("why").unwrap().contains("it did not come to rest"), "{report}");
+    assert_eq!(vehicle.scripts.running().count(), 1);
+    assert!(vehicle.moves());
+}
+
+#[test]
+fn no_more_scripts_run_than_a_state_can_name() {
+    let mut vehicle = Vehicle::in_the_air();
+    let named =
+        |number: usize| Assignment { called: Some(format!("s{number}")), ..script(json!([{"sync": {}}])) };
+    (0..8).for_each(|number| vehicle.load(&named(number)).unwrap());
+    assert!(vehicle.load(&named(8)).unwrap_err().contains("8 scripts run already"));
+}
+
+#[test]
+fn facts_are_told_only_to_those_who_listen() {
+    let mut vehicle = Vehicle::in_the_air();
+    let listened =
+        |vehicle: &Vehicle| [AT, AHEAD, NEIGHBOUR, BATTERY].map(|fact| vehicle.scripts.listen_to(fact));
+    assert_eq!(listened(&vehicle), [false; 4]);
+    vehicle.load(&shipped("patrol", json!({"route": [[0, 0, 3]]}))).unwrap();
+    assert_eq!(listened(&vehicle), [true, false, false, true]);
+    vehicle.load(&shipped("curfew", json!({"min": [0, 0, 0], "max": [1, 1, 1], "for_s": 9}))).unwrap();
+    assert_eq!(listened(&vehicle), [true, true, false, true]);
+    vehicle.hears(order(ME, "resume"));
+    assert_eq!(listened(&vehicle), [true, true, false, false], "the patrol has ended");
+}
+
+#[test]
+fn patrol_flies_round_and_goes_on_with_the_mission_at_its_level() {
+    let mut vehicle = Vehicle::in_the_air();
+    vehicle.load(&shipped("patrol", json!({"route": [[1, 2, 3], [4, 5, 6]], "min_percent": 30}))).unwrap();
+    let goto = |events: &[Event]| {
+        let goto = events.iter().find(|event| event.kind() == GOTO)?;
+        Some([goto.real("x")?, goto.real("y")?, goto.real("z")?])
+    };
+    assert_eq!(goto(&vehicle.hears(at(AT, [0.0; 3]))), Some([1.0, 2.0, 3.0]));
+    let arrived = mine(ARRIVED).with("leg", bthreads::OPERATOR_LEG);
+    for place in [[4.0, 5.0, 6.0], [1.0, 2.0, 3.0], [4.0, 5.0, 6.0]] {
+        assert_eq!(goto(&vehicle.hears(arrived.clone())), Some(place));
+    }
+    assert_eq!(goto(&vehicle.hears(mine(BATTERY).with("percent", 35_i64))), None);
+    assert_eq!(goto(&vehicle.hears(mine(BATTERY).with("percent", 30_i64))), Some([50.0, 0.0, 3.0]));
+    assert_eq!(vehicle.scripts.running().count(), 0);
+}
+
+#[test]
+fn patrol_gives_way_to_an_operator_and_passes_over_points_out_of_bounds() {
+    let mut vehicle = Vehicle::in_the_air();
+    vehicle.load(&shipped("patrol", json!({"route": [[900, 0, 3], [4, 5, 6]]}))).unwrap();
+    assert_eq!(vehicle.verbs_after(at(AT, [0.0; 3])), ["at", "order"]);
+    vehicle.now += Duration::from_secs(3);
+    let happened = vehicle.happens();
+    assert!(happened.iter().any(|event| event.kind() == DECLINED));
+    assert_eq!(happened.iter().find(|event| event.kind() == GOTO).and_then(|goto| goto.real("x")), Some(4.0));
+    let point = order(ME, "goto").with("x", 7.0).with("y", 7.0).with("z", 3.0);
+    assert_eq!(vehicle.hears(point).iter().find(|event| event.kind() == GOTO).unwrap().real("x"), Some(7.0));
+    assert_eq!(vehicle.scripts.running().count(), 0);
+}
+
+#[test]
+fn curfew_keeps_a_vehicle_out_while_it_lasts_and_lets_one_inside_leave() {
+    let region = json!({"min": [10, -5, 0], "max": [20, 5, 10], "after_s": 5, "for_s": 60});
+    let (inside, outside) = ([15.0, 0.0, 3.0], [2.0, 0.0, 3.0]);
+    for begins_inside in [false, true] {
+        let mut vehicle = Vehicle::in_the_air();
+        vehicle.load(&shipped("curfew", region.clone())).unwrap();
+        vehicle.hears(at(AHEAD, inside));
+        assert!(vehicle.moves(), "it has not begun");
+        vehicle.now += Duration::from_secs(5);
+        vehicle.hears(at(AT, if begins_inside { inside } else { outside }));
+        assert_eq!(vehicle.moves(), begins_inside);
+        vehicle.hears(at(AT, outside));
+        vehicle.hears(at(AHEAD, outside));
+        assert!(vehicle.moves(), "outside");
+        vehicle.hears(at(AHEAD, inside));
+        assert!(!vehicle.moves(), "about to fly in");
+        vehicle.now += Duration::from_secs(61);
+        assert!(vehicle.moves(), "it is over");
+    }
+}
+
+#[test]
+fn alternate_waits_for_the_other_and_does_not_wait_for_ever() {
+    let with =
+        |first: i64| json!({"other": "uav/2", "min": [10, -5, 0], "max": [20, 5, 10], "goes_first": first});
+    let (inside, outside) = ([15.0, 0.0, 3.0], [2.0, 0.0, 3.0]);
+    let other = |place| at(NEIGHBOUR, place).with("node", "uav/2").with("distance_m", 9.0);
+    let mut first = Vehicle::in_the_air();
+    first.load(&shipped("alternate", with(1))).unwrap();
+    let mut second = Vehicle::in_the_air();
+    second.load(&shipped("alternate", with(0))).unwrap();
+    for vehicle in [&mut first, &mut second] {
+        vehicle.hears(at(AHEAD, inside));
+    }
+    assert!(first.moves() && !second.moves());
+    [inside, outside].into_iter().for_each(|place| drop(first.hears(at(AT, place))));
+    assert!(!first.moves(), "it is not its turn again");
+    [inside, outside].into_iter().for_each(|place| drop(second.hears(other(place))));
+    assert!(second.moves());
+    first.now += Duration::from_secs(121);
+    assert!(first.moves(), "its patience is at an end");
+    [inside, outside].into_iter().for_each(|place| drop(second.hears(at(AT, place))));
+    assert!(!second.moves());
+    second.program.occurred(vocabulary::event("uav/2", LANDED));
+    assert!(second.moves(), "there is nobody to take turns with");
+}
+
+#[test]
+fn follow_keeps_its_distance_and_goes_on_when_the_leader_lands() {
+    let mut vehicle = Vehicle::in_the_air();
+    vehicle.load(&shipped("follow", json!({"leader": "uav/2", "distance_m": 8}))).unwrap();
+    let leader = |x: f64, distance_m: f64| {
+        at(NEIGHBOUR, [x, 0.0, 3.0]).with("node", "uav/2").with("distance_m", distance_m)
+    };
+    let goto =
+        |events: Vec<Event>| events.iter().find(|event| event.kind() == GOTO).and_then(|goto| goto.real("x"));
+    assert_eq!(goto(vehicle.hears(leader(20.0, 12.0))), Some(20.0));
+    assert_eq!(goto(vehicle.hears(leader(21.0, 11.0))), Some(21.0));
+    vehicle.hears(mine(PLANNED).with("leg", bthreads::OPERATOR_LEG));
+    assert!(vehicle.moves());
+    vehicle.hears(leader(21.0, 7.5));
+    assert!(!vehicle.moves(), "near enough");
+    vehicle.hears(leader(24.0, 9.0));
+    assert!(vehicle.moves());
+    assert_eq!(goto(vehicle.hears(leader(25.0, 10.0))), Some(25.0));
+    vehicle.program.occurred(vocabulary::event("uav/2", LAND).with("why", "mission complete"));
+    assert_eq!(goto(vehicle.happens()), Some(50.0));
+}
+
+#[test]
+fn what_is_shipped_says_what_it_is_for_and_fits_its_name() {
+    for (name, text) in SHIPPED {
+        let script = ScriptFile::parse(&format!("{name}.toml"), text).unwrap();
+        assert_eq!(script.name, name);
+        assert!(
+            script.about.ends_with('.') && script.parameters.values().all(|p| p.about.ends_with('.')),
+            "{name}"
+        );
+    }
+    assert!(matches!(shipped("patrol", json!({})).bind(ME).unwrap_err().field.as_str(), "with.route"));
+    assert!(matches!(shipped("curfew", json!({"for_s": 5})).with["for_s"], Argument::Integer(5)));
+}

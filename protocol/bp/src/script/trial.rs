@@ -1,0 +1,182 @@
+//! Tries a script before it runs: alone, in a world where everything that it waits for may happen at any time.
+//!
+//! What the script shall not do there is keep something from ever happening again, or go round by itself without waiting
+//! for anybody. Blocks inside one another that end in time are tried with the innermost ending first.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::samples::samples;
+use super::{Op, Script};
+use crate::bid::Bid;
+use crate::event::Event;
+use crate::event_set::EventSet;
+use crate::program::{Program, ProgramConfig};
+use crate::verify::{Graph, GraphEdge, Timers, Verifier};
+
+/// What a trial has found out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Trial {
+    /// How many states the script and its world have, as far as they were looked at.
+    pub states: usize,
+    /// Whether all were looked at.
+    pub is_complete: bool,
+}
+
+/// What is wrong with a script, and the shortest way there.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrialFault {
+    /// It blocks something and cannot let go.
+    #[error("it blocks `{event}` for ever{}; give it a `within_s`, or something to wait for that can happen", after(.trace))]
+    NeverLetsGo {
+        /// What.
+        event: Event,
+        /// What happens before.
+        trace: Vec<Event>,
+    },
+    /// It goes round on its own requests.
+    #[error("it goes round without waiting for anything: {}{}", list(.cycle), after(.trace))]
+    Spins {
+        /// What it requests again and again.
+        cycle: Vec<Event>,
+        /// What happens before.
+        trace: Vec<Event>,
+    },
+}
+
+fn list(events: &[Event]) -> String {
+    let events: Vec<String> = events.iter().map(Event::to_string).collect();
+    events.join(", ")
+}
+
+fn after(trace: &[Event]) -> String {
+    if trace.is_empty() { " from the start".to_owned() } else { format!(" after {}", list(trace)) }
+}
+
+impl Script {
+    /// Tries the script in no more than `most_states` states.
+    ///
+    /// # Errors
+    /// [`TrialFault`]: the script can get into a state that it should not.
+    pub fn try_out(&self, most_states: usize) -> Result<Trial, TrialFault> {
+        let blocks: Vec<&EventSet> = self.bids().map(Bid::blocks).collect();
+        let hears: Vec<&EventSet> = self.bids().flat_map(|bid| [bid.waits(), bid.interrupts()]).collect();
+        let own: BTreeSet<&str> = self.bids().flat_map(Bid::requests).map(Event::name).collect();
+        let held: BTreeSet<Event> =
+            samples(&blocks).filter(|event| blocks.iter().any(|set| set.contains(event))).collect();
+        let heard = samples(&hears).filter(|event| hears.iter().any(|set| set.contains(event)));
+        let world: BTreeSet<Event> = heard.chain(held.iter().cloned()).collect();
+
+        let mut program = Program::new(ProgramConfig::default());
+        program.add("script", self.clone());
+        let any = world.iter().fold(Bid::new(), Bid::request);
+        if let Ok(world) = Self::new(&[Op::forever([Op::Sync(any)])]) {
+            program.add("world", world);
+        }
+        let graph = Verifier::new(program).timers(Timers::AnyTime).most_states(most_states).graph();
+        let paths = Paths::of(&graph);
+        let is_complete = graph.not_covered.is_empty();
+        // What was not looked at might let go.
+        for event in held.into_iter().filter(|_| is_complete) {
+            if let Some(state) = paths.never_again(&event) {
+                return Err(TrialFault::NeverLetsGo { event, trace: paths.to(state) });
+            }
+        }
+        let by_itself = |event: &Event| own.contains(event.name()) && !world.contains(event);
+        if let Some((state, cycle)) = paths.cycle(by_itself) {
+            return Err(TrialFault::Spins { cycle, trace: paths.to(state) });
+        }
+        Ok(Trial { states: graph.states.len(), is_complete })
+    }
+}
+
+/// The ways through a graph.
+struct Paths<'a> {
+    states: u32,
+    edges: &'a [GraphEdge],
+    /// By state: the edges that leave it and that lead to it.
+    out: BTreeMap<u32, Vec<&'a GraphEdge>>,
+    into: BTreeMap<u32, Vec<&'a GraphEdge>>,
+}
+
+impl<'a> Paths<'a> {
+    fn of(graph: &'a Graph) -> Self {
+        let (mut out, mut into) = (BTreeMap::<_, Vec<_>>::new(), BTreeMap::<_, Vec<_>>::new());
+        for edge in &graph.edges {
+            out.entry(edge.from).or_default().push(edge);
+            into.entry(edge.to).or_default().push(edge);
+        }
+        Self { states: graph.states.len() as u32, edges: &graph.edges, out, into }
+    }
+
+    fn leaving(&self, state: u32) -> impl Iterator<Item = &'a GraphEdge> + '_ {
+        self.out.get(&state).into_iter().flatten().copied()
+    }
+
+    /// The first state from which no way leads to one where `event` may happen.
+    fn never_again(&self, event: &Event) -> Option<u32> {
+        let allowing = self.edges.iter().filter(|edge| edge.event == *event);
+        let mut good: BTreeSet<u32> = allowing.map(|edge| edge.from).collect();
+        let mut queue: Vec<u32> = good.iter().copied().collect();
+        while let Some(state) = queue.pop() {
+            for edge in self.into.get(&state).into_iter().flatten() {
+                if good.insert(edge.from) {
+                    queue.push(edge.from);
+                }
+            }
+        }
+        (0..self.states).find(|state| !good.contains(state))
+    }
+
+    /// The first cycle of nothing but such events: where it begins, and what happens in it.
+    fn cycle(&self, such: impl Fn(&Event) -> bool) -> Option<(u32, Vec<Event>)> {
+        let next = |state| self.leaving(state).filter(|edge| such(&edge.event));
+        self.out.keys().copied().find_map(|start| {
+            let mut came: BTreeMap<u32, &GraphEdge> = BTreeMap::new();
+            let mut queue = vec![start];
+            while let Some(state) = queue.pop() {
+                for edge in next(state) {
+                    if edge.to == start {
+                        came.insert(start, edge);
+                        return Some((start, walk_back(&came, start, start)));
+                    }
+                    if !came.contains_key(&edge.to) {
+                        came.insert(edge.to, edge);
+                        queue.push(edge.to);
+                    }
+                }
+            }
+            None
+        })
+    }
+
+    /// The shortest way from the start to a state.
+    fn to(&self, goal: u32) -> Vec<Event> {
+        let mut came: BTreeMap<u32, &GraphEdge> = BTreeMap::new();
+        let mut queue = std::collections::VecDeque::from([0]);
+        while let Some(state) = queue.pop_front() {
+            for edge in self.leaving(state) {
+                if edge.to != 0 && !came.contains_key(&edge.to) {
+                    came.insert(edge.to, edge);
+                    queue.push_back(edge.to);
+                }
+            }
+        }
+        if goal == 0 { Vec::new() } else { walk_back(&came, 0, goal) }
+    }
+}
+
+/// What happens on the way from `start` to `goal`, of which each state knows the edge that led to it.
+fn walk_back(came: &BTreeMap<u32, &GraphEdge>, start: u32, goal: u32) -> Vec<Event> {
+    let mut events = Vec::new();
+    let mut state = goal;
+    while let Some(edge) = came.get(&state) {
+        events.push(edge.event.clone());
+        state = edge.from;
+        if state == start {
+            break;
+        }
+    }
+    events.reverse();
+    events
+}
