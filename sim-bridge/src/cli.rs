@@ -181,6 +181,9 @@ pub enum Bench {
         /// CPU time of each run.
         #[arg(long, value_name = "S", default_value_t = 0.5, value_parser = positive)]
         seconds: f64,
+        /// How many dine while the verifier looks at every state.
+        #[arg(long, value_name = "N", default_value_t = 12)]
+        philosophers: usize,
     },
     /// Memory and messages per node as a fleet grows, over the network in memory.
     Fleet {
