@@ -6,6 +6,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use clap::builder::RangedU64ValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::scenario::{Overrides, Scenario, ScenarioError};
@@ -210,7 +211,7 @@ pub enum Bench {
         #[arg(long, value_name = "N", default_value_t = 4000)]
         round_trips: usize,
         /// How many homes confirm a block, each in a process of its own.
-        #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(2..).map(usize::from))]
+        #[arg(long, value_name = "N", default_value_t = 10, value_parser = RangedU64ValueParser::<usize>::new().range(2..))]
         homes: usize,
         /// How many blocks are confirmed.
         #[arg(long, value_name = "N", default_value_t = 500)]
