@@ -6,6 +6,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use clap::builder::RangedU64ValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::scenario::{Overrides, Scenario, ScenarioError};
@@ -181,6 +182,9 @@ pub enum Bench {
         /// CPU time of each run.
         #[arg(long, value_name = "S", default_value_t = 0.5, value_parser = positive)]
         seconds: f64,
+        /// How many dine while the verifier looks at every state.
+        #[arg(long, value_name = "N", default_value_t = 12)]
+        philosophers: usize,
     },
     /// Memory and messages per node as a fleet grows, over the network in memory.
     Fleet {
@@ -207,7 +211,7 @@ pub enum Bench {
         #[arg(long, value_name = "N", default_value_t = 4000)]
         round_trips: usize,
         /// How many homes confirm a block, each in a process of its own.
-        #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(2..).map(usize::from))]
+        #[arg(long, value_name = "N", default_value_t = 10, value_parser = RangedU64ValueParser::<usize>::new().range(2..))]
         homes: usize,
         /// How many blocks are confirmed.
         #[arg(long, value_name = "N", default_value_t = 500)]

@@ -1,15 +1,17 @@
-//! Behavioural programs: how many events a second of one processor's time gives, beside BPpy's on the same programs.
+//! Behavioural programs: how many events a second of one processor's time gives, beside BPpy's on the same programs, and
+//! how many states a second are verified.
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use nix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use skein_bp::script::{Op, Script};
-use skein_bp::{Bid, Program, ProgramConfig};
+use skein_bp::verify::{Inspection, Verifier};
+use skein_bp::{Bid, EventSet, Program, ProgramConfig};
 
 use super::quantile::median;
 
@@ -45,8 +47,14 @@ impl<T> Figures<T> {
     }
 }
 
-pub(super) fn run(repetitions: usize, cpu_time: Duration, as_json: bool) -> anyhow::Result<()> {
+pub(super) fn run(
+    repetitions: usize,
+    cpu_time: Duration,
+    philosophers: usize,
+    as_json: bool,
+) -> anyhow::Result<()> {
     let ours = measure(repetitions, cpu_time)?;
+    let verified = verify(philosophers)?;
     let theirs = match measure_peer(repetitions, cpu_time) {
         Ok(theirs) => Some(theirs),
         Err(why) => {
@@ -65,6 +73,10 @@ pub(super) fn run(repetitions: usize, cpu_time: Duration, as_json: bool) -> anyh
             "idle_1000_events_per_s": ours.idle_1000,
             "woken_1000_events_per_s": ours.woken_1000,
             "lost_to_1000_idle": lost,
+            "philosophers": philosophers,
+            "verified_states": verified.states,
+            "verify_states_per_s": verified.states as f64 / verified.time_s,
+            "verify_states_per_cpu_s": verified.states as f64 / verified.cpu_time_s,
             "bppy_events_per_s": theirs,
             "ratio_hot_cold": ratio(|figures| figures.hot_cold),
             "ratio_idle_100": ratio(|figures| figures.idle_100),
@@ -88,6 +100,11 @@ pub(super) fn run(repetitions: usize, cpu_time: Duration, as_json: bool) -> anyh
         println!("{name:<20} {:>10.0} events per CPU second{beside}", of(&ours));
     }
     println!("1000 idle b-threads cost {:.1} %", lost * 100.0);
+    println!(
+        "{philosophers} dining philosophers: {} states verified, {:.0} a second",
+        verified.states,
+        verified.states as f64 / verified.time_s
+    );
     Ok(())
 }
 
@@ -142,6 +159,44 @@ fn events_per_s(mut program: Program, cpu_time: Duration) -> anyhow::Result<f64>
 
 fn this_threads_cpu_time() -> anyhow::Result<Duration> {
     Ok(clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID)?.into())
+}
+
+/// What the verifier did.
+struct Verified {
+    states: usize,
+    time_s: f64,
+    cpu_time_s: f64,
+}
+
+/// Looks for a deadlock at a table that has none, so at every state.
+fn verify(philosophers: usize) -> anyhow::Result<Verified> {
+    let verifier = Verifier::new(dinner(philosophers)?).inspect([Inspection::Deadlock]);
+    let (since, cpu_since) = (Instant::now(), this_processs_cpu_time()?);
+    let report = verifier.run();
+    let (time, cpu_time) = (since.elapsed(), this_processs_cpu_time()? - cpu_since);
+    anyhow::ensure!(report.verdict.is_none() && report.is_complete(), "the verifier is wrong: {report}");
+    Ok(Verified { states: report.states, time_s: time.as_secs_f64(), cpu_time_s: cpu_time.as_secs_f64() })
+}
+
+fn this_processs_cpu_time() -> anyhow::Result<Duration> {
+    Ok(clock_gettime(ClockId::CLOCK_PROCESS_CPUTIME_ID)?.into())
+}
+
+/// Philosophers between sticks; all but the first take the right one first.
+fn dinner(philosophers: usize) -> anyhow::Result<Program> {
+    let mut program = Program::new(ProgramConfig::default());
+    for i in 1..=philosophers {
+        let next = i % philosophers + 1;
+        let taken = EventSet::from([format!("take/{i}/right"), format!("take/{next}/left")]);
+        let put = EventSet::from([format!("put/{i}/right"), format!("put/{next}/left")]);
+        let lies = Bid::new().wait_for(&taken).block(&put);
+        forever(&mut program, &format!("stick {i}"), [lies, Bid::new().wait_for(put).block(taken)])?;
+        let (first, second) = if i == 1 { ("left", "right") } else { ("right", "left") };
+        let acts = [("take", first), ("take", second), ("put", second), ("put", first)];
+        let acts = acts.map(|(act, side)| Bid::new().request(format!("{act}/{i}/{side}")));
+        forever(&mut program, &format!("philosopher {i}"), acts)?;
+    }
+    Ok(program)
 }
 
 fn hot_cold(idle: usize) -> anyhow::Result<Program> {

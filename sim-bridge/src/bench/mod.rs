@@ -20,8 +20,8 @@ use crate::cli::Bench;
 /// What keeps it from being measured.
 pub fn run(what: &Bench, as_json: bool) -> anyhow::Result<()> {
     match what {
-        Bench::Bp { repetitions, seconds } => {
-            bp::run(*repetitions, Duration::from_secs_f64(*seconds), as_json)
+        Bench::Bp { repetitions, seconds, philosophers } => {
+            bp::run(*repetitions, Duration::from_secs_f64(*seconds), *philosophers, as_json)
         }
         Bench::Fleet { nodes, seconds } => fleet::run(nodes, Duration::from_secs_f64(*seconds), as_json),
         Bench::FleetOf { nodes, seconds } => fleet::run_one(*nodes, Duration::from_secs_f64(*seconds)),
