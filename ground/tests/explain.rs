@@ -271,6 +271,22 @@ fn any_ring_of_waiting_ends() {
     }
 }
 
+#[test]
+fn the_most_tangled_boards_are_explained_in_a_few_reasons() {
+    let names: Vec<String> = (1..=24).map(|number| format!("uav/{number}")).collect();
+    let tangled = |vehicle: &String| {
+        let others: Vec<String> =
+            names.iter().filter(|name| *name != vehicle).map(|name| format!("{name}#b")).collect();
+        let others: Vec<&str> = others.iter().map(String::as_str).collect();
+        let bid = ["enter", "advance", "goto", "plan"]
+            .iter()
+            .fold(Bid::new(), |bid, verb| bid.request(format!("{vehicle}/{verb}")));
+        board(vehicle, &[("b", bid.wait_for("uav/**"), &others)])
+    };
+    let explanation = of(&hovering(names.iter().map(tangled).collect()), "uav/1");
+    assert!((1..=8).contains(&explanation.changes.len()), "{explanation}");
+}
+
 /// A vehicle that flies for ten seconds and is held from then on.
 fn record(path: &Path) -> Result<Recorder, Box<dyn std::error::Error>> {
     let mut recorder = Recorder::create(path)?;

@@ -19,6 +19,8 @@ const MOST_CHANGES: usize = 8;
 const LONGEST_CHAIN: usize = 8;
 /// Of those who block one request, and of the requests that one waits for, so many are followed.
 const MOST_FOLLOWED: usize = 4;
+/// B-threads that are asked in all: boards may be as tangled as those who bid like.
+const MOST_ASKED: usize = 256;
 /// What a standing vehicle lacks first; other requests come after these.
 const FIRST: [&str; 5] = [ADVANCE, HOMEWARD, ENTER, TAKEOFF, GOTO];
 
@@ -32,6 +34,8 @@ pub(super) struct Inquiry<'a> {
     because: Vec<String>,
     /// Whose reasons have been given.
     asked: BTreeSet<Party>,
+    /// How many more may be asked.
+    left: usize,
     changes: Vec<Change>,
 }
 
@@ -50,6 +54,7 @@ impl<'a> Inquiry<'a> {
             path: Vec::new(),
             because: Vec::new(),
             asked: BTreeSet::new(),
+            left: MOST_ASKED,
             changes: Vec::new(),
         }
     }
@@ -174,18 +179,19 @@ impl<'a> Inquiry<'a> {
         if self.path.len() == LONGEST_CHAIN {
             return self.say(self.because.clone(), Vec::new());
         }
+        let Some(left) = self.left.checked_sub(1) else { return };
+        self.left = left;
         let before = self.changes.len();
-        let mut needed = Vec::new();
+        let (mut needed, mut leads_on) = (Vec::new(), false);
         self.path.push(party.clone());
         if let Some(board) = self.board(&party.node)
             && let Some(row) = board.row(&party.bthread)
         {
             self.follow_requests(party, row, &mut needed);
-            let leads_on = self.changes.len() > before;
-            if !leads_on {
+            if self.changes.len() == before {
                 self.follow_waits(party, row, &mut needed);
             }
-            let leads_on = leads_on || self.changes.len() > before;
+            leads_on = self.changes.len() > before;
             if !leads_on && needed.is_empty() {
                 needed = waits::in_words(&row.waits, self.vehicle);
             }
@@ -197,7 +203,8 @@ impl<'a> Inquiry<'a> {
         needed.extend(lease.map(|lease| {
             format!("{} is lost for {:.1} s, and its lease lapses", party.node, lease.length.as_secs_f64())
         }));
-        if !needed.is_empty() {
+        // What only leads on to others has nothing to say of its own.
+        if !(leads_on && needed.is_empty()) {
             self.say(self.because.clone(), needed);
         }
     }

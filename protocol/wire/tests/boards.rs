@@ -10,14 +10,14 @@ use proptest::prelude::*;
 use skein_bp::{Bid, Event, EventSet};
 use skein_dbp::{Board, BoardLease, BoardRow};
 use skein_wire::{Link as _, MAX_PAYLOAD, NetworkConfig, NodeLink, Payload};
-use swarm::{Always, LEASE, Swarm, TICK, name, program};
+use swarm::{Always, LEASE, Requester, Swarm, TICK, name, program};
 
 /// `uav/1` wants to advance, `ground/main` blocks that, and something of the vehicle's own that it may not.
 fn held() -> Swarm {
     let mut swarm = Swarm::new(&["uav/1", "ground/main"], NetworkConfig::default(), 1);
     let mut vehicle = program(1);
-    vehicle
-        .add("navigation", Always(Bid::new().request("uav/1/advance").wait_for("uav/1/landed").priority(10)));
+    vehicle.add("navigation", Requester::new("uav/1/advance", 1000, Duration::from_millis(100)));
+    vehicle.add("mission", Always(Bid::new().wait_for("uav/1/landed").priority(10)));
     let config = skein_dbp::NodeConfig { safety: EventSet::named("uav/1/land"), ..swarm.config("uav/1", 1) };
     swarm.start_with(config, vehicle);
     let mut ground = program(1);
@@ -33,8 +33,10 @@ fn a_blocked_request_is_on_the_board_with_its_blocker_and_the_age_of_the_lease()
     let board = swarm.node("uav/1").board();
     let navigation = board.row("navigation").unwrap();
     assert_eq!(navigation.requests[0].blocked_by, ["ground/main#hold"]);
-    assert_eq!((navigation.priority, navigation.lease), (Some(10), None));
-    assert!(navigation.waits.contains(&"uav/1/landed".into()));
+    assert_eq!(navigation.lease, None);
+    let mission = board.row("mission").unwrap();
+    assert_eq!(mission.priority, Some(10));
+    assert!(mission.waits.contains(&"uav/1/landed".into()));
     let hold = board.row("ground/main#hold").unwrap();
     // As it was asked for, not as this home honours it.
     assert_eq!(hold.blocks.to_string(), "(uav/*/advance | uav/*/land)");
@@ -45,7 +47,7 @@ fn a_blocked_request_is_on_the_board_with_its_blocker_and_the_age_of_the_lease()
     swarm.run(LEASE * 2);
     let board = swarm.node("uav/1").board();
     assert!(board.row("ground/main#hold").is_none());
-    assert!(board.row("navigation").unwrap().requests[0].blocked_by.is_empty());
+    assert!(board.row("navigation").unwrap().requests.iter().all(|request| request.blocked_by.is_empty()));
 }
 
 /// When `uav/1` puts its board in the next seconds.
@@ -71,7 +73,7 @@ fn a_board_is_told_at_once_when_something_is_newly_blocked_and_seldom_when_nothi
     let lost_at = swarm.now;
     let free = told(&mut swarm, 2);
     assert!(free.iter().any(|at| *at <= lost_at + LEASE + Duration::from_millis(300)), "{free:?}");
-    assert!(free.len() <= 3, "{free:?}");
+    assert!(free.len() <= 5, "{free:?}");
 }
 
 #[test]
