@@ -9,6 +9,7 @@ use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_ground::{Answer, Order, SentScript, Who};
 use skein_sim::scenario::Scenario;
 use skein_tests::Lockstep;
+use skein_wire::NetworkConfig;
 
 /// Files that a scenario names are those of the agent.
 const BESIDE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../agent/scripts/test.toml");
@@ -120,7 +121,13 @@ fn curfew(for_s: f64) -> SentScript {
 
 #[test]
 fn a_script_reaches_a_flying_vehicle_over_a_bad_network_and_is_taken_back() {
-    let mut lockstep = Lockstep::of(scenario(&format!("{THROUGH}\n[network]\nloss = 0.3"), 3));
+    let mut lockstep = Lockstep::of(scenario(THROUGH, 3));
+    lockstep.network.set_config(NetworkConfig {
+        loss: 0.3,
+        duplicate: 0.1,
+        reorder: 0.1,
+        ..NetworkConfig::default()
+    });
     let vehicle = lockstep.nodes[0].clone();
     let who = || Who::only(vehicle.clone());
     let answer = |lockstep: &Lockstep, id: u64| {
