@@ -11,26 +11,22 @@
 //! use skein_bp::{Bid, Program, ProgramConfig};
 //!
 //! let mut program = Program::new(ProgramConfig::default());
-//! let asks_for = |first: &str, then: &str| {
-//!     let take = |fork: &str| Op::Sync(Bid::new().request(format!("take {fork}")));
-//!     let put = |fork: &str| Op::Sync(Bid::new().request(format!("put {fork}")));
-//!     Script::new(&[Op::forever([take(first), take(then), put(first), put(then)])])
-//! };
-//! let lies = |fork: &str| {
-//!     let (take, put) = (format!("take {fork}"), format!("put {fork}"));
-//!     let free = Bid::new().wait_for(take.as_str());
-//!     let taken = Bid::new().wait_for(put).block(take);
-//!     Script::new(&[Op::forever([Op::Sync(free), Op::Sync(taken)])])
-//! };
-//! program.add("left diner", asks_for("a", "b")?);
-//! program.add("right diner", asks_for("b", "a")?);
-//! program.add("fork a", lies("a")?);
-//! program.add("fork b", lies("b")?);
+//! for (diner, first, second) in [("left", "a", "b"), ("right", "b", "a")] {
+//!     let act = |what: &str, fork: &str| Op::Sync(Bid::new().request(format!("{what}/{fork}/{diner}")));
+//!     let acts = [act("take", first), act("take", second), act("put", first), act("put", second)];
+//!     program.add(diner, Script::new(&[Op::forever(acts)])?);
+//! }
+//! for fork in ["a", "b"] {
+//!     let (take, put) = (format!("take/{fork}/*"), format!("put/{fork}/*"));
+//!     let lies = Op::Sync(Bid::new().wait_for(take.clone()));
+//!     let held = Op::Sync(Bid::new().wait_for(put).block(take));
+//!     program.add(fork, Script::new(&[Op::forever([lies, held])])?);
+//! }
 //!
 //! let report = Verifier::new(program).inspect([Inspection::Deadlock]).run();
 //! let violation = report.verdict.ok_or("no deadlock found")?;
 //! let names: Vec<_> = violation.trace.iter().map(|event| event.name()).collect();
-//! assert_eq!(names, ["take a", "take b"]);
+//! assert_eq!(names, ["take/a/left", "take/b/right"]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -46,8 +42,10 @@ mod locals;
 mod model;
 mod product;
 mod report;
+mod rows;
 mod search;
 mod store;
+mod two_threads;
 mod view;
 
 use std::fmt;
@@ -144,6 +142,13 @@ impl Verifier {
     #[must_use]
     pub fn deepest(mut self, events: u32) -> Self {
         self.limits.deepest = events;
+        self
+    }
+
+    /// How many threads may work at it; 2 unless set, and more do not help. The outcome is the same.
+    #[must_use]
+    pub fn threads(mut self, threads: usize) -> Self {
+        self.limits.threads = threads;
         self
     }
 

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use super::cycle::HotGraph;
 use super::model::{Model, Moves};
 use super::report::{Fault, Inspection, Omission, Progress, Report, Violation};
+use super::rows::hash;
 use super::store::{Arrival, MOST_STATES, START, Store};
+use super::two_threads;
 
 /// In which order states are looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,19 +28,24 @@ pub struct Limits {
     pub most_states: usize,
     /// How long the runs may be that are looked at.
     pub deepest: u32,
+    /// How many threads may work at it; more than 2 do not help, and a depth-first search needs 1. The outcome is the
+    /// same.
+    pub threads: usize,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { order: Search::BreadthFirst, most_states: MOST_STATES, deepest: u32::MAX }
+        Self { order: Search::BreadthFirst, most_states: MOST_STATES, deepest: u32::MAX, threads: 2 }
     }
 }
 
+/// How many states are looked at before a second thread is worth its while.
+const ALONE: usize = 1 << 12;
 /// How many states are looked at from one report of progress to the next.
 const PROGRESS_EVERY: usize = 1 << 15;
 
 /// Looks at every state that `model` can reach, and at its cycles, until one is at fault or a bound is reached.
-pub fn check<M: Model>(
+pub fn check<M: Model + Send>(
     model: &mut M,
     limits: &Limits,
     inspections: &[Inspection],
@@ -77,9 +84,11 @@ fn hot_cycle<M: Model>(model: &mut M, seen: &Exploration, inspections: &[Inspect
 pub(super) struct Exploration {
     pub(super) store: Store,
     limits: Limits,
-    frontier: Frontier,
+    pub(super) frontier: Frontier,
     edges: u64,
     depth: u32,
+    /// How many states were gone on from.
+    explored: usize,
     /// Moves that lead to unseen states beyond the greatest depth.
     too_deep: u64,
     pub(super) not_covered: Vec<Omission>,
@@ -88,52 +97,32 @@ pub(super) struct Exploration {
 impl Exploration {
     pub(super) fn new<M: Model>(model: &mut M, limits: &Limits) -> Self {
         let mut store = Store::new();
-        store.insert(&model.start(), Arrival { from: START, label: 0 });
+        let start = model.start();
+        store.insert(&start, hash(&start), Arrival { from: START, label: 0 });
         Self {
             store,
             limits: Limits { most_states: limits.most_states.clamp(1, MOST_STATES), ..*limits },
             frontier: Frontier::new(limits.order),
             edges: 0,
             depth: 0,
+            explored: 0,
             too_deep: 0,
             not_covered: Vec::new(),
         }
     }
 
     /// Explores until a state is at fault, and gives it.
-    pub(super) fn run<M: Model>(
+    pub(super) fn run<M: Model + Send>(
         &mut self,
         model: &mut M,
         inspections: &[Inspection],
         progress: &mut dyn FnMut(&Progress),
     ) -> Option<(u32, Fault)> {
-        let (mut moves, mut state, mut fault) = (Moves::default(), Vec::new(), None);
-        let mut explored = 0_usize;
-        while let Some((number, depth)) = self.frontier.next(self.store.len()) {
-            self.depth = self.depth.max(depth);
-            state.clear();
-            state.extend_from_slice(self.store.state(number));
-            moves.clear();
-            model.expand(&state, &mut moves);
-            explored += 1;
-            let fits = self.follow(number, depth, &moves);
-            fault = model.fault(&state, moves.is_empty(), inspections).map(|fault| (number, fault));
-            let unexplored = self.store.len() - explored;
-            if fault.is_some() {
-                if unexplored > 0 {
-                    self.not_covered.push(Omission::StoppedAtViolation { unexplored });
-                }
-                break;
-            }
-            if !fits {
-                let most_states = self.limits.most_states;
-                self.not_covered.push(Omission::StateBound { most_states, unexplored: unexplored + 1 });
-                break;
-            }
-            if explored.is_multiple_of(PROGRESS_EVERY) {
-                progress(&Progress { states: self.store.len(), edges: self.edges, unexplored, depth });
-            }
-        }
+        let fault = self.run_alone(model, inspections, progress);
+        let fault = match fault {
+            Outcome::Goes => two_threads::run(self, model, inspections, progress),
+            Outcome::Ends(fault) => fault,
+        };
         if self.too_deep > 0 {
             let Limits { deepest, .. } = self.limits;
             self.not_covered.push(Omission::DepthBound { deepest, moves: self.too_deep });
@@ -141,9 +130,74 @@ impl Exploration {
         fault
     }
 
+    /// Explores on this thread, to the end or until it is worth while to use another.
+    fn run_alone<M: Model>(
+        &mut self,
+        model: &mut M,
+        inspections: &[Inspection],
+        progress: &mut dyn FnMut(&Progress),
+    ) -> Outcome {
+        let (mut moves, mut state) = (Moves::default(), Vec::new());
+        let two_threads = self.limits.threads > 1 && self.limits.order == Search::BreadthFirst;
+        while let Some((number, depth)) = self.frontier.next(self.store.len()) {
+            state.clear();
+            state.extend_from_slice(self.store.state(number));
+            moves.clear();
+            model.expand(&state, &mut moves);
+            let fault = model.fault(&state, moves.is_empty(), inspections);
+            if let ended @ Outcome::Ends(_) = self.take_in(number, depth, moves.hashed(), fault, progress) {
+                return ended;
+            }
+            if two_threads && self.explored >= ALONE {
+                return Outcome::Goes;
+            }
+        }
+        Outcome::Ends(None)
+    }
+
+    /// How many states were gone on from.
+    pub(super) fn explored(&self) -> usize {
+        self.explored
+    }
+
+    /// Takes in what there is to a state: its moves, and its fault.
+    pub(super) fn take_in<'a>(
+        &mut self,
+        number: u32,
+        depth: u32,
+        moves: impl Iterator<Item = (u32, &'a [u32], u32)>,
+        fault: Option<Fault>,
+        progress: &mut dyn FnMut(&Progress),
+    ) -> Outcome {
+        self.explored += 1;
+        self.depth = self.depth.max(depth);
+        let fits = self.follow(number, depth, moves);
+        let unexplored = self.store.len() - self.explored;
+        if let Some(fault) = fault {
+            if unexplored > 0 {
+                self.not_covered.push(Omission::StoppedAtViolation { unexplored });
+            }
+            return Outcome::Ends(Some((number, fault)));
+        }
+        if !fits {
+            let most_states = self.limits.most_states;
+            self.not_covered.push(Omission::StateBound { most_states, unexplored: unexplored + 1 });
+            return Outcome::Ends(None);
+        }
+        if self.explored.is_multiple_of(PROGRESS_EVERY) {
+            progress(&Progress { states: self.store.len(), edges: self.edges, unexplored, depth });
+        }
+        Outcome::Goes
+    }
+
     /// Takes in the moves out of a state; false if there is no room for all.
-    fn follow(&mut self, from: u32, depth: u32, moves: &Moves) -> bool {
-        for (label, target) in moves.iter() {
+    fn follow<'a>(
+        &mut self,
+        from: u32,
+        depth: u32,
+        moves: impl Iterator<Item = (u32, &'a [u32], u32)>,
+    ) -> bool {
+        for (label, target, hash) in moves {
             let full = self.store.len() >= self.limits.most_states;
             if (full || depth >= self.limits.deepest) && self.store.find(target).is_none() {
                 if full {
@@ -153,7 +207,7 @@ impl Exploration {
                 continue;
             }
             self.edges += 1;
-            if let Some(number) = self.store.insert(target, Arrival { from, label }) {
+            if let Some(number) = self.store.insert(target, hash, Arrival { from, label }) {
                 self.frontier.add(number, depth + 1);
             }
         }
@@ -162,9 +216,18 @@ impl Exploration {
     }
 }
 
+/// How a search stands.
+#[derive(Debug)]
+pub(super) enum Outcome {
+    /// There may be more to look at.
+    Goes,
+    /// It is over, with a state at fault or without.
+    Ends(Option<(u32, Fault)>),
+}
+
 /// The states to look at next.
 #[derive(Debug)]
-enum Frontier {
+pub(super) enum Frontier {
     /// All in the order of their numbers.
     Queue { next: u32, depth: u32, level_end: u32 },
     /// The latest first, with their depths; those of one state in the order of its moves.
@@ -180,7 +243,7 @@ impl Frontier {
     }
 
     /// The number and depth of the next state, of so many known.
-    fn next(&mut self, known: usize) -> Option<(u32, u32)> {
+    pub(super) fn next(&mut self, known: usize) -> Option<(u32, u32)> {
         match self {
             Self::Queue { next, depth, level_end } => {
                 if *next as usize >= known {
