@@ -55,6 +55,7 @@ mod peers;
 mod stalls;
 mod stream;
 mod table;
+pub mod verify;
 
 pub use config::NodeConfig;
 pub use explain::NodeExplanation;

@@ -9,21 +9,21 @@ use crate::{BidAck, BidRecord, NodeName, Refusal, RemoteBid};
 #[derive(Clone, Debug)]
 pub(crate) struct Outbox {
     /// The home's incarnation, once it is known.
-    home_incarnation: Option<u64>,
+    pub(crate) home_incarnation: Option<u64>,
     /// Number of the present content; 0 before the first.
-    epoch: u64,
-    bids: Vec<RemoteBid>,
+    pub(crate) epoch: u64,
+    pub(crate) bids: Vec<RemoteBid>,
     /// For each b-thread, its synchronisation point and the epoch in which that came in.
-    since: BTreeMap<String, (u64, u64)>,
+    pub(crate) since: BTreeMap<String, (u64, u64)>,
     /// Requests that a former life of the home may have served: the synchronisation point not to be asked for again.
-    unknown: BTreeMap<String, u64>,
+    pub(crate) unknown: BTreeMap<String, u64>,
     /// What the home did not honour of the content it acknowledged last.
-    refused: Vec<Refusal>,
-    acked_epoch: u64,
+    pub(crate) refused: Vec<Refusal>,
+    pub(crate) acked_epoch: u64,
     /// When the last acknowledged copy was sent.
-    acked_sent_at: Duration,
+    pub(crate) acked_sent_at: Duration,
     /// When the last copy was sent; none of the present content yet.
-    sent_at: Option<Duration>,
+    pub(crate) sent_at: Option<Duration>,
 }
 
 /// Who bids.

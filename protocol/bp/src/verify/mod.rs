@@ -58,6 +58,7 @@ pub use interner::Interner;
 pub use model::{Model, Moves};
 use product::Product;
 pub use report::{Fault, Inspection, Omission, Progress, Report, Violation, ViolationKind};
+use search::check_by_two;
 pub use search::{Limits, Search, check};
 pub use view::View;
 
@@ -86,6 +87,7 @@ pub struct Verifier {
     program: Program,
     inspections: Vec<Inspection>,
     limits: Limits,
+    threads: usize,
     timers: Timers,
     feed: Vec<Event>,
     invariants: Vec<Invariant>,
@@ -99,6 +101,7 @@ impl Verifier {
             program,
             inspections: Inspection::USUAL.to_vec(),
             limits: Limits::default(),
+            threads: 2,
             timers: Timers::default(),
             feed: Vec::new(),
             invariants: Vec::new(),
@@ -148,7 +151,7 @@ impl Verifier {
     /// How many threads may work at it; 2 unless set, and more do not help. The outcome is the same.
     #[must_use]
     pub fn threads(mut self, threads: usize) -> Self {
-        self.limits.threads = threads;
+        self.threads = threads;
         self
     }
 
@@ -176,11 +179,9 @@ impl Verifier {
 
     /// Looks at every state until a violation is found or a bound is reached.
     pub fn run(mut self) -> Report {
-        let mut product = self.product(false);
-        let mut report = check(&mut product, &self.limits, &self.inspections, &mut self.on_progress);
+        let (mut report, mut product) = self.check(false);
         if product.order_is_lost() {
-            product = self.product(true);
-            report = check(&mut product, &self.limits, &self.inspections, &mut self.on_progress);
+            (report, product) = self.check(true);
         }
         let waiting = product.unfired_deadlines();
         if !waiting.is_empty() {
@@ -188,6 +189,16 @@ impl Verifier {
             report.not_covered.push(Omission::NotModelled { what });
         }
         report
+    }
+
+    fn check(&mut self, in_order: bool) -> (Report, Product) {
+        let mut product = self.product(in_order);
+        let Self { limits, inspections, on_progress, threads, .. } = self;
+        let report = match threads {
+            0 | 1 => check(&mut product, limits, inspections, on_progress),
+            _ => check_by_two(&mut product, limits, inspections, on_progress),
+        };
+        (report, product)
     }
 
     /// The graph of all states within the bounds, violations or not.
@@ -209,11 +220,12 @@ impl Verifier {
 
 impl fmt::Debug for Verifier {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { program, inspections, limits, timers, feed, invariants, .. } = self;
+        let Self { program, inspections, limits, threads, timers, feed, invariants, .. } = self;
         f.debug_struct("Verifier")
             .field("program", program)
             .field("inspections", inspections)
             .field("limits", limits)
+            .field("threads", threads)
             .field("timers", timers)
             .field("feed", feed)
             .field("invariants", invariants)

@@ -28,14 +28,11 @@ pub struct Limits {
     pub most_states: usize,
     /// How long the runs may be that are looked at.
     pub deepest: u32,
-    /// How many threads may work at it; more than 2 do not help, and a depth-first search needs 1. The outcome is the
-    /// same.
-    pub threads: usize,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { order: Search::BreadthFirst, most_states: MOST_STATES, deepest: u32::MAX, threads: 2 }
+        Self { order: Search::BreadthFirst, most_states: MOST_STATES, deepest: u32::MAX }
     }
 }
 
@@ -45,7 +42,7 @@ const ALONE: usize = 1 << 12;
 const PROGRESS_EVERY: usize = 1 << 15;
 
 /// Looks at every state that `model` can reach, and at its cycles, until one is at fault or a bound is reached.
-pub fn check<M: Model + Send>(
+pub fn check<M: Model>(
     model: &mut M,
     limits: &Limits,
     inspections: &[Inspection],
@@ -53,30 +50,35 @@ pub fn check<M: Model + Send>(
 ) -> Report {
     let mut seen = Exploration::new(model, limits);
     let fault = seen.run(model, inspections, progress);
-    let verdict = match fault {
-        Some((number, Fault { kind, violators })) => {
-            let trace = seen.store.path(number).into_iter().map(|label| model.event(label)).collect();
-            Some(Violation { kind, violators, trace, cycle_length: None })
-        }
-        None => hot_cycle(model, &seen, inspections),
-    };
-    Report {
-        verdict,
-        states: seen.store.len(),
-        edges: seen.edges,
-        depth: seen.depth,
-        not_covered: seen.not_covered,
-    }
+    seen.report(model, fault, inspections)
 }
 
-fn hot_cycle<M: Model>(model: &mut M, seen: &Exploration, inspections: &[Inspection]) -> Option<Violation> {
+/// The same by two threads, where they help. The outcome is the same.
+pub(super) fn check_by_two<M: Model + Send>(
+    model: &mut M,
+    limits: &Limits,
+    inspections: &[Inspection],
+    progress: &mut dyn FnMut(&Progress),
+) -> Report {
+    let mut seen = Exploration::new(model, limits);
+    let fault = match seen.run_alone(model, inspections, progress, ALONE) {
+        Outcome::Goes if limits.order == Search::BreadthFirst => {
+            two_threads::run(&mut seen, model, inspections, progress)
+        }
+        Outcome::Goes => seen.run(model, inspections, progress),
+        Outcome::Ends(fault) => fault,
+    };
+    seen.report(model, fault, inspections)
+}
+
+fn hot_cycle<M: Model>(model: &mut M, store: &Store, inspections: &[Inspection]) -> Option<Violation> {
     let is_cycles = |inspection: &&Inspection| {
         matches!(inspection, Inspection::HotBThread | Inspection::HotRun(_) | Inspection::HotSystem)
     };
     let mut asked = inspections.iter().filter(is_cycles).peekable();
     asked.peek()?;
-    let graph = HotGraph::of(model, &seen.store);
-    asked.find_map(|inspection| graph.violation(model, &seen.store, inspection))
+    let graph = HotGraph::of(model, store);
+    asked.find_map(|inspection| graph.violation(model, store, inspection))
 }
 
 /// What has been seen so far.
@@ -91,7 +93,7 @@ pub(super) struct Exploration {
     explored: usize,
     /// Moves that lead to unseen states beyond the greatest depth.
     too_deep: u64,
-    pub(super) not_covered: Vec<Omission>,
+    not_covered: Vec<Omission>,
 }
 
 impl Exploration {
@@ -112,33 +114,27 @@ impl Exploration {
     }
 
     /// Explores until a state is at fault, and gives it.
-    pub(super) fn run<M: Model + Send>(
+    pub(super) fn run<M: Model>(
         &mut self,
         model: &mut M,
         inspections: &[Inspection],
         progress: &mut dyn FnMut(&Progress),
     ) -> Option<(u32, Fault)> {
-        let fault = self.run_alone(model, inspections, progress);
-        let fault = match fault {
-            Outcome::Goes => two_threads::run(self, model, inspections, progress),
+        match self.run_alone(model, inspections, progress, usize::MAX) {
+            Outcome::Goes => None,
             Outcome::Ends(fault) => fault,
-        };
-        if self.too_deep > 0 {
-            let Limits { deepest, .. } = self.limits;
-            self.not_covered.push(Omission::DepthBound { deepest, moves: self.too_deep });
         }
-        fault
     }
 
-    /// Explores on this thread, to the end or until it is worth while to use another.
+    /// Explores until a state is at fault, or so many were looked at.
     fn run_alone<M: Model>(
         &mut self,
         model: &mut M,
         inspections: &[Inspection],
         progress: &mut dyn FnMut(&Progress),
+        most: usize,
     ) -> Outcome {
         let (mut moves, mut state) = (Moves::default(), Vec::new());
-        let two_threads = self.limits.threads > 1 && self.limits.order == Search::BreadthFirst;
         while let Some((number, depth)) = self.frontier.next(self.store.len()) {
             state.clear();
             state.extend_from_slice(self.store.state(number));
@@ -148,11 +144,37 @@ impl Exploration {
             if let ended @ Outcome::Ends(_) = self.take_in(number, depth, moves.hashed(), fault, progress) {
                 return ended;
             }
-            if two_threads && self.explored >= ALONE {
+            if self.explored >= most {
                 return Outcome::Goes;
             }
         }
         Outcome::Ends(None)
+    }
+
+    fn report<M: Model>(
+        mut self,
+        model: &mut M,
+        fault: Option<(u32, Fault)>,
+        inspections: &[Inspection],
+    ) -> Report {
+        let verdict = match fault {
+            Some((number, Fault { kind, violators })) => {
+                let trace = self.store.path(number).into_iter().map(|label| model.event(label)).collect();
+                Some(Violation { kind, violators, trace, cycle_length: None })
+            }
+            None => hot_cycle(model, &self.store, inspections),
+        };
+        let not_covered = self.take_not_covered();
+        Report { verdict, states: self.store.len(), edges: self.edges, depth: self.depth, not_covered }
+    }
+
+    /// What was not looked at.
+    pub(super) fn take_not_covered(&mut self) -> Vec<Omission> {
+        let mut not_covered = std::mem::take(&mut self.not_covered);
+        if self.too_deep > 0 {
+            not_covered.push(Omission::DepthBound { deepest: self.limits.deepest, moves: self.too_deep });
+        }
+        not_covered
     }
 
     /// How many states were gone on from.
