@@ -53,6 +53,32 @@ fn dining_philosophers_have_the_known_graph_and_starve_when_each_has_one_stick()
     }
 }
 
+#[test]
+fn two_threads_find_what_one_finds() {
+    let bounds = [(usize::MAX, u32::MAX), (9_000, u32::MAX), (usize::MAX, 15)];
+    for (inspections, (most_states, deepest)) in [vec![], vec![Inspection::Deadlock]]
+        .into_iter()
+        .flat_map(|i| bounds.map(|bounds| (i.clone(), bounds)))
+    {
+        let run = |threads| {
+            let verifier = Verifier::new(philosophers(8)).inspect(inspections.clone()).threads(threads);
+            verifier.most_states(most_states).deepest(deepest).run()
+        };
+        assert_eq!(run(2), run(1), "{most_states} states, {deepest} deep");
+    }
+    // Late enough to be found by the other thread.
+    let late = |threads| {
+        let mut program = philosophers(8);
+        program.add(
+            "counts",
+            Script::new(&[Op::repeat(16, [wait(EventSet::All)]), Op::AssertFail("late".into())]).unwrap(),
+        );
+        Verifier::new(program).inspect([Inspection::FailedAssertion]).threads(threads).run()
+    };
+    assert_eq!(late(1).verdict.as_ref().unwrap().trace.len(), 16);
+    assert_eq!(late(2), late(1));
+}
+
 const LINES: [[(i32, i32); 3]; 8] = [
     [(0, 0), (0, 1), (0, 2)],
     [(1, 0), (1, 1), (1, 2)],
@@ -120,7 +146,8 @@ fn tic_tac_toe() -> Program {
         }
     }
     // Two X that could make a fork, and the corners or sides that spoil it.
-    let forks: [([(i32, i32); 2], &[(i32, i32)]); 13] = [
+    type Square = (i32, i32);
+    let forks: [([Square; 2], &[Square]); 13] = [
         ([(1, 2), (2, 0)], &[(2, 2), (0, 2), (2, 0)]),
         ([(2, 1), (0, 2)], &[(2, 2), (0, 2), (2, 0)]),
         ([(1, 2), (2, 1)], &[(2, 2), (0, 2), (2, 0)]),

@@ -7,16 +7,16 @@ use crate::NodeName;
 
 /// Every local b-thread whose block concerns other homes.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct HeldBlocks(BTreeMap<String, HeldBlock>);
+pub(crate) struct HeldBlocks(pub(crate) BTreeMap<String, HeldBlock>);
 
 /// One b-thread's block.
 #[derive(Clone, Debug)]
-struct HeldBlock {
-    sync: u64,
+pub(crate) struct HeldBlock {
+    pub(crate) sync: u64,
     /// The homes that it concerns.
-    homes: Vec<NodeName>,
+    pub(crate) homes: Vec<NodeName>,
     /// Whether its holder was told that it holds everywhere.
-    confirmed: bool,
+    pub(crate) confirmed: bool,
 }
 
 /// What a holder is to be told.

@@ -62,6 +62,7 @@ mod roster;
 mod stalls;
 mod stream;
 mod table;
+pub mod verify;
 
 pub use authority::{Authority, Grant, Role, SCRIPT};
 pub use board::{Board, BoardLease, BoardRequest, BoardRow};

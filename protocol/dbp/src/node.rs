@@ -5,12 +5,13 @@ mod deciding;
 mod receiving;
 mod running;
 mod sending;
+mod standing;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-use skein_bp::{Bid, Event, EventSet, Origin, Program, ProgramError};
+use skein_bp::{Bid, Event, EventSet, Origin, Program, ProgramError, Selection};
 
 use crate::explain::NodeExplanation;
 use crate::facts::{self, count, tell};
@@ -145,6 +146,10 @@ pub struct Node {
     selections: Vec<Happened>,
     stats: NodeStats,
 }
+
+/// Takes the next step of a program that has been told all: selects an event, or finds that there is none to select.
+pub(crate) type Select<'a> =
+    dyn FnMut(&mut Program, Duration) -> Result<Option<Selection>, ProgramError> + 'a;
 
 /// What the program is to be told before it goes on.
 #[derive(Clone, Debug)]
@@ -285,9 +290,14 @@ impl Node {
     /// # Errors
     /// When the program fails or does not settle, or breaks the rule of one home. The node can go on after any of them.
     pub fn step(&mut self, now: Duration) -> Result<(), NodeError> {
+        self.step_by(now, &mut |program, now| program.step(now))
+    }
+
+    /// The same, with every selection made by `select`.
+    pub(crate) fn step_by(&mut self, now: Duration, select: &mut Select<'_>) -> Result<(), NodeError> {
         self.set_clock(now);
         self.let_go_of_the_lapsed();
-        let outcome = self.run();
+        let outcome = self.run(select);
         self.send_what_is_due();
         outcome
     }

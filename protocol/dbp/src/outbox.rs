@@ -9,23 +9,23 @@ use crate::{BidAck, BidRecord, NodeName, OnLoss, Refusal, RemoteBid};
 #[derive(Clone, Debug)]
 pub(crate) struct Outbox {
     /// The home's incarnation, once it is known.
-    home_incarnation: Option<u64>,
+    pub(crate) home_incarnation: Option<u64>,
     /// Number of the present content; 0 before the first.
-    epoch: u64,
-    bids: Vec<RemoteBid>,
+    pub(crate) epoch: u64,
+    pub(crate) bids: Vec<RemoteBid>,
     /// For each b-thread, its synchronisation point and the epoch in which that came in.
-    since: BTreeMap<String, (u64, u64)>,
+    pub(crate) since: BTreeMap<String, (u64, u64)>,
     /// Requests that a former life of the home may have served: the synchronisation point not to be asked for again.
-    unknown: BTreeMap<String, u64>,
+    pub(crate) unknown: BTreeMap<String, u64>,
     /// What the home did not honour of the content it acknowledged last.
-    refused: Vec<Refusal>,
+    pub(crate) refused: Vec<Refusal>,
     /// Blocks that the home keeps even without renewal: for each b-thread, its synchronisation point (G5).
-    durable: BTreeMap<String, u64>,
-    acked_epoch: u64,
+    pub(crate) durable: BTreeMap<String, u64>,
+    pub(crate) acked_epoch: u64,
     /// When the last acknowledged copy was sent.
-    acked_sent_at: Duration,
+    pub(crate) acked_sent_at: Duration,
     /// When the last copy was sent; none of the present content yet.
-    sent_at: Option<Duration>,
+    pub(crate) sent_at: Option<Duration>,
 }
 
 /// Who bids.
@@ -71,8 +71,28 @@ impl Outbox {
         }
         bids.retain(|bid| !bid.requests.is_empty() || !bid.block.is_none());
         if bids != self.bids {
+            self.carry_blocks_over(&bids);
             self.bids = bids;
             self.renew_content();
+        }
+    }
+
+    /// A b-thread that moves on with its block, or with less of it, goes on holding what the home has acknowledged.
+    fn carry_blocks_over(&mut self, next: &[RemoteBid]) {
+        for new in next.iter().filter(|new| !new.block.is_none()) {
+            let old = self.bids.iter().find(|old| old.bthread == new.bthread && old.on_loss == new.on_loss);
+            let Some(old) = old.filter(|old| old.sync != new.sync && new.block.is_within(&old.block)) else {
+                continue;
+            };
+            if self.block_refused(&old.bthread, old.sync) {
+                continue;
+            }
+            if let Some((sync, _)) = self.since.get_mut(&new.bthread) {
+                *sync = new.sync;
+            }
+            if let Some(sync) = self.durable.get_mut(&new.bthread) {
+                *sync = new.sync;
+            }
         }
     }
 

@@ -75,6 +75,13 @@ impl Peers {
         self.0.get(node)?.incarnation
     }
 
+    /// Takes a peer to have been silent since the start of time.
+    pub(crate) fn silence(&mut self, node: &NodeName) {
+        if let Some(peer) = self.0.get_mut(node) {
+            peer.last_word = peer.last_word.map(|_| Duration::ZERO);
+        }
+    }
+
     /// Takes over the lease that a peer has announced.
     pub(crate) fn set_lease(&mut self, node: &NodeName, lease: Duration) {
         if let Some(peer) = self.0.get_mut(node) {

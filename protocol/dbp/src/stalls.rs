@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Who blocks what, by the event's name and the proxy's.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Stalls(BTreeMap<String, BTreeSet<String>>);
+pub(crate) struct Stalls(pub(crate) BTreeMap<String, BTreeSet<String>>);
 
 /// What is to be told.
 #[derive(Clone, Debug, PartialEq, Eq)]

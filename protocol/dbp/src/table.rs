@@ -79,49 +79,49 @@ impl TakenIn {
 pub(crate) struct BidTable {
     incarnation: u64,
     rights: Rights,
-    bidders: BTreeMap<NodeName, Bidder>,
+    pub(crate) bidders: BTreeMap<NodeName, Bidder>,
     /// Whether the blocks to be kept have changed since they were last taken to be saved.
     unsaved: bool,
 }
 
 /// One node's bids in one of its lives.
 #[derive(Clone, Debug, Default)]
-struct Bidder {
-    incarnation: u64,
-    epoch: u64,
-    sent_at: Duration,
+pub(crate) struct Bidder {
+    pub(crate) incarnation: u64,
+    pub(crate) epoch: u64,
+    pub(crate) sent_at: Duration,
     /// When the newest copy arrived, on this home's clock.
-    heard_at: Duration,
-    lease: Duration,
+    pub(crate) heard_at: Duration,
+    pub(crate) lease: Duration,
     /// Whether the lease runs.
-    live: bool,
+    pub(crate) live: bool,
     /// Whether one of its records was made for this home's present life.
-    knows_this_life: bool,
-    bids: BTreeMap<String, TakenBid>,
+    pub(crate) knows_this_life: bool,
+    pub(crate) bids: BTreeMap<String, TakenBid>,
     /// The b-threads whose blocks lapsed with the lease, until the next record.
-    released: BTreeSet<String>,
+    pub(crate) released: BTreeSet<String>,
     /// Highest synchronisation point of each b-thread at which a request was served (G4).
-    served: BTreeMap<String, u64>,
-    refused: Vec<Refusal>,
+    pub(crate) served: BTreeMap<String, u64>,
+    pub(crate) refused: Vec<Refusal>,
     /// Blocks that an authority has lifted: for each b-thread, up to which synchronisation point.
-    lifted: BTreeMap<String, u64>,
+    pub(crate) lifted: BTreeMap<String, u64>,
 }
 
 /// One bid, as far as it is honoured.
 #[derive(Clone, Debug, PartialEq)]
-struct TakenBid {
-    sync: u64,
-    requests: Vec<Event>,
-    block: EventSet,
+pub(crate) struct TakenBid {
+    pub(crate) sync: u64,
+    pub(crate) requests: Vec<Event>,
+    pub(crate) block: EventSet,
     /// The block as it was asked for, of which this home honours its own part.
-    asked_block: EventSet,
-    priority: Option<i32>,
+    pub(crate) asked_block: EventSet,
+    pub(crate) priority: Option<i32>,
     /// Whether the requests may still be served.
-    open: bool,
+    pub(crate) open: bool,
     /// Whether the block outlives its holder.
-    keep: bool,
+    pub(crate) keep: bool,
     /// Whether it is left over from a life of its node that has ended, so that only an authority can lift it.
-    orphaned: bool,
+    pub(crate) orphaned: bool,
 }
 
 /// A remote b-thread that stands behind a proxy.

@@ -59,7 +59,7 @@ impl Graph {
     pub(super) fn of(product: &mut Product, limits: &Limits, progress: &mut dyn FnMut(&Progress)) -> Self {
         let mut seen = Exploration::new(product, limits);
         seen.run(product, &[], progress);
-        let mut graph = Self { states: Vec::new(), edges: Vec::new(), not_covered: seen.not_covered };
+        let mut graph = Self { states: Vec::new(), edges: Vec::new(), not_covered: seen.take_not_covered() };
         let mut moves = Moves::default();
         for from in 0..seen.store.len() as u32 {
             let state = seen.store.state(from);

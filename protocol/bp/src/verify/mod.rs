@@ -11,26 +11,22 @@
 //! use skein_bp::{Bid, Program, ProgramConfig};
 //!
 //! let mut program = Program::new(ProgramConfig::default());
-//! let asks_for = |first: &str, then: &str| {
-//!     let take = |fork: &str| Op::Sync(Bid::new().request(format!("take {fork}")));
-//!     let put = |fork: &str| Op::Sync(Bid::new().request(format!("put {fork}")));
-//!     Script::new(&[Op::forever([take(first), take(then), put(first), put(then)])])
-//! };
-//! let lies = |fork: &str| {
-//!     let (take, put) = (format!("take {fork}"), format!("put {fork}"));
-//!     let free = Bid::new().wait_for(take.as_str());
-//!     let taken = Bid::new().wait_for(put).block(take);
-//!     Script::new(&[Op::forever([Op::Sync(free), Op::Sync(taken)])])
-//! };
-//! program.add("left diner", asks_for("a", "b")?);
-//! program.add("right diner", asks_for("b", "a")?);
-//! program.add("fork a", lies("a")?);
-//! program.add("fork b", lies("b")?);
+//! for (diner, first, second) in [("left", "a", "b"), ("right", "b", "a")] {
+//!     let act = |what: &str, fork: &str| Op::Sync(Bid::new().request(format!("{what}/{fork}/{diner}")));
+//!     let acts = [act("take", first), act("take", second), act("put", first), act("put", second)];
+//!     program.add(diner, Script::new(&[Op::forever(acts)])?);
+//! }
+//! for fork in ["a", "b"] {
+//!     let (take, put) = (format!("take/{fork}/*"), format!("put/{fork}/*"));
+//!     let lies = Op::Sync(Bid::new().wait_for(take.clone()));
+//!     let held = Op::Sync(Bid::new().wait_for(put).block(take));
+//!     program.add(fork, Script::new(&[Op::forever([lies, held])])?);
+//! }
 //!
 //! let report = Verifier::new(program).inspect([Inspection::Deadlock]).run();
 //! let violation = report.verdict.ok_or("no deadlock found")?;
 //! let names: Vec<_> = violation.trace.iter().map(|event| event.name()).collect();
-//! assert_eq!(names, ["take a", "take b"]);
+//! assert_eq!(names, ["take/a/left", "take/b/right"]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -46,8 +42,10 @@ mod locals;
 mod model;
 mod product;
 mod report;
+mod rows;
 mod search;
 mod store;
+mod two_threads;
 mod view;
 
 use std::fmt;
@@ -60,6 +58,7 @@ pub use interner::Interner;
 pub use model::{Model, Moves};
 use product::Product;
 pub use report::{Fault, Inspection, Omission, Progress, Report, Violation, ViolationKind};
+use search::check_by_two;
 pub use search::{Limits, Search, check};
 pub use view::View;
 
@@ -88,6 +87,7 @@ pub struct Verifier {
     program: Program,
     inspections: Vec<Inspection>,
     limits: Limits,
+    threads: usize,
     timers: Timers,
     feed: Vec<Event>,
     invariants: Vec<Invariant>,
@@ -101,6 +101,7 @@ impl Verifier {
             program,
             inspections: Inspection::USUAL.to_vec(),
             limits: Limits::default(),
+            threads: 2,
             timers: Timers::default(),
             feed: Vec::new(),
             invariants: Vec::new(),
@@ -147,6 +148,13 @@ impl Verifier {
         self
     }
 
+    /// How many threads may work at it; 2 unless set, and more do not help. The outcome is the same.
+    #[must_use]
+    pub fn threads(mut self, threads: usize) -> Self {
+        self.threads = threads;
+        self
+    }
+
     /// What becomes of deadlines.
     #[must_use]
     pub fn timers(mut self, timers: Timers) -> Self {
@@ -171,11 +179,9 @@ impl Verifier {
 
     /// Looks at every state until a violation is found or a bound is reached.
     pub fn run(mut self) -> Report {
-        let mut product = self.product(false);
-        let mut report = check(&mut product, &self.limits, &self.inspections, &mut self.on_progress);
+        let (mut report, mut product) = self.check(false);
         if product.order_is_lost() {
-            product = self.product(true);
-            report = check(&mut product, &self.limits, &self.inspections, &mut self.on_progress);
+            (report, product) = self.check(true);
         }
         let waiting = product.unfired_deadlines();
         if !waiting.is_empty() {
@@ -183,6 +189,16 @@ impl Verifier {
             report.not_covered.push(Omission::NotModelled { what });
         }
         report
+    }
+
+    fn check(&mut self, in_order: bool) -> (Report, Product) {
+        let mut product = self.product(in_order);
+        let Self { limits, inspections, on_progress, threads, .. } = self;
+        let report = match threads {
+            0 | 1 => check(&mut product, limits, inspections, on_progress),
+            _ => check_by_two(&mut product, limits, inspections, on_progress),
+        };
+        (report, product)
     }
 
     /// The graph of all states within the bounds, violations or not.
@@ -204,11 +220,12 @@ impl Verifier {
 
 impl fmt::Debug for Verifier {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { program, inspections, limits, timers, feed, invariants, .. } = self;
+        let Self { program, inspections, limits, threads, timers, feed, invariants, .. } = self;
         f.debug_struct("Verifier")
             .field("program", program)
             .field("inspections", inspections)
             .field("limits", limits)
+            .field("threads", threads)
             .field("timers", timers)
             .field("feed", feed)
             .field("invariants", invariants)

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::rows::{Rows, hash};
 use super::{Fault, Inspection};
 use crate::event::Event;
 
@@ -30,21 +31,39 @@ pub trait Model {
     fn event(&self, label: u32) -> Event;
 }
 
-/// The moves out of one state: labels, and the states they lead to.
+/// Moves: labels, and the states they lead to.
 #[derive(Clone, Debug, Default)]
 pub struct Moves {
     labels: Vec<u32>,
-    /// Where each target ends in `words`.
-    ends: Vec<usize>,
-    words: Vec<u32>,
+    targets: Rows,
+    hashes: Vec<u32>,
 }
 
 impl Moves {
     /// Adds a move to the state `target`.
     pub fn push(&mut self, label: u32, target: impl IntoIterator<Item = u32>) {
         self.labels.push(label);
-        self.words.extend(target);
-        self.ends.push(self.words.len());
+        self.targets.words.extend(target);
+        self.close();
+    }
+
+    /// Adds a move to a state that differs from `state` only in these places.
+    pub fn push_changed(
+        &mut self,
+        label: u32,
+        state: &[u32],
+        changes: impl IntoIterator<Item = (usize, u32)>,
+    ) {
+        self.labels.push(label);
+        let start = self.targets.words.len();
+        self.targets.words.extend_from_slice(state);
+        let target = self.targets.words.get_mut(start..).unwrap_or_default();
+        for (at, word) in changes {
+            if let Some(place) = target.get_mut(at) {
+                *place = word;
+            }
+        }
+        self.close();
     }
 
     /// How many moves there are.
@@ -59,15 +78,28 @@ impl Moves {
 
     /// Label and target of each move, in the order in which they were added.
     pub fn iter(&self) -> impl Iterator<Item = (u32, &[u32])> {
-        let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        let targets =
-            starts.zip(&self.ends).map(|(start, end)| self.words.get(start..*end).unwrap_or_default());
-        self.labels.iter().copied().zip(targets)
+        self.hashed().map(|(label, target, _)| (label, target))
+    }
+
+    /// Label and target of each move with the target's hash.
+    pub(super) fn hashed(&self) -> impl Iterator<Item = (u32, &[u32], u32)> {
+        let targets = (0..self.labels.len()).map(|at| self.targets.get(at));
+        self.labels
+            .iter()
+            .zip(targets)
+            .zip(&self.hashes)
+            .map(|((label, target), hash)| (*label, target, *hash))
     }
 
     pub(super) fn clear(&mut self) {
         self.labels.clear();
-        self.ends.clear();
-        self.words.clear();
+        self.targets.clear();
+        self.hashes.clear();
+    }
+
+    fn close(&mut self) {
+        self.targets.close();
+        let target = self.targets.get(self.targets.len() - 1);
+        self.hashes.push(hash(target));
     }
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::interner::Interner;
-use super::locals::{Cause, ENDED, Kind, Local, LocalId, Locals, Rules};
+use super::locals::{Cause, ENDED, Kind, Local, Locals, Rules};
 use super::model::{Model, Moves};
 use super::{Fault, Inspection, Invariant, Timers, View, ViolationKind};
 use crate::event::Event;
@@ -63,9 +63,10 @@ struct Beside {
 struct Scratch {
     blocked: Vec<u64>,
     open: Vec<u64>,
-    /// Positions in the row that an event moves.
+    /// Places in the row that an event moves.
     movers: Vec<usize>,
-    targets: Vec<LocalId>,
+    movers_by_event: Vec<Vec<usize>>,
+    changes: Vec<(usize, u32)>,
 }
 
 impl Product {
@@ -229,37 +230,74 @@ impl Product {
 
     /// Adds the move of an internal event, or of the external one at a position in the queue.
     fn select(&mut self, state: &[u32], event: u32, external: Option<usize>, moves: &mut Moves) {
-        let mut scratch = std::mem::take(&mut self.scratch);
-        scratch.movers.clear();
-        scratch.targets.clear();
-        let (mut plain, mut effects) = (true, 0);
+        let mut movers = std::mem::take(&mut self.scratch.movers);
+        movers.clear();
         for (at, id) in state.iter().enumerate().skip(1) {
             if has(self.locals.bits(*id, Kind::Wakes), event) {
-                let outcome = self.locals.outcome(*id, Cause::Event(event));
-                plain &= outcome.plain;
-                effects += usize::from(!outcome.plain);
-                scratch.movers.push(at);
-                scratch.targets.push(outcome.next);
+                movers.push(at);
             }
         }
+        self.happen(state, event, external, &movers, moves);
+        self.scratch.movers = movers;
+    }
+
+    /// Adds the move of each event in `scratch.open`.
+    fn select_open(&mut self, state: &[u32], moves: &mut Moves) {
+        let mut by_event = std::mem::take(&mut self.scratch.movers_by_event);
+        by_event.resize_with(by_event.len().max(self.locals.events.len()), Vec::new);
+        let open = std::mem::take(&mut self.scratch.open);
+        for (at, id) in state.iter().enumerate().skip(1) {
+            for (word, (wakes, open)) in self.locals.bits(*id, Kind::Wakes).iter().zip(&open).enumerate() {
+                for event in ones(wakes & open) {
+                    if let Some(movers) = by_event.get_mut(word * 64 + event) {
+                        movers.push(at);
+                    }
+                }
+            }
+        }
+        for (word, open) in open.iter().enumerate() {
+            for event in ones(*open) {
+                let event = word * 64 + event;
+                if let Some(movers) = by_event.get_mut(event) {
+                    self.happen(state, event as u32, None, movers, moves);
+                    movers.clear();
+                }
+            }
+        }
+        self.scratch.movers_by_event = by_event;
+        self.scratch.open = open;
+    }
+
+    /// Adds the move of an event that moves those at these places of the row.
+    fn happen(
+        &mut self,
+        state: &[u32],
+        event: u32,
+        external: Option<usize>,
+        movers: &[usize],
+        moves: &mut Moves,
+    ) {
+        let mut changes = std::mem::take(&mut self.scratch.changes);
+        changes.clear();
+        let (mut effects, mut ended) = (0, false);
+        for at in movers {
+            let id = state.get(*at).copied().unwrap_or(ENDED);
+            let outcome = self.locals.outcome(id, Cause::Event(event));
+            effects += usize::from(!outcome.plain);
+            ended |= outcome.next == ENDED;
+            changes.push((*at, outcome.next));
+        }
         self.order.matters |= effects > 1;
-        if plain {
-            let rest = self.without_external(state, external);
-            let mut moved = scratch.movers.iter().copied().zip(scratch.targets.iter().copied()).peekable();
-            let row = state.iter().enumerate().filter_map(|(at, id)| {
-                let id = if at == 0 {
-                    rest
-                } else {
-                    moved.next_if(|(mover, _)| *mover == at).map_or(*id, |m| m.1)
-                };
-                (at == 0 || id != ENDED).then_some(id)
-            });
-            moves.push(event, row);
+        if effects == 0 {
+            if external.is_some() {
+                changes.push((0, self.without_external(state, external)));
+            }
+            push(moves, event, state, &changes, ended);
         } else if let Some(happens) = self.locals.events.get(event).cloned() {
             let row = self.run_program(state, |program| program.select(happens, external));
             moves.push(event, row);
         }
-        self.scratch = scratch;
+        self.scratch.changes = changes;
     }
 
     /// The number of what is beside the local states once an external event was taken from the queue.
@@ -397,19 +435,14 @@ impl Model for Product {
         }
         self.find_open(state);
         let external = self.next_external(state);
-        for word in 0..self.scratch.open.len() {
-            let mut open = self.scratch.open.get(word).copied().unwrap_or(0);
-            while open != 0 {
-                self.select(state, word as u32 * 64 + open.trailing_zeros(), None, moves);
-                open &= open - 1;
-            }
-        }
-        if let Some(at) = external.filter(|_| moves.is_empty() || self.externals_any_time)
+        let before = moves.len();
+        self.select_open(state, moves);
+        if let Some(at) = external.filter(|_| moves.len() == before || self.externals_any_time)
             && let Some(event) = self.beside(state).and_then(|beside| beside.externals.get(at)).copied()
         {
             self.select(state, event, Some(at), moves);
         }
-        if moves.is_empty() {
+        if moves.len() == before {
             self.feed(state, moves);
         }
         if self.timers == Timers::AnyTime {
@@ -438,6 +471,27 @@ impl Model for Product {
         }
         self.locals.events.get(label).cloned().unwrap_or_else(|| Event::new(""))
     }
+}
+
+/// Adds a move that changes a state in these places, where a b-thread may have ended.
+fn push(moves: &mut Moves, label: u32, state: &[u32], changes: &[(usize, u32)], ended: bool) {
+    if !ended {
+        return moves.push_changed(label, state, changes.iter().copied());
+    }
+    let changed = |at: usize| changes.iter().find(|(place, _)| *place == at).map(|(_, word)| *word);
+    let row = state.iter().enumerate().map(|(at, word)| (at, changed(at).unwrap_or(*word)));
+    moves.push(label, row.filter(|(at, word)| *at == 0 || *word != ENDED).map(|(_, word)| word));
+}
+
+/// The places of the ones in a word, lowest first.
+fn ones(mut word: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lowest = word.trailing_zeros() as usize;
+        (word != 0).then(|| {
+            word &= word - 1;
+            lowest
+        })
+    })
 }
 
 /// Whether an event is in a set of bits.

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use super::cycle::HotGraph;
 use super::model::{Model, Moves};
 use super::report::{Fault, Inspection, Omission, Progress, Report, Violation};
+use super::rows::hash;
 use super::store::{Arrival, MOST_STATES, START, Store};
+use super::two_threads;
 
 /// In which order states are looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,6 +36,8 @@ impl Default for Limits {
     }
 }
 
+/// How many states are looked at before a second thread is worth its while.
+const ALONE: usize = 1 << 12;
 /// How many states are looked at from one report of progress to the next.
 const PROGRESS_EVERY: usize = 1 << 15;
 
@@ -46,30 +50,35 @@ pub fn check<M: Model>(
 ) -> Report {
     let mut seen = Exploration::new(model, limits);
     let fault = seen.run(model, inspections, progress);
-    let verdict = match fault {
-        Some((number, Fault { kind, violators })) => {
-            let trace = seen.store.path(number).into_iter().map(|label| model.event(label)).collect();
-            Some(Violation { kind, violators, trace, cycle_length: None })
-        }
-        None => hot_cycle(model, &seen, inspections),
-    };
-    Report {
-        verdict,
-        states: seen.store.len(),
-        edges: seen.edges,
-        depth: seen.depth,
-        not_covered: seen.not_covered,
-    }
+    seen.report(model, fault, inspections)
 }
 
-fn hot_cycle<M: Model>(model: &mut M, seen: &Exploration, inspections: &[Inspection]) -> Option<Violation> {
+/// The same by two threads, where they help. The outcome is the same.
+pub(super) fn check_by_two<M: Model + Send>(
+    model: &mut M,
+    limits: &Limits,
+    inspections: &[Inspection],
+    progress: &mut dyn FnMut(&Progress),
+) -> Report {
+    let mut seen = Exploration::new(model, limits);
+    let fault = match seen.run_alone(model, inspections, progress, ALONE) {
+        Outcome::Goes if limits.order == Search::BreadthFirst => {
+            two_threads::run(&mut seen, model, inspections, progress)
+        }
+        Outcome::Goes => seen.run(model, inspections, progress),
+        Outcome::Ends(fault) => fault,
+    };
+    seen.report(model, fault, inspections)
+}
+
+fn hot_cycle<M: Model>(model: &mut M, store: &Store, inspections: &[Inspection]) -> Option<Violation> {
     let is_cycles = |inspection: &&Inspection| {
         matches!(inspection, Inspection::HotBThread | Inspection::HotRun(_) | Inspection::HotSystem)
     };
     let mut asked = inspections.iter().filter(is_cycles).peekable();
     asked.peek()?;
-    let graph = HotGraph::of(model, &seen.store);
-    asked.find_map(|inspection| graph.violation(model, &seen.store, inspection))
+    let graph = HotGraph::of(model, store);
+    asked.find_map(|inspection| graph.violation(model, store, inspection))
 }
 
 /// What has been seen so far.
@@ -77,24 +86,28 @@ fn hot_cycle<M: Model>(model: &mut M, seen: &Exploration, inspections: &[Inspect
 pub(super) struct Exploration {
     pub(super) store: Store,
     limits: Limits,
-    frontier: Frontier,
+    pub(super) frontier: Frontier,
     edges: u64,
     depth: u32,
+    /// How many states were gone on from.
+    explored: usize,
     /// Moves that lead to unseen states beyond the greatest depth.
     too_deep: u64,
-    pub(super) not_covered: Vec<Omission>,
+    not_covered: Vec<Omission>,
 }
 
 impl Exploration {
     pub(super) fn new<M: Model>(model: &mut M, limits: &Limits) -> Self {
         let mut store = Store::new();
-        store.insert(&model.start(), Arrival { from: START, label: 0 });
+        let start = model.start();
+        store.insert(&start, hash(&start), Arrival { from: START, label: 0 });
         Self {
             store,
             limits: Limits { most_states: limits.most_states.clamp(1, MOST_STATES), ..*limits },
             frontier: Frontier::new(limits.order),
             edges: 0,
             depth: 0,
+            explored: 0,
             too_deep: 0,
             not_covered: Vec::new(),
         }
@@ -107,43 +120,106 @@ impl Exploration {
         inspections: &[Inspection],
         progress: &mut dyn FnMut(&Progress),
     ) -> Option<(u32, Fault)> {
-        let (mut moves, mut state, mut fault) = (Moves::default(), Vec::new(), None);
-        let mut explored = 0_usize;
+        match self.run_alone(model, inspections, progress, usize::MAX) {
+            Outcome::Goes => None,
+            Outcome::Ends(fault) => fault,
+        }
+    }
+
+    /// Explores until a state is at fault, or so many were looked at.
+    fn run_alone<M: Model>(
+        &mut self,
+        model: &mut M,
+        inspections: &[Inspection],
+        progress: &mut dyn FnMut(&Progress),
+        most: usize,
+    ) -> Outcome {
+        let (mut moves, mut state) = (Moves::default(), Vec::new());
         while let Some((number, depth)) = self.frontier.next(self.store.len()) {
-            self.depth = self.depth.max(depth);
             state.clear();
             state.extend_from_slice(self.store.state(number));
             moves.clear();
             model.expand(&state, &mut moves);
-            explored += 1;
-            let fits = self.follow(number, depth, &moves);
-            fault = model.fault(&state, moves.is_empty(), inspections).map(|fault| (number, fault));
-            let unexplored = self.store.len() - explored;
-            if fault.is_some() {
-                if unexplored > 0 {
-                    self.not_covered.push(Omission::StoppedAtViolation { unexplored });
-                }
-                break;
+            let fault = model.fault(&state, moves.is_empty(), inspections);
+            if let ended @ Outcome::Ends(_) = self.take_in(number, depth, moves.hashed(), fault, progress) {
+                return ended;
             }
-            if !fits {
-                let most_states = self.limits.most_states;
-                self.not_covered.push(Omission::StateBound { most_states, unexplored: unexplored + 1 });
-                break;
-            }
-            if explored.is_multiple_of(PROGRESS_EVERY) {
-                progress(&Progress { states: self.store.len(), edges: self.edges, unexplored, depth });
+            if self.explored >= most {
+                return Outcome::Goes;
             }
         }
+        Outcome::Ends(None)
+    }
+
+    fn report<M: Model>(
+        mut self,
+        model: &mut M,
+        fault: Option<(u32, Fault)>,
+        inspections: &[Inspection],
+    ) -> Report {
+        let verdict = match fault {
+            Some((number, Fault { kind, violators })) => {
+                let trace = self.store.path(number).into_iter().map(|label| model.event(label)).collect();
+                Some(Violation { kind, violators, trace, cycle_length: None })
+            }
+            None => hot_cycle(model, &self.store, inspections),
+        };
+        let not_covered = self.take_not_covered();
+        Report { verdict, states: self.store.len(), edges: self.edges, depth: self.depth, not_covered }
+    }
+
+    /// What was not looked at.
+    pub(super) fn take_not_covered(&mut self) -> Vec<Omission> {
+        let mut not_covered = std::mem::take(&mut self.not_covered);
         if self.too_deep > 0 {
-            let Limits { deepest, .. } = self.limits;
-            self.not_covered.push(Omission::DepthBound { deepest, moves: self.too_deep });
+            not_covered.push(Omission::DepthBound { deepest: self.limits.deepest, moves: self.too_deep });
         }
-        fault
+        not_covered
+    }
+
+    /// How many states were gone on from.
+    pub(super) fn explored(&self) -> usize {
+        self.explored
+    }
+
+    /// Takes in what there is to a state: its moves, and its fault.
+    pub(super) fn take_in<'a>(
+        &mut self,
+        number: u32,
+        depth: u32,
+        moves: impl Iterator<Item = (u32, &'a [u32], u32)>,
+        fault: Option<Fault>,
+        progress: &mut dyn FnMut(&Progress),
+    ) -> Outcome {
+        self.explored += 1;
+        self.depth = self.depth.max(depth);
+        let fits = self.follow(number, depth, moves);
+        let unexplored = self.store.len() - self.explored;
+        if let Some(fault) = fault {
+            if unexplored > 0 {
+                self.not_covered.push(Omission::StoppedAtViolation { unexplored });
+            }
+            return Outcome::Ends(Some((number, fault)));
+        }
+        if !fits {
+            let most_states = self.limits.most_states;
+            self.not_covered.push(Omission::StateBound { most_states, unexplored: unexplored + 1 });
+            return Outcome::Ends(None);
+        }
+        if self.explored.is_multiple_of(PROGRESS_EVERY) {
+            progress(&Progress { states: self.store.len(), edges: self.edges, unexplored, depth });
+        }
+        Outcome::Goes
     }
 
     /// Takes in the moves out of a state; false if there is no room for all.
-    fn follow(&mut self, from: u32, depth: u32, moves: &Moves) -> bool {
-        for (label, target) in moves.iter() {
+    fn follow<'a>(
+        &mut self,
+        from: u32,
+        depth: u32,
+        moves: impl Iterator<Item = (u32, &'a [u32], u32)>,
+    ) -> bool {
+        for (label, target, hash) in moves {
             let full = self.store.len() >= self.limits.most_states;
             if (full || depth >= self.limits.deepest) && self.store.find(target).is_none() {
                 if full {
@@ -153,7 +229,7 @@ impl Exploration {
                 continue;
             }
             self.edges += 1;
-            if let Some(number) = self.store.insert(target, Arrival { from, label }) {
+            if let Some(number) = self.store.insert(target, hash, Arrival { from, label }) {
                 self.frontier.add(number, depth + 1);
             }
         }
@@ -162,9 +238,18 @@ impl Exploration {
     }
 }
 
+/// How a search stands.
+#[derive(Debug)]
+pub(super) enum Outcome {
+    /// There may be more to look at.
+    Goes,
+    /// It is over, with a state at fault or without.
+    Ends(Option<(u32, Fault)>),
+}
+
 /// The states to look at next.
 #[derive(Debug)]
-enum Frontier {
+pub(super) enum Frontier {
     /// All in the order of their numbers.
     Queue { next: u32, depth: u32, level_end: u32 },
     /// The latest first, with their depths; those of one state in the order of its moves.
@@ -180,7 +265,7 @@ impl Frontier {
     }
 
     /// The number and depth of the next state, of so many known.
-    fn next(&mut self, known: usize) -> Option<(u32, u32)> {
+    pub(super) fn next(&mut self, known: usize) -> Option<(u32, u32)> {
         match self {
             Self::Queue { next, depth, level_end } => {
                 if *next as usize >= known {

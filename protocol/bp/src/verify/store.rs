@@ -1,13 +1,13 @@
 //! The states that a search has seen.
 
+use super::rows::{Rows, hash};
+
 /// Every state seen, numbered in the order of discovery, each once.
 ///
 /// Found by a hash; equality is of the whole row.
 #[derive(Clone, Debug)]
 pub(super) struct Store {
-    words: Vec<u32>,
-    /// Where each state's words end.
-    ends: Vec<usize>,
+    states: Rows,
     /// How each state was first reached.
     arrivals: Vec<Arrival>,
     /// Open addressing: the hash in the upper half, the state's number plus one in the lower; 0 is free.
@@ -29,18 +29,15 @@ const SMALLEST_TABLE: usize = 1 << 10;
 
 impl Store {
     pub(super) fn new() -> Self {
-        Self { words: Vec::new(), ends: Vec::new(), arrivals: Vec::new(), table: vec![0; SMALLEST_TABLE] }
+        Self { states: Rows::default(), arrivals: Vec::new(), table: vec![0; SMALLEST_TABLE] }
     }
 
     pub(super) fn len(&self) -> usize {
-        self.ends.len()
+        self.states.len()
     }
 
     pub(super) fn state(&self, number: u32) -> &[u32] {
-        let at = number as usize;
-        let start = at.checked_sub(1).and_then(|before| self.ends.get(before)).copied().unwrap_or(0);
-        let end = self.ends.get(at).copied().unwrap_or(start);
-        self.words.get(start..end).unwrap_or_default()
+        self.states.get(number as usize)
     }
 
     /// The number of a state, if it has been seen.
@@ -48,16 +45,15 @@ impl Store {
         self.look_up(state, hash(state)).ok()
     }
 
-    /// Takes in a state reached by a move. Gives its number if it is new.
-    pub(super) fn insert(&mut self, state: &[u32], arrival: Arrival) -> Option<u32> {
-        let hash = hash(state);
+    /// Takes in a state, of this hash, reached by a move. Gives its number if it is new.
+    pub(super) fn insert(&mut self, state: &[u32], hash: u32, arrival: Arrival) -> Option<u32> {
         let free = self.look_up(state, hash).err()?;
         let number = u32::try_from(self.len()).ok()?;
         if let Some(place) = self.table.get_mut(free) {
             *place = u64::from(hash) << 32 | u64::from(number + 1);
         }
-        self.words.extend_from_slice(state);
-        self.ends.push(self.words.len());
+        self.states.words.extend_from_slice(state);
+        self.states.close();
         self.arrivals.push(arrival);
         if self.len() * 8 > self.table.len() * 5 {
             self.grow();
@@ -121,25 +117,6 @@ impl Store {
     }
 }
 
-/// Multiplies pairs of words and folds the two halves of each product into one another.
-fn hash(state: &[u32]) -> u32 {
-    let mut hash = state.len() as u64;
-    let mut pairs = state.chunks_exact(2);
-    for pair in &mut pairs {
-        let &[low, high] = pair else { continue };
-        hash = fold(hash ^ (u64::from(high) << 32 | u64::from(low)));
-    }
-    if let [last] = pairs.remainder() {
-        hash = fold(hash ^ u64::from(*last));
-    }
-    (fold(hash) >> 32) as u32
-}
-
-fn fold(bits: u64) -> u64 {
-    let product = u128::from(bits ^ 0x9e37_79b9_7f4a_7c15) * 0xd6e8_feb8_6659_fd93;
-    (product as u64) ^ (product >> 64) as u64
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,8 +127,8 @@ mod tests {
         let arrival = Arrival { from: START, label: 0 };
         let row = |n: u32| [n % 7, n / 7, 3, n % 3];
         for n in 0..20_000 {
-            assert_eq!(store.insert(&row(n), arrival), Some(n));
-            assert_eq!(store.insert(&row(n), arrival), None);
+            assert_eq!(store.insert(&row(n), hash(&row(n)), arrival), Some(n));
+            assert_eq!(store.insert(&row(n), hash(&row(n)), arrival), None);
         }
         for n in 0..20_000 {
             assert_eq!(store.find(&row(n)), Some(n));
@@ -167,8 +144,8 @@ mod tests {
         let mut seen = std::collections::HashMap::new();
         let twins = (0..400_000_u32).find_map(|n| seen.insert(hash(&[n, 5]), n).map(|twin| (n, twin)));
         let (one, other) = twins.unwrap();
-        assert!(store.insert(&[one, 5], arrival).is_some());
-        assert!(store.insert(&[other, 5], arrival).is_some());
+        assert!(store.insert(&[one, 5], hash(&[one, 5]), arrival).is_some());
+        assert!(store.insert(&[other, 5], hash(&[one, 5]), arrival).is_some());
         assert_ne!(store.find(&[one, 5]), store.find(&[other, 5]));
     }
 }

@@ -9,7 +9,9 @@ use skein_bp::{Origin, Rival, Selection};
 use crate::board::shorten;
 use crate::facts::{self, tell};
 use crate::held_blocks::BlockNews;
-use crate::node::{Delivery, Happened, Home, MOST_ROUNDS, Node, NodeError, RESTART_GUARD, confirmation};
+use crate::node::{
+    Delivery, Happened, Home, MOST_ROUNDS, Node, NodeError, RESTART_GUARD, Select, confirmation,
+};
 use crate::stalls::StallNews;
 use crate::{Message, NodeName, Occurrence, Recipient, Roster};
 
@@ -46,14 +48,14 @@ impl Node {
         self.started.unwrap_or(self.now) + self.config.longest_lease.max(self.config.lease)
     }
 
-    /// Lets the program run until it has settled and knows all facts that this brought about.
-    pub(super) fn run(&mut self) -> Result<(), NodeError> {
+    /// Lets the program run until it has settled and knows all facts that this brought about; `select` takes each step.
+    pub(super) fn run(&mut self, select: &mut Select<'_>) -> Result<(), NodeError> {
         let before = self.selections.len();
         let mut outcome = Ok(());
         self.tell_step();
         for _ in 0..MOST_ROUNDS {
             self.check_held_blocks();
-            if let Err(error) = self.run_program(before) {
+            if let Err(error) = self.run_program(before, select) {
                 outcome = Err(error);
             }
             if let Err(error) = self.state_bids() {
@@ -68,7 +70,7 @@ impl Node {
         outcome
     }
 
-    fn run_program(&mut self, before: usize) -> Result<(), NodeError> {
+    fn run_program(&mut self, before: usize, select: &mut Select<'_>) -> Result<(), NodeError> {
         while let Some(delivery) = self.deliveries.pop_front() {
             match delivery {
                 Delivery::Fact(_, Some((bthread, sync))) if self.sync_of(&bthread) != Some(sync) => {}
@@ -82,7 +84,7 @@ impl Node {
                 Delivery::Recalled(decision) => self.learn(decision)?,
             }
         }
-        while let Some(selection) = self.program.step(self.now)? {
+        while let Some(selection) = select(&mut self.program, self.now)? {
             self.publish(selection);
             let limit = self.config.settle_limit;
             if self.selections.len() - before > limit {

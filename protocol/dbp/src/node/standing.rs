@@ -1,0 +1,150 @@
+//! Where a node stands, for a verifier: all that what it will do depends on, but times.
+
+use std::time::Duration;
+
+use crate::NodeName;
+use crate::node::Node;
+use crate::verify::row::{Family, Part, Row};
+
+impl Node {
+    /// Writes where the node stands. Numbers that only grow are written as such, so that they can be counted anew.
+    pub(crate) fn write_standing(&self, row: &mut Row<'_>) {
+        let own = &self.config.name;
+        let sync = |bthread: &str| Family::Sync(own.clone(), bthread.into());
+        row.part(Part::Program(Box::new(self.program.clone())));
+        for (bthread, _, at) in self.program.bids() {
+            row.number(sync(bthread), at);
+        }
+        row.plain(self.config.incarnation);
+        row.flag(self.guarding);
+        for (_, peer) in self.peers.iter() {
+            row.flag(peer.alive);
+            row.optional(peer.incarnation);
+        }
+        for reported in [&self.unroutable, &self.two_homed] {
+            row.list(reported, |row, (bthread, at)| {
+                row.text(bthread);
+                row.number(sync(bthread), *at);
+            });
+        }
+        row.part(Part::Stalls(self.stalls.0.clone()));
+        row.list(&self.held.0, |row, (bthread, held)| {
+            row.text(bthread);
+            row.number(sync(bthread), held.sync);
+            row.part(Part::Homes(held.homes.clone()));
+            row.flag(held.confirmed);
+        });
+        self.write_outboxes(row);
+        self.write_table(row);
+        for (home, stream) in &self.streams {
+            row.flag(stream.has_begun());
+            row.number(Family::Seq(home.clone()), stream.applied());
+        }
+        row.number(Family::Seq(own.clone()), self.history.latest_seq());
+    }
+
+    fn write_outboxes(&self, row: &mut Row<'_>) {
+        let own = &self.config.name;
+        for (home, outbox) in &self.outboxes {
+            let epoch = || Family::Epoch(own.clone(), home.clone());
+            let sync = |bthread: &str| Family::Sync(own.clone(), bthread.into());
+            row.optional(outbox.home_incarnation);
+            row.number(epoch(), outbox.epoch);
+            row.number(epoch(), outbox.acked_epoch);
+            row.flag(self.is_sure_of(home));
+            row.list(&outbox.bids, |row, bid| row.bid(own, bid));
+            row.list(&outbox.since, |row, (bthread, (at, entered))| {
+                row.text(bthread);
+                row.number(sync(bthread), *at);
+                row.number(epoch(), *entered);
+            });
+            row.list(&outbox.unknown, |row, (bthread, at)| {
+                row.text(bthread);
+                row.number(sync(bthread), *at);
+            });
+            row.list(&outbox.refused, |row, refusal| row.refusal(own, refusal));
+            row.list(&outbox.durable, |row, (bthread, at)| {
+                row.text(bthread);
+                row.number(sync(bthread), *at);
+            });
+        }
+    }
+
+    fn write_table(&self, row: &mut Row<'_>) {
+        row.list(&self.table.bidders, |row, (node, bidder)| {
+            let sync = |bthread: &str| Family::Sync(node.clone(), bthread.into());
+            row.text(node.as_str());
+            row.plain(bidder.incarnation);
+            row.number(Family::Epoch(node.clone(), self.config.name.clone()), bidder.epoch);
+            row.flag(bidder.live);
+            row.flag(bidder.knows_this_life);
+            row.list(&bidder.bids, |row, (bthread, bid)| {
+                row.text(bthread);
+                row.number(sync(bthread), bid.sync);
+                row.part(Part::Bid(bid.requests.clone(), bid.block.clone(), bid.priority));
+                row.flag(bid.open);
+                row.flag(bid.keep);
+                row.flag(bid.orphaned);
+            });
+            row.list(&bidder.released, |row, bthread| row.text(bthread));
+            row.list(&bidder.served, |row, (bthread, at)| {
+                row.text(bthread);
+                row.number(sync(bthread), *at);
+            });
+            row.list(&bidder.refused, |row, refusal| row.refusal(node, refusal));
+            row.list(&bidder.lifted, |row, (bthread, at)| {
+                row.text(bthread);
+                row.number(sync(bthread), *at);
+            });
+        });
+    }
+
+    /// Whether what `home` has acknowledged surely holds there now.
+    pub(crate) fn is_sure_of(&self, home: &NodeName) -> bool {
+        self.outboxes
+            .get(home)
+            .is_some_and(|outbox| self.now < outbox.acked_sent_at + self.config.lease * 9 / 10)
+    }
+
+    /// Whether `node` counts as alive here.
+    pub(crate) fn hears(&self, node: &NodeName) -> bool {
+        self.peers.iter().any(|(name, peer)| name == node && peer.alive)
+    }
+
+    /// Whether `guarded` events are kept back since the start.
+    pub(crate) fn is_guarding(&self) -> bool {
+        self.guarding
+    }
+
+    /// The occurrences after number `seq` that this node, as their home, still has.
+    pub(crate) fn occurred_since(&self, seq: u64) -> Vec<skein_bp::Event> {
+        let kept = self.history.after(seq).into_iter().flatten();
+        kept.map(|occurrence| occurrence.event.clone()).collect()
+    }
+
+    /// The number of the latest own occurrence.
+    pub(crate) fn latest_seq(&self) -> u64 {
+        self.history.latest_seq()
+    }
+
+    /// Lets the time pass in which `home` surely keeps what this node has stated there; a fresh copy is due.
+    pub(crate) fn let_hold_lapse(&mut self, home: &NodeName) {
+        if let Some(outbox) = self.outboxes.get_mut(home) {
+            outbox.acked_sent_at = Duration::ZERO;
+            outbox.sent_at = None;
+        }
+    }
+
+    /// Lets the lease pass of what `node` has stated here, and of its last sign of life.
+    pub(crate) fn let_lease_lapse(&mut self, node: &NodeName) {
+        if let Some(bidder) = self.table.bidders.get_mut(node) {
+            bidder.heard_at = Duration::ZERO;
+        }
+        self.peers.silence(node);
+    }
+
+    /// Lets the longest lease pass since the start.
+    pub(crate) fn let_guard_end(&mut self) {
+        self.started = Some(Duration::ZERO);
+    }
+}

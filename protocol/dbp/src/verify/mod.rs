@@ -1,0 +1,178 @@
+//! The verifier for a small network: every run of up to three nodes, with what may go wrong between them.
+//!
+//! What is explored are [`Node`](crate::Node)s themselves. A move lets one message arrive, or one lease lapse, or a node
+//! restart, and then the node goes on until it has settled, in every way in which its ties may fall. Messages take any
+//! time; records of bids are lost, repeated and, if so set, overtaken; occurrences come in order, since holes are repaired.
+//! A partition is messages that take long while leases lapse. Time has no length: a lease lapses at a move, at its holder
+//! before its home, as the protocol sees to it (G3); deadlines of b-threads do not fire.
+//!
+//! ```
+//! use skein_dbp::verify::{Faults, programs};
+//! let naive = programs::naive_resource(2)?.verifier(Faults { lapses: 0, ..Faults::default() }).run();
+//! assert!(naive.verdict.is_some(), "both enter before they hear of each other");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod network;
+pub mod programs;
+pub(crate) mod row;
+mod wire;
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+
+use network::NetworkModel;
+use skein_bp::Program;
+use skein_bp::verify::{Inspection, Limits, Omission, Progress, Report, check};
+
+use crate::NodeConfig;
+
+/// One node of a network under verification.
+#[derive(Clone, Debug)]
+pub struct Member {
+    /// Its settings. The roster is that of the network.
+    pub config: NodeConfig,
+    /// Its program at the start of each of its lives.
+    pub program: Program,
+    /// Whether it may restart, as often as the [`Faults`] say.
+    pub may_restart: bool,
+}
+
+/// What may go wrong, and how often.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Faults {
+    /// Whether an older record of bids may still arrive once a newer one was sent.
+    pub delay: bool,
+    /// How many leases may lapse.
+    pub lapses: u32,
+    /// How many restarts there may be, of members that may.
+    pub restarts: u32,
+    /// Whether what a node tells itself of the fleet, its facts, takes time to arrive at others, like all that occurs. It is
+    /// of interest only where a b-thread waits for another node's facts.
+    pub late_facts: bool,
+    /// How many occurrences may be on their way from one node to another.
+    pub most_under_way: usize,
+}
+
+impl Default for Faults {
+    fn default() -> Self {
+        Self { delay: true, lapses: 1, restarts: 0, late_facts: false, most_under_way: 16 }
+    }
+}
+
+/// The programs of all nodes in one state, as an invariant sees them.
+#[derive(Clone, Debug)]
+pub struct NetworkView<'a> {
+    programs: BTreeMap<&'a str, &'a Program>,
+}
+
+impl<'a> NetworkView<'a> {
+    fn new(programs: BTreeMap<&'a str, &'a Program>) -> Self {
+        Self { programs }
+    }
+
+    /// The program of one node.
+    pub fn program(&self, node: &str) -> Option<&'a Program> {
+        self.programs.get(node).copied()
+    }
+
+    /// Nodes and their programs, by name.
+    pub fn programs(&self) -> impl Iterator<Item = (&'a str, &'a Program)> {
+        self.programs.iter().map(|(name, program)| (*name, *program))
+    }
+}
+
+/// Something that must hold in every state of the network.
+#[derive(Clone)]
+struct Invariant {
+    name: String,
+    holds: Arc<InvariantFn>,
+}
+
+type InvariantFn = dyn Fn(&NetworkView<'_>) -> Result<(), String> + Send + Sync;
+type OnProgress = Box<dyn FnMut(&Progress)>;
+
+/// A verification of one network, to be set up and run.
+pub struct NetworkVerifier {
+    members: Vec<Member>,
+    faults: Faults,
+    limits: Limits,
+    invariants: Vec<Invariant>,
+    on_progress: OnProgress,
+}
+
+impl NetworkVerifier {
+    /// Of these nodes, which know each other at the start. Each state takes some kilobytes, so the search ends after
+    /// 200 000 unless told otherwise.
+    pub fn new(members: Vec<Member>, faults: Faults) -> Self {
+        let limits = Limits { most_states: 200_000, ..Limits::default() };
+        Self { members, faults, limits, invariants: Vec::new(), on_progress: Box::new(|_| {}) }
+    }
+
+    /// Looks besides for a state in which `holds` gives an error, which says what is wrong with it.
+    #[must_use]
+    pub fn invariant(
+        mut self,
+        name: impl Into<String>,
+        holds: impl Fn(&NetworkView<'_>) -> Result<(), String> + Send + Sync + 'static,
+    ) -> Self {
+        self.invariants.push(Invariant { name: name.into(), holds: Arc::new(holds) });
+        self
+    }
+
+    /// Gives up after so many states.
+    #[must_use]
+    pub fn most_states(mut self, states: usize) -> Self {
+        self.limits.most_states = states;
+        self
+    }
+
+    /// Calls `on_progress` every few ten thousand states.
+    #[must_use]
+    pub fn on_progress(mut self, on_progress: impl FnMut(&Progress) + 'static) -> Self {
+        self.on_progress = Box::new(on_progress);
+        self
+    }
+
+    /// Looks at every state, until a b-thread fails, an invariant is broken, a node cannot go on, or a bound is reached.
+    pub fn run(mut self) -> Report {
+        let mut model = NetworkModel::new(self.members, self.faults, self.invariants);
+        let inspections = [Inspection::FailedAssertion];
+        let mut report = check(&mut model, &self.limits, &inspections, &mut self.on_progress);
+        let Faults { delay, lapses, restarts, late_facts, most_under_way } = self.faults;
+        let mut left_out = vec![format!("more than {lapses} lapses and {restarts} restarts")];
+        if !delay {
+            left_out.push("records of bids that arrive after a newer one was sent".to_owned());
+        }
+        if !late_facts {
+            left_out.push("facts of one node that take time to arrive at another".to_owned());
+        }
+        if model.queue_cut {
+            left_out.push(format!("more than {most_under_way} occurrences on their way between two nodes"));
+        }
+        if model.ways_cut {
+            left_out.push("some of the ways in which one node's ties may fall".to_owned());
+        }
+        report.not_covered.extend(left_out.into_iter().map(|what| Omission::NotModelled { what }));
+        report
+    }
+}
+
+impl fmt::Debug for NetworkVerifier {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { members, faults, limits, invariants, .. } = self;
+        f.debug_struct("NetworkVerifier")
+            .field("members", members)
+            .field("faults", faults)
+            .field("limits", limits)
+            .field("invariants", invariants)
+            .finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for Invariant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Invariant").field(&self.name).finish()
+    }
+}

@@ -1,0 +1,518 @@
+//! A network of real nodes as a model.
+
+use std::collections::BTreeMap;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+use rustc_hash::FxHashMap;
+use skein_bp::verify::{Fault, Inspection, Interner, Model, Moves, ViolationKind};
+use skein_bp::{Event, Program, ProgramError, Selection};
+
+use super::row::{Family, Part, Row};
+use super::wire::Wire;
+use super::{Faults, Invariant, Member, NetworkView};
+use crate::node::Node;
+use crate::{Message, NodeConfig, NodeError, NodeName, Presence, Recipient, facts};
+
+/// When the network starts: later than any lease, so that what was last heard at time zero has lapsed.
+const START: Duration = Duration::from_secs(1 << 20);
+/// From one move to the next; so little that nothing lapses by itself.
+const MOVE: Duration = Duration::from_nanos(1);
+/// Ways in which the b-threads of one node may go on after one message.
+const MOST_WAYS: usize = 4096;
+
+/// Nodes, what is on its way between them, and how much may still go wrong.
+#[derive(Clone, Debug)]
+struct Network {
+    nodes: BTreeMap<NodeName, Rc<Node>>,
+    wires: BTreeMap<(NodeName, NodeName), Rc<Wire>>,
+    lapses: u32,
+    restarts: u32,
+    now: Duration,
+    /// Why a node could not go on.
+    broken: Option<(NodeName, NodeError)>,
+}
+
+/// Something that happens to a node.
+#[derive(Clone, Debug)]
+enum Step {
+    /// Its b-threads begin.
+    Begin(NodeName),
+    /// The record at this place of the wire from a bidder arrives, and those before it never will.
+    Record {
+        from: NodeName,
+        to: NodeName,
+        at: usize,
+    },
+    Ack {
+        from: NodeName,
+        to: NodeName,
+    },
+    Occurrence {
+        from: NodeName,
+        to: NodeName,
+    },
+    /// A sign of life.
+    Presence {
+        from: NodeName,
+        to: NodeName,
+    },
+    /// The holder of a lease can no longer be sure of the home.
+    HoldLapses {
+        holder: NodeName,
+        home: NodeName,
+    },
+    /// The home lets go.
+    LeaseLapses {
+        holder: NodeName,
+        home: NodeName,
+    },
+    GuardEnds(NodeName),
+    Restart(NodeName),
+}
+
+/// The model of a network.
+#[derive(Debug)]
+pub(super) struct NetworkModel {
+    members: Vec<Member>,
+    faults: Faults,
+    invariants: Vec<Invariant>,
+    parts: Interner<Part>,
+    families: Interner<Family>,
+    labels: Interner<Event>,
+    /// States that were reached and not gone on from; a state that was has none.
+    waiting: FxHashMap<Vec<u32>, Option<Network>>,
+    /// The state that is gone on from.
+    present: Option<Network>,
+    /// Whether a bound of the model, not of the search, was reached.
+    pub(super) ways_cut: bool,
+    pub(super) queue_cut: bool,
+}
+
+impl NetworkModel {
+    pub(super) fn new(members: Vec<Member>, faults: Faults, invariants: Vec<Invariant>) -> Self {
+        Self {
+            members,
+            faults,
+            invariants,
+            parts: Interner::default(),
+            families: Interner::default(),
+            labels: Interner::default(),
+            waiting: FxHashMap::default(),
+            present: None,
+            ways_cut: false,
+            queue_cut: false,
+        }
+    }
+
+    /// The fleet is formed, and nobody has begun.
+    fn formed(&self) -> Network {
+        let roster = self.roster();
+        let nodes = self.members.iter().map(|member| {
+            let mut node = member.node(&roster, member.config.incarnation);
+            for other in self.members.iter().filter(|other| other.config.name != member.config.name) {
+                node.handle(START, presence(other, other.config.incarnation, Duration::ZERO, 0));
+            }
+            (member.config.name.clone(), Rc::new(node))
+        });
+        Network {
+            nodes: nodes.collect(),
+            wires: BTreeMap::new(),
+            lapses: self.faults.lapses,
+            restarts: self.faults.restarts,
+            now: START,
+            broken: None,
+        }
+    }
+
+    fn roster(&self) -> Vec<NodeName> {
+        self.members.iter().map(|member| member.config.name.clone()).collect()
+    }
+
+    fn row(&mut self, network: &Network) -> Vec<u32> {
+        let mut row = Row::new(&mut self.parts, &mut self.families);
+        for node in network.nodes.values() {
+            node.write_standing(&mut row);
+        }
+        let silent = Wire::default();
+        for (from, to) in pairs(network) {
+            if let Some(home) = network.nodes.get(to) {
+                let wire = network.wires.get(&(from.clone(), to.clone())).map_or(&silent, |wire| wire);
+                wire.write_standing(&mut row, from, home);
+            }
+        }
+        row.plain(network.lapses.into());
+        row.plain(network.restarts.into());
+        if let Some((node, error)) = &network.broken {
+            row.text(&format!("{node}: {error}"));
+        }
+        row.finish()
+    }
+
+    /// All that may happen next.
+    fn steps(&self, network: &Network) -> Vec<Step> {
+        let not_begun = network.nodes.values().find(|node| !has_begun(node));
+        if let Some(node) = not_begun {
+            return vec![Step::Begin(node.name().clone())];
+        }
+        let mut steps = Vec::new();
+        for (from, to) in pairs(network) {
+            let (from, to) = (from.clone(), to.clone());
+            if let Some(wire) = network.wires.get(&(from.clone(), to.clone())) {
+                let records =
+                    (0..wire.records.len()).map(|at| Step::Record { from: from.clone(), to: to.clone(), at });
+                steps.extend(records);
+                steps.extend(wire.ack.as_ref().map(|_| Step::Ack { from: from.clone(), to: to.clone() }));
+                let next = wire.occurrences.front();
+                steps.extend(next.map(|_| Step::Occurrence { from: from.clone(), to: to.clone() }));
+                let presence = wire.presence.as_ref();
+                steps.extend(presence.map(|_| Step::Presence { from: from.clone(), to: to.clone() }));
+            }
+            let (Some(holder), Some(home)) = (network.nodes.get(&from), network.nodes.get(&to)) else {
+                continue;
+            };
+            if holder.is_sure_of(&to) {
+                if network.lapses > 0 {
+                    steps.push(Step::HoldLapses { holder: from, home: to });
+                }
+            } else if home.hears(&from) && network.lapses < self.faults.lapses {
+                steps.push(Step::LeaseLapses { holder: from, home: to });
+            }
+        }
+        for (name, node) in &network.nodes {
+            let sure = network.nodes.values().any(|other| other.is_sure_of(name));
+            if node.is_guarding() && !sure {
+                steps.push(Step::GuardEnds(name.clone()));
+            }
+            let may_restart = |member: &Member| member.config.name == *name && member.may_restart;
+            if network.restarts > 0 && self.members.iter().any(may_restart) {
+                steps.push(Step::Restart(name.clone()));
+            }
+        }
+        steps
+    }
+
+    /// The states to which a step may lead, each with what was selected on the way.
+    fn outcomes(&mut self, network: &Network, step: &Step) -> Vec<(Vec<String>, Network)> {
+        let mut outcomes = Vec::new();
+        let mut script: Vec<Choice> = Vec::new();
+        loop {
+            let mut next = network.clone();
+            next.now += MOVE;
+            let mut choices = Choices { script: std::mem::take(&mut script), at: 0 };
+            let mut selected = self.take(&mut next, step, &mut choices);
+            self.hear_facts(&mut next, &mut choices, &mut selected);
+            outcomes.push((selected, next));
+            script = choices.script;
+            while script.last().is_some_and(|choice| choice.taken + 1 >= choice.of) {
+                script.pop();
+            }
+            match script.last_mut() {
+                Some(choice) if outcomes.len() < MOST_WAYS => choice.taken += 1,
+                Some(_) => {
+                    self.ways_cut = true;
+                    return outcomes;
+                }
+                None => return outcomes,
+            }
+        }
+    }
+
+    /// Lets a step happen, and the node go on after it; gives what it selects.
+    fn take(&mut self, network: &mut Network, step: &Step, choices: &mut Choices) -> Vec<String> {
+        let now = network.now;
+        match step {
+            Step::Begin(node) | Step::GuardEnds(node) => {
+                if let (Step::GuardEnds(_), Some(node)) = (step, network.nodes.get_mut(node)) {
+                    Rc::make_mut(node).let_guard_end();
+                }
+                self.go_on(network, node, choices)
+            }
+            Step::Record { from, to, at } => {
+                let wire = network.wire(from, to);
+                let record = wire.records.drain(..=*at).next_back();
+                network.hand_over(to, now, record.map(Message::Bid));
+                self.go_on(network, to, choices)
+            }
+            Step::Ack { from, to } => {
+                let ack = network.wire(from, to).ack.take();
+                network.hand_over(to, now, ack.map(Message::Ack));
+                self.go_on(network, to, choices)
+            }
+            Step::Occurrence { from, to } => {
+                let occurrence = network.wire(from, to).occurrences.pop_front();
+                network.hand_over(to, now, occurrence.map(Message::Occurrence));
+                self.go_on(network, to, choices)
+            }
+            Step::Presence { from, to } => {
+                let presence = network.wire(from, to).presence.take();
+                network.hand_over(to, now, presence.map(Message::Presence));
+                self.go_on(network, to, choices)
+            }
+            Step::HoldLapses { holder, home } => {
+                network.lapses -= 1;
+                network.with(holder, |node| node.let_hold_lapse(home));
+                // An acknowledgement on its way is of a copy sent before.
+                network.wire(home, holder).ack = None;
+                self.go_on(network, holder, choices)
+            }
+            Step::LeaseLapses { holder, home } => {
+                network.wire(home, holder).ack = None;
+                network.with(home, |node| node.let_lease_lapse(holder));
+                let mut selected = self.go_on(network, home, choices);
+                network.with(holder, |node| node.let_hold_lapse(home));
+                selected.extend(self.go_on(network, holder, choices));
+                selected
+            }
+            Step::Restart(node) => {
+                network.restarts -= 1;
+                self.restart(network, node);
+                self.go_on(network, node, choices)
+            }
+        }
+    }
+
+    /// Begins a new life of a node, which finds the others alive. What was on its way to the old one is lost.
+    fn restart(&self, network: &mut Network, name: &NodeName) {
+        let Some(member) = self.members.iter().find(|member| member.config.name == *name) else { return };
+        let incarnation = network.nodes.get(name).map_or(0, |node| node.incarnation()) + 1;
+        let mut node = member.node(&self.roster(), incarnation);
+        for other in self.members.iter().filter(|other| other.config.name != *name) {
+            let Some(peer) = network.nodes.get(&other.config.name) else { continue };
+            let (life, seq) = (peer.incarnation(), peer.latest_seq());
+            node.handle(network.now, presence(other, life, START, seq));
+            network.wires.remove(&(other.config.name.clone(), name.clone()));
+        }
+        network.nodes.insert(name.clone(), Rc::new(node));
+        for other in self.roster().iter().filter(|other| *other != name) {
+            let Message::Presence(presence) = presence(member, incarnation, Duration::ZERO, 0) else {
+                continue;
+            };
+            network.wire(name, other).presence = Some(presence);
+        }
+    }
+
+    /// Lets a node go on, and puts what it says on the wires. Gives what it selected.
+    fn go_on(&mut self, network: &mut Network, name: &NodeName, choices: &mut Choices) -> Vec<String> {
+        let Some(node) = network.nodes.get_mut(name) else { return Vec::new() };
+        let node = Rc::make_mut(node);
+        let outcome = node.step_by(network.now, &mut |program, now| choices.step(program, now));
+        let selected = node.take_selections();
+        let outgoing = node.take_outgoing();
+        if let Err(error) = outcome {
+            network.broken.get_or_insert((name.clone(), error));
+        }
+        for (recipient, message) in outgoing {
+            for to in self.roster().iter().filter(|to| *to != name) {
+                if matches!(&recipient, Recipient::Node(node) if node != to) {
+                    continue;
+                }
+                self.queue_cut |= network.put(name, to, message.clone(), self.faults);
+            }
+        }
+        let own = selected.iter().filter(|happened| happened.home == *name);
+        own.map(|happened| happened.event.to_string()).collect()
+    }
+
+    /// Lets the others' facts that are next on the wires arrive, unless they may take their time.
+    fn hear_facts(&mut self, network: &mut Network, choices: &mut Choices, selected: &mut Vec<String>) {
+        if self.faults.late_facts {
+            return;
+        }
+        while let Some((from, to)) = network.next_fact() {
+            let now = network.now;
+            let fact = network.wire(&from, &to).occurrences.pop_front();
+            network.hand_over(&to, now, fact.map(Message::Occurrence));
+            selected.extend(self.go_on(network, &to, choices));
+        }
+    }
+
+    fn label(&mut self, step: &Step, selected: &[String]) -> u32 {
+        let what = match step {
+            Step::Begin(node) => Event::new(format!("{node} begins")),
+            Step::Record { from, to, .. } => Event::new(format!("{to} takes in what {from} bids")),
+            Step::Ack { from, to } => Event::new(format!("{to} hears that {from} has taken in its bids")),
+            Step::Occurrence { from, to } => Event::new(format!("{to} hears what occurred at {from}")),
+            Step::Presence { from, to } => Event::new(format!("{to} hears that {from} lives")),
+            Step::HoldLapses { holder, home } => Event::new(format!("{holder} is no longer sure of {home}")),
+            Step::LeaseLapses { holder, home } => Event::new(format!("{home} lets go of what {holder} bids")),
+            Step::GuardEnds(node) => Event::new(format!("{node} has waited for the longest lease")),
+            Step::Restart(node) => Event::new(format!("{node} restarts")),
+        };
+        let what = if selected.is_empty() { what } else { what.with("then", selected.join(", ")) };
+        self.labels.number(what)
+    }
+}
+
+impl Model for NetworkModel {
+    fn start(&mut self) -> Vec<u32> {
+        let network = self.formed();
+        let row = self.row(&network);
+        self.waiting.insert(row.clone(), Some(network));
+        row
+    }
+
+    fn expand(&mut self, state: &[u32], moves: &mut Moves) {
+        self.present = self.waiting.get_mut(state).and_then(Option::take);
+        let Some(network) = self.present.clone() else { return };
+        if network.broken.is_some() {
+            return;
+        }
+        for step in self.steps(&network) {
+            for (selected, next) in self.outcomes(&network, &step) {
+                let row = self.row(&next);
+                let label = self.label(&step, &selected);
+                moves.push(label, row.iter().copied());
+                self.waiting.entry(row).or_insert(Some(next));
+            }
+        }
+    }
+
+    fn fault(&self, _: &[u32], _: bool, inspections: &[Inspection]) -> Option<Fault> {
+        let network = self.present.as_ref()?;
+        if let Some((node, error)) = &network.broken {
+            let (violator, message) = match error {
+                NodeError::Program(ProgramError::Failed { bthread, message }) => {
+                    (format!("{node}#{bthread}"), message.clone())
+                }
+                error => (node.to_string(), error.to_string()),
+            };
+            let kind = ViolationKind::FailedAssertion { message };
+            let wanted = inspections.contains(&Inspection::FailedAssertion);
+            return wanted.then(|| Fault { kind, violators: vec![violator.into()] });
+        }
+        let programs = network.nodes.iter().map(|(name, node)| (name.as_str(), node.program())).collect();
+        let view = NetworkView::new(programs);
+        self.invariants.iter().find_map(|invariant| {
+            let message = (invariant.holds)(&view).err()?;
+            let kind = ViolationKind::Invariant { invariant: invariant.name.clone(), message };
+            Some(Fault { kind, violators: Vec::new() })
+        })
+    }
+
+    fn hot(&self, _: &[u32], _: &mut Vec<u32>) {}
+
+    fn bthread(&self, _: u32) -> Arc<str> {
+        "".into()
+    }
+
+    fn event(&self, label: u32) -> Event {
+        self.labels.get(label).cloned().unwrap_or_else(|| Event::new(""))
+    }
+}
+
+impl Member {
+    fn node(&self, roster: &[NodeName], incarnation: u64) -> Node {
+        let config = NodeConfig { incarnation, roster: roster.to_vec(), ..self.config.clone() };
+        Node::new(config, self.program.clone())
+    }
+}
+
+impl Network {
+    fn wire(&mut self, from: &NodeName, to: &NodeName) -> &mut Wire {
+        Rc::make_mut(self.wires.entry((from.clone(), to.clone())).or_default())
+    }
+
+    fn with(&mut self, name: &NodeName, change: impl FnOnce(&mut Node)) {
+        if let Some(node) = self.nodes.get_mut(name) {
+            change(Rc::make_mut(node));
+        }
+    }
+
+    fn hand_over(&mut self, to: &NodeName, now: Duration, message: Option<Message>) {
+        if let Some(message) = message {
+            self.with(to, |node| node.handle(now, message));
+        }
+    }
+
+    /// Two nodes of which the first has told a fact that is the next thing the other hears of it.
+    fn next_fact(&self) -> Option<(NodeName, NodeName)> {
+        let is_fact = |wire: &Wire, from: &NodeName| {
+            wire.occurrences.front().is_some_and(|next| facts::all(from).contains(&next.event))
+        };
+        let has_begun = |name: &NodeName| self.nodes.get(name).is_some_and(|node| has_begun(node));
+        let next = self.wires.iter().find(|((from, to), wire)| is_fact(wire, from) && has_begun(to));
+        next.map(|(pair, _)| pair.clone())
+    }
+
+    /// Puts a message on its way; true if there was no room for it.
+    fn put(&mut self, from: &NodeName, to: &NodeName, message: Message, faults: Faults) -> bool {
+        let wire = self.wire(from, to);
+        match message {
+            Message::Bid(record) => {
+                if !faults.delay {
+                    wire.records.clear();
+                }
+                wire.records
+                    .retain(|older| older.epoch != record.epoch || older.incarnation != record.incarnation);
+                wire.records.push(record);
+            }
+            Message::Ack(ack) => wire.ack = Some(ack),
+            Message::Occurrence(occurrence) => {
+                if wire.occurrences.len() >= faults.most_under_way {
+                    return true;
+                }
+                wire.occurrences.push_back(occurrence);
+            }
+            // Nothing that a wire holds is lost for good, so no wish to hear it again is needed, and a sign of life says
+            // nothing new but where it is put by hand.
+            Message::Presence(_) | Message::Repair(_) => {}
+        }
+        false
+    }
+}
+
+/// Whether a node's b-threads have reached their first synchronisation points.
+fn has_begun(node: &Node) -> bool {
+    node.program().bids().all(|(.., sync)| sync > 0)
+}
+
+/// Every node with every other one.
+fn pairs(network: &Network) -> impl Iterator<Item = (&NodeName, &NodeName)> {
+    let others = |from| network.nodes.keys().filter(move |to| *to != from).map(move |to| (from, to));
+    network.nodes.keys().flat_map(others)
+}
+
+fn presence(of: &Member, incarnation: u64, up: Duration, latest_seq: u64) -> Message {
+    Message::Presence(Presence {
+        node: of.config.name.clone(),
+        incarnation,
+        up,
+        latest_seq,
+        oldest_seq: 1,
+        lease_ms: u64::try_from(of.config.lease.as_millis()).unwrap_or(u64::MAX),
+        joint: None,
+    })
+}
+
+/// One selection among several.
+#[derive(Clone, Copy, Debug)]
+struct Choice {
+    taken: usize,
+    of: usize,
+}
+
+/// What to select, in order; beyond its end the first event each time, which is noted.
+#[derive(Debug)]
+struct Choices {
+    script: Vec<Choice>,
+    at: usize,
+}
+
+impl Choices {
+    fn step(&mut self, program: &mut Program, now: Duration) -> Result<Option<Selection>, ProgramError> {
+        program.synchronise(now)?;
+        let selectable = program.selectable();
+        if self.at == self.script.len() && selectable.len() > 1 {
+            self.script.push(Choice { taken: 0, of: selectable.len() });
+        }
+        let taken = if selectable.len() > 1 {
+            self.at += 1;
+            self.script.get(self.at - 1).map_or(0, |choice| choice.taken)
+        } else {
+            0
+        };
+        selectable.get(taken).map(|event| program.choose(event, now)).transpose()
+    }
+}

@@ -1,0 +1,261 @@
+//! Small networks that show the rules of b-programs across nodes at work.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+use skein_bp::script::{Op, Script, ScriptError};
+use skein_bp::{BThread, Bid, Context, Event, EventSet, Program, ProgramConfig};
+
+use super::{Faults, Member, NetworkVerifier, NetworkView};
+use crate::{NodeConfig, NodeName, NodeNameError, facts};
+
+/// A network and what must hold in it.
+#[derive(Clone)]
+pub struct Network {
+    /// What it is called.
+    pub name: &'static str,
+    /// Its nodes.
+    pub members: Vec<Member>,
+    /// What must hold in every state, besides that no b-thread's assertion fails.
+    pub requirement: Option<(&'static str, Arc<Requirement>)>,
+}
+
+/// See [`NetworkVerifier::invariant`].
+pub type Requirement = dyn Fn(&NetworkView<'_>) -> Result<(), String> + Send + Sync;
+
+/// Why one of these networks could not be made: a mistake in this file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NetworkError {
+    /// A node has a name that is none.
+    #[error(transparent)]
+    Name(#[from] NodeNameError),
+    /// A script is unsound.
+    #[error(transparent)]
+    Script(#[from] ScriptError),
+}
+
+impl Network {
+    /// A verification of it with these faults.
+    pub fn verifier(&self, faults: Faults) -> NetworkVerifier {
+        let verifier = NetworkVerifier::new(self.members.clone(), faults);
+        match self.requirement.clone() {
+            Some((name, holds)) => verifier.invariant(name, move |view| holds(view)),
+            None => verifier,
+        }
+    }
+}
+
+/// Those that are sound, as they are to be written.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn sound() -> Result<Vec<Network>, NetworkError> {
+    Ok(vec![alternating_gate()?, guarded_resource(2)?, held_launch()?, asked_once()?])
+}
+
+/// Two nodes pass a gate by turns: `uav/1`, where the gate is, never lets one pass twice in a row.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn alternating_gate() -> Result<Network, NetworkError> {
+    let (one, other) = ("uav/1/pass/1", "uav/1/pass/2");
+    let passes = |event: &str| Op::Sync(Bid::new().request(event));
+    let turn = |now: &str, later: &str| Op::Sync(Bid::new().wait_for(now).block(later));
+    let twice = |event: &str| {
+        let body = vec![Op::AssertFail(format!("{event} twice in a row"))];
+        [
+            Op::Sync(Bid::new().wait_for(event)),
+            Op::Sync(Bid::new().wait_for("uav/1/pass/*")),
+            Op::On([(event.to_owned(), body)].into()),
+        ]
+    };
+    let here = [
+        ("passes", vec![passes(one), passes(one)]),
+        ("gate", vec![Op::forever([turn(one, other), turn(other, one)])]),
+        ("one twice", vec![Op::forever(twice(one))]),
+        ("other twice", vec![Op::forever(twice(other))]),
+    ];
+    let members =
+        vec![scripts("uav/1", &here)?, scripts("uav/2", &[("passes", vec![passes(other), passes(other)])])?];
+    Ok(Network { name: "alternating gate", members, requirement: None })
+}
+
+/// A shared place that at most one of `count` vehicles may be in: each blocks the others, awaits confirmation, then
+/// enters, and leaves at once when its block lapses. Entering is `guarded` after a restart.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn guarded_resource(count: usize) -> Result<Network, NetworkError> {
+    let members = (1..=count).map(|number| {
+        let (name, mut program) = vehicle(number)?;
+        let others = EventSet::from("uav/*/enter").and(EventSet::named(name.event_name("enter")).not());
+        // It stays where it is while the block is to hold, since every synchronisation point is a new block.
+        let claim = Bid::new().block(others).wait_for(facts::block_lapsed(&name, "claim"));
+        program.add("claim", Script::new(&[Op::forever([Op::Sync(claim)])])?);
+        program.add("entrance", Entrance { node: name.clone(), place: Place::Outside, careful: true });
+        let guarded = EventSet::named(name.event_name("enter"));
+        Ok(Member {
+            config: NodeConfig { guarded, ..NodeConfig::new(name, 1, Vec::new()) },
+            program,
+            may_restart: true,
+        })
+    });
+    Ok(Network {
+        name: "guarded resource",
+        members: members.collect::<Result<_, NetworkError>>()?,
+        requirement: Some(("at most one is inside", Arc::new(at_most_one_inside))),
+    })
+}
+
+/// The same place, where each blocks the others and enters without waiting to hear that the block holds. It is not safe.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn naive_resource(count: usize) -> Result<Network, NetworkError> {
+    let members = (1..=count).map(|number| {
+        let (name, mut program) = vehicle(number)?;
+        let others = EventSet::from("uav/*/enter").and(EventSet::named(name.event_name("enter")).not());
+        program.add("claim", Script::new(&[Op::Sync(Bid::new().block(others))])?);
+        program.add("entrance", Entrance { node: name.clone(), place: Place::Before, careful: false });
+        Ok(Member { config: NodeConfig::new(name, 1, Vec::new()), program, may_restart: true })
+    });
+    Ok(Network {
+        name: "naive resource",
+        members: members.collect::<Result<_, NetworkError>>()?,
+        requirement: Some(("at most one is inside", Arc::new(at_most_one_inside))),
+    })
+}
+
+/// The ground asks `uav/1` to take off and holds it back until it says go: no take-off while the hold stands.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn held_launch() -> Result<Network, NetworkError> {
+    let ground = NodeName::new("ground/main")?;
+    let until_go = Bid::new().block("uav/1/takeoff").wait_for("ground/main/go");
+    let scripts_here = [
+        ("launch", vec![Op::Sync(Bid::new().request("uav/1/takeoff"))]),
+        ("hold", vec![Op::Sync(until_go)]),
+        (
+            "go",
+            vec![
+                Op::Sync(Bid::new().wait_for(facts::confirmed(&ground, "hold"))),
+                Op::Sync(Bid::new().request("ground/main/go")),
+            ],
+        ),
+    ];
+    let flight = [("airborne", vec![Op::Sync(Bid::new().wait_for("uav/1/takeoff")), Op::Sync(Bid::new())])];
+    let holds = |view: &NetworkView<'_>| {
+        let held = view.program("ground/main").is_some_and(|ground| ground.bid("hold").is_some());
+        let past_first = |uav: &Program| uav.bids().any(|(name, _, sync)| name == "airborne" && sync > 1);
+        let flies = view.program("uav/1").is_some_and(past_first);
+        if held && flies { Err("it has taken off".to_owned()) } else { Ok(()) }
+    };
+    Ok(Network {
+        name: "held launch",
+        members: vec![scripts("ground/main", &scripts_here)?, scripts("uav/1", &flight)?],
+        requirement: Some(("nobody takes off while held", Arc::new(holds))),
+    })
+}
+
+/// The ground asks `uav/1` once to drop its load, and asks no more when it cannot know; a log hears every drop.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn asked_once() -> Result<Network, NetworkError> {
+    drops("asked once", vec![Op::Sync(Bid::new().request("uav/1/drop"))])
+}
+
+/// The same request, asked again when it is unknown whether it was served. It is not safe.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn asked_again() -> Result<Network, NetworkError> {
+    let unknown = facts::of(&NodeName::new("ground/main")?, facts::UNKNOWN);
+    let ask = Op::Sync(Bid::new().request("uav/1/drop").wait_for(unknown));
+    let again = Op::On([("ground/main/unknown".to_owned(), vec![ask.clone()])].into());
+    drops("asked again", vec![ask, again])
+}
+
+fn drops(name: &'static str, asking: Vec<Op>) -> Result<Network, NetworkError> {
+    let heard = || Op::Sync(Bid::new().wait_for("uav/1/drop"));
+    let log = [("at most one", vec![heard(), heard(), Op::AssertFail("dropped twice".to_owned())])];
+    let members = vec![
+        scripts("ground/main", &[("asking", asking)])?,
+        scripts("ground/log", &log)?,
+        scripts("uav/1", &[])?,
+    ];
+    Ok(Network { name, members, requirement: None })
+}
+
+fn vehicle(number: usize) -> Result<(NodeName, Program), NetworkError> {
+    Ok((NodeName::new(&format!("uav/{number}"))?, Program::new(ProgramConfig::default())))
+}
+
+fn scripts(node: &str, bthreads: &[(&str, Vec<Op>)]) -> Result<Member, NetworkError> {
+    let mut program = Program::new(ProgramConfig::default());
+    for (name, body) in bthreads {
+        program.add(*name, Script::new(body)?);
+    }
+    let config = NodeConfig::new(NodeName::new(node)?, 1, Vec::new());
+    // A node that begins again asks again, so what must not be repeated is asked by one that does not.
+    Ok(Member { config, program, may_restart: node.starts_with("uav/") })
+}
+
+/// Takes one vehicle in and out again.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+struct Entrance {
+    node: NodeName,
+    place: Place,
+    /// Whether it awaits confirmation, and leaves when that is void.
+    careful: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+enum Place {
+    /// Waits until its claim is confirmed.
+    Outside,
+    /// May enter.
+    Before,
+    Inside,
+}
+
+impl BThread for Entrance {
+    fn bid(&self) -> Option<Bid> {
+        let lapse = match self.careful {
+            true => facts::block_lapsed(&self.node, "claim"),
+            false => EventSet::None,
+        };
+        Some(match self.place {
+            Place::Outside => Bid::new().wait_for(facts::confirmed(&self.node, "claim")),
+            Place::Before => Bid::new().request(self.node.event_name("enter")).wait_for(lapse),
+            // For how long it stays inside is up to others, so it may be for ever.
+            Place::Inside => Bid::new().wait_for(lapse),
+        })
+    }
+
+    fn resume(&mut self, event: &Event, _: &mut Context) {
+        self.place = match (self.place, event.kind()) {
+            (_, facts::BLOCK_LAPSED) => Place::Outside,
+            (Place::Outside, _) => Place::Before,
+            (Place::Before | Place::Inside, _) => Place::Inside,
+        };
+    }
+}
+
+fn at_most_one_inside(view: &NetworkView<'_>) -> Result<(), String> {
+    let inside = view.programs().filter(|(_, program)| {
+        program.state_of::<Entrance>("entrance").is_some_and(|entrance| entrance.place == Place::Inside)
+    });
+    let names: Vec<&str> = inside.map(|(name, _)| name).collect();
+    if names.len() > 1 { Err(format!("{} are inside", names.join(" and "))) } else { Ok(()) }
+}
+
+impl std::fmt::Debug for Network {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Network")
+            .field("name", &self.name)
+            .field("members", &self.members)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,125 @@
+//! A state of a network as a row of numbers.
+//!
+//! Counters that grow for ever would make every state a new one. Only their order counts, so each family of them is
+//! counted anew, from the least one that is in use.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use skein_bp::verify::Interner;
+use skein_bp::{Event, EventSet, Program};
+
+use crate::{NodeName, Refusal, RemoteBid};
+
+/// Something that is equal or not.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Part {
+    Program(Box<Program>),
+    Text(String),
+    Homes(Vec<NodeName>),
+    Event(Event),
+    /// Requests, block, priority.
+    Bid(Vec<Event>, EventSet, Option<i32>),
+    Stalls(BTreeMap<String, BTreeSet<String>>),
+}
+
+/// Numbers that are compared with one another and with no others.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Family {
+    /// Synchronisation points of a node's b-thread.
+    Sync(NodeName, String),
+    /// Contents that a bidder has stated to a home.
+    Epoch(NodeName, NodeName),
+    /// Occurrences of a home.
+    Seq(NodeName),
+}
+
+/// A row that is being written.
+#[derive(Debug)]
+pub(crate) struct Row<'a> {
+    parts: &'a mut Interner<Part>,
+    families: &'a mut Interner<Family>,
+    words: Vec<u32>,
+    /// Where in the row a number of a family stands: family, number, place.
+    numbers: Vec<(u32, u64, usize)>,
+}
+
+impl<'a> Row<'a> {
+    pub(crate) fn new(parts: &'a mut Interner<Part>, families: &'a mut Interner<Family>) -> Self {
+        Self { parts, families, words: Vec::new(), numbers: Vec::new() }
+    }
+
+    pub(crate) fn part(&mut self, part: Part) {
+        let number = self.parts.number(part);
+        self.words.push(number);
+    }
+
+    pub(crate) fn text(&mut self, text: &str) {
+        self.part(Part::Text(text.into()));
+    }
+
+    pub(crate) fn flag(&mut self, flag: bool) {
+        self.words.push(flag.into());
+    }
+
+    /// A number that stays small.
+    pub(crate) fn plain(&mut self, number: u64) {
+        self.words.push(u32::try_from(number).unwrap_or(u32::MAX));
+    }
+
+    pub(crate) fn optional(&mut self, number: Option<u64>) {
+        self.plain(number.map_or(0, |number| number + 1));
+    }
+
+    pub(crate) fn number(&mut self, family: Family, number: u64) {
+        let family = self.families.number(family);
+        self.numbers.push((family, number, self.words.len()));
+        self.words.push(0);
+    }
+
+    pub(crate) fn list<T>(&mut self, items: impl IntoIterator<Item = T>, write: impl Fn(&mut Self, T)) {
+        let place = self.words.len();
+        self.words.push(0);
+        let mut count = 0;
+        for item in items {
+            write(self, item);
+            count += 1;
+        }
+        if let Some(word) = self.words.get_mut(place) {
+            *word = count;
+        }
+    }
+
+    /// What `node` bids elsewhere.
+    pub(crate) fn bid(&mut self, node: &NodeName, bid: &RemoteBid) {
+        self.text(&bid.bthread);
+        self.number(Family::Sync(node.clone(), bid.bthread.clone()), bid.sync);
+        self.part(Part::Bid(bid.requests.clone(), bid.block.clone(), bid.priority));
+    }
+
+    /// What of a bid of `node` was refused.
+    pub(crate) fn refusal(&mut self, node: &NodeName, refusal: &Refusal) {
+        self.text(&refusal.bthread);
+        self.number(Family::Sync(node.clone(), refusal.bthread.clone()), refusal.sync);
+        self.text(refusal.reason.as_str());
+    }
+
+    /// The whole row, its numbers counted anew.
+    pub(crate) fn finish(mut self) -> Vec<u32> {
+        self.numbers.sort_unstable();
+        let mut last = None;
+        let mut rank = 0;
+        for (family, number, place) in self.numbers {
+            rank = match last {
+                Some((before, _)) if before != family => 0,
+                Some((_, same)) if same == number => rank,
+                Some(_) => rank + 1,
+                None => 0,
+            };
+            last = Some((family, number));
+            if let Some(word) = self.words.get_mut(place) {
+                *word = rank;
+            }
+        }
+        self.words
+    }
+}

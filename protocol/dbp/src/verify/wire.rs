@@ -1,0 +1,51 @@
+//! What is on its way from one node to another.
+
+use std::collections::VecDeque;
+
+use super::row::{Family, Part, Row};
+use crate::node::Node;
+use crate::{BidAck, BidRecord, NodeName, Occurrence, Presence};
+
+/// Messages from one node to another that have not arrived. Of records any may arrive next, and then older ones count no
+/// more; of acknowledgements and presences only the newest counts; occurrences arrive in order, since holes are repaired.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Wire {
+    pub(super) records: Vec<BidRecord>,
+    pub(super) ack: Option<BidAck>,
+    pub(super) occurrences: VecDeque<Occurrence>,
+    pub(super) presence: Option<Presence>,
+}
+
+impl Wire {
+    pub(super) fn write_standing(&self, row: &mut Row<'_>, from: &NodeName, to: &Node) {
+        row.list(&self.records, |row, record| {
+            row.plain(record.incarnation);
+            row.optional(record.home_incarnation);
+            row.number(Family::Epoch(from.clone(), to.name().clone()), record.epoch);
+            let since = to.occurred_since(record.applied);
+            row.list(&record.bids, |row, bid| {
+                row.bid(from, bid);
+                // All that the home will ask of what has occurred since the record was made.
+                row.flag(since.iter().any(|event| bid.requests.contains(event)));
+            });
+        });
+        row.list(&self.ack, |row, ack| {
+            row.plain(ack.incarnation);
+            row.plain(ack.home_incarnation);
+            row.number(Family::Epoch(to.name().clone(), from.clone()), ack.epoch);
+            row.list(&ack.refused, |row, refusal| row.refusal(to.name(), refusal));
+        });
+        row.list(&self.occurrences, |row, occurrence| {
+            row.plain(occurrence.incarnation);
+            row.number(Family::Seq(from.clone()), occurrence.seq);
+            row.part(Part::Event(occurrence.event.clone()));
+            row.list(&occurrence.requests_served, |row, served| {
+                row.text(served.node.as_str());
+                row.plain(served.incarnation);
+                row.text(&served.bthread);
+                row.number(Family::Sync(served.node.clone(), served.bthread.clone()), served.sync);
+            });
+        });
+        row.list(&self.presence, |row, presence| row.plain(presence.incarnation));
+    }
+}

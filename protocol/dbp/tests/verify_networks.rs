@@ -1,0 +1,115 @@
+//! The verifier on small networks whose answers are known.
+
+#![allow(clippy::unwrap_used)] // A test fails by panicking.
+
+use std::sync::Arc;
+
+use skein_bp::EventSet;
+use skein_bp::verify::{Omission, Report, ViolationKind};
+use skein_dbp::verify::programs::{self, Network};
+use skein_dbp::verify::{Faults, Member, NetworkView};
+
+const NONE: Faults = Faults { delay: false, lapses: 0, restarts: 0, late_facts: false, most_under_way: 8 };
+
+fn trace(report: &Report) -> Vec<String> {
+    report.verdict.iter().flat_map(|violation| &violation.trace).map(ToString::to_string).collect()
+}
+
+fn holds(network: &Network, faults: Faults) -> Report {
+    let report = network.verifier(faults).run();
+    assert_eq!(report.verdict, None, "{}: {report}", network.name);
+    // The only bounds are those on what may go wrong.
+    let is_modelled = |omission: &Omission| matches!(omission, Omission::NotModelled { .. });
+    assert!(report.not_covered.iter().all(is_modelled), "{}: {report}", network.name);
+    println!("{}: {} states, {} edges", network.name, report.states, report.edges);
+    report
+}
+
+#[test]
+fn nodes_pass_a_gate_by_turns() {
+    let network = programs::alternating_gate().unwrap();
+    let calm = holds(&network, NONE);
+    holds(&network, Faults { delay: true, ..NONE });
+    let lapsing = holds(&network, Faults { lapses: 1, ..NONE });
+    let restarting = holds(&network, Faults { restarts: 1, ..NONE });
+    // Faults add behaviour.
+    assert!([lapsing, restarting].iter().all(|report| report.states > calm.states));
+}
+
+#[test]
+fn one_at_most_is_inside_where_each_blocks_awaits_confirmation_and_acts() {
+    let network = programs::guarded_resource(2).unwrap();
+    holds(&network, Faults { delay: true, ..NONE });
+    holds(&network, Faults { lapses: 1, ..NONE });
+    holds(&network, Faults { restarts: 1, ..NONE });
+}
+
+#[test]
+fn of_three_one_at_most_is_inside() {
+    holds(&programs::guarded_resource(3).unwrap(), NONE);
+}
+
+#[test]
+fn someone_does_get_inside() {
+    let mut network = programs::guarded_resource(2).unwrap();
+    let enters = |view: &NetworkView<'_>| {
+        let entered = view.programs().any(|(node, program)| {
+            let entrance = program.bids().find(|(name, ..)| *name == "entrance");
+            entrance.is_some_and(|(_, bid, sync)| {
+                sync > 2 && bid.requests().is_empty() && node.starts_with("uav/")
+            })
+        });
+        if entered { Err("entered".to_owned()) } else { Ok(()) }
+    };
+    network.requirement = Some(("nobody enters", Arc::new(enters)));
+    assert!(network.verifier(NONE).run().verdict.is_some());
+}
+
+#[test]
+fn two_are_inside_where_nobody_awaits_confirmation() {
+    let report = programs::naive_resource(2).unwrap().verifier(NONE).run();
+    let violation = report.verdict.as_ref().unwrap();
+    assert!(
+        matches!(&violation.kind, ViolationKind::Invariant { message, .. } if message == "uav/1 and uav/2 are inside")
+    );
+    // Both begin, and enter before they hear of each other.
+    assert_eq!(trace(&report).len(), 2, "{report}");
+    assert!(
+        trace(&report)[0].starts_with("uav/1 begins") && trace(&report)[0].contains("uav/1/enter"),
+        "{report}"
+    );
+}
+
+/// Whoever is inside learns of a home's new life, and leaves, before it can acknowledge a claim of that life.
+#[test]
+fn one_at_most_is_inside_after_a_restart_even_where_entering_is_not_guarded() {
+    let mut network = programs::guarded_resource(2).unwrap();
+    for Member { config, .. } in &mut network.members {
+        config.guarded = EventSet::None;
+    }
+    holds(&network, Faults { restarts: 1, ..NONE });
+}
+
+#[test]
+fn nobody_takes_off_while_held() {
+    holds(&programs::held_launch().unwrap(), Faults { lapses: 1, ..NONE });
+}
+
+/// How many states the two searches below look at: more than it takes to find what is wrong with the second network.
+const MOST: usize = 15_000;
+
+#[test]
+fn what_is_asked_once_is_done_once_though_its_home_restarts() {
+    let network = programs::asked_once().unwrap();
+    let report = network.verifier(Faults { restarts: 1, ..NONE }).most_states(MOST).run();
+    assert_eq!(report.verdict, None, "{report}");
+}
+
+#[test]
+fn what_is_asked_again_may_be_done_twice() {
+    let report =
+        programs::asked_again().unwrap().verifier(Faults { restarts: 1, ..NONE }).most_states(MOST).run();
+    let violation = report.verdict.as_ref().unwrap();
+    assert_eq!(violation.kind, ViolationKind::FailedAssertion { message: "dropped twice".into() });
+    assert_eq!(*violation.violators[0], *"ground/log#at most one");
+}
