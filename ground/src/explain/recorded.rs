@@ -71,7 +71,7 @@ impl Recorded {
         let mut recorded = Self {
             notes: Vec::new(),
             span: (Duration::MAX, Duration::ZERO),
-            complete: file.ends_with(mcap::MAGIC),
+            complete: ends_as_it_should(&file),
         };
         for message in stream {
             let message = match message {
@@ -136,6 +136,11 @@ impl Recorded {
         }
         evidence
     }
+}
+
+/// Whether the mark that a file begins with is also at its end.
+fn ends_as_it_should(file: &[u8]) -> bool {
+    file.get(mcap::MAGIC.len()..).is_some_and(|rest| rest.ends_with(mcap::MAGIC))
 }
 
 fn note(message: &mcap::Message<'_>) -> Result<Option<Note>, DecodeError> {
