@@ -209,30 +209,31 @@ fn a_vehicle_follows_another_at_a_distance_until_that_lands() {
     let text = r#"
         cruise_speed_m_s = 2.0
         [[vehicle]]
-        start_m = [0.0, 0.0]
-        waypoints_m = [[30.0, 0.0, 3.0], [30.0, 30.0, 3.0], [0.0, 30.0, 3.0]]
-        [[vehicle]]
         start_m = [-4.0, 0.0]
         waypoints_m = [[-4.0, -10.0, 3.0]]
+        [[vehicle]]
+        start_m = [0.0, 0.0]
+        waypoints_m = [[30.0, 0.0, 3.0], [30.0, 30.0, 3.0], [0.0, 30.0, 3.0]]
         [[script]]
         file = "follow.toml"
-        vehicles = [2]
-        with = { leader = "uav/1", distance_m = 8 }"#;
+        vehicles = [1]
+        with = { leader = "uav/2", distance_m = 8 }"#;
     let mut lockstep = Lockstep::of(scenario(text, 5));
     let mut distances = Vec::new();
     let mut corner_m = f64::INFINITY;
     fly(&mut lockstep, seconds(300.0), |lockstep| {
-        let (leader, follower) = (position(lockstep, 0), position(lockstep, 1));
+        let (follower, leader) = (position(lockstep, 0), position(lockstep, 1));
         corner_m = corner_m.min(distance(follower, [30.0, 30.0, 3.0]));
         // Once both are on their way, and until the leader comes down.
-        if leader[1] > 2.0 && distance(leader, [0.0, 30.0, 3.0]) > 2.0 {
+        if leader[1] > 2.0 && distance(leader, [0.0, 30.0, leader[2]]) > 2.0 {
             distances.push(distance(leader, follower));
         }
     });
     let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
     let farthest = distances.iter().copied().fold(0.0, f64::max);
+    assert!(distances.len() > 250, "{} looks", distances.len());
     assert!(nearest > 4.0 && farthest < 14.0, "it kept {nearest} to {farthest} m");
     assert!(corner_m < 6.0, "it flew the leader's way, {corner_m} m from its corner");
-    let landed = position(&lockstep, 1);
+    let landed = position(&lockstep, 0);
     assert!(distance(landed, [-4.0, -10.0, 0.0]) < 1.5, "then its own: {landed:?}");
 }
