@@ -291,7 +291,8 @@ fn swap(index: &mut Index, place: Place, old: &EventSet, new: &EventSet) {
     }
 }
 
-fn rank(strategy: Strategy, owner: &Owner, bid: &Bid) -> Option<i32> {
+/// Priority of a bid's requests under a strategy; none is lowest.
+pub(crate) fn rank(strategy: Strategy, owner: &Owner, bid: &Bid) -> Option<i32> {
     match (strategy, owner) {
         (Strategy::Simple | Strategy::Ordered, _) => None,
         (Strategy::SyncPriority, _) => bid.given_priority(),

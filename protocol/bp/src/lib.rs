@@ -47,6 +47,7 @@ mod selection;
 mod strategy;
 mod tie;
 mod value;
+pub mod verify;
 
 pub use bid::Bid;
 pub use bthread::{BThread, Context, DEFAULT_BTHREAD_PRIORITY};

@@ -129,6 +129,15 @@ pub struct Program {
     listeners: Vec<Place>,
 }
 
+/// What a program holds beside its b-threads and proxies.
+#[derive(Clone, Debug)]
+pub(crate) struct Rest {
+    pub(crate) externals: VecDeque<Event>,
+    pub(crate) occurrences: VecDeque<Event>,
+    pub(crate) failure: Option<(Arc<str>, String)>,
+    pub(crate) daemon: bool,
+}
+
 /// Building and feeding a program.
 impl Program {
     /// A program without b-threads.
@@ -487,6 +496,63 @@ impl Program {
         if self.unstarted.is_empty() {
             self.board.compact();
         }
+    }
+}
+
+/// Taking a program apart, and putting another of the same settings together: what a verifier does.
+impl Program {
+    pub(crate) fn config(&self) -> &ProgramConfig {
+        &self.config
+    }
+
+    pub(crate) fn home(&self) -> &EventSet {
+        &self.board.home
+    }
+
+    /// B-threads and proxies in the order they came.
+    pub(crate) fn entries(&self) -> impl Iterator<Item = &Entry> {
+        self.board.entries()
+    }
+
+    pub(crate) fn rest(&self) -> Rest {
+        Rest {
+            externals: self.externals.clone(),
+            occurrences: self.occurrences.clone(),
+            failure: self.failure.clone(),
+            daemon: self.daemon,
+        }
+    }
+
+    /// A program whose b-threads and proxies are at these synchronisation points.
+    pub(crate) fn assemble(&self, seats: impl Iterator<Item = (Arc<str>, Owner, Bid)>, rest: Rest) -> Self {
+        let mut program = Self::new(self.config.clone());
+        program.set_home(&self.board.home);
+        for (name, owner, bid) in seats {
+            let place = program.board.add(name, owner, 0);
+            program.board.restate(place, bid);
+        }
+        let Rest { externals, occurrences, failure, daemon } = rest;
+        Self { externals, occurrences, failure, daemon, ..program }
+    }
+
+    /// Lets an event happen that may be selected: an internal one, or the external one at a position in the queue.
+    pub(crate) fn select(&mut self, event: Event, external: Option<usize>) {
+        let origin = match external {
+            Some(at) => {
+                self.externals.remove(at);
+                Origin::External
+            }
+            None => Origin::Internal,
+        };
+        self.deliver(event, origin, 0, Duration::ZERO);
+    }
+
+    /// Resumes a b-thread as if its deadline had passed.
+    pub(crate) fn fire_deadline(&mut self, bthread: &str) {
+        let Some(place) = self.board.bthread(bthread) else { return };
+        self.resume(place, &Event::timeout(), Duration::ZERO);
+        self.start_added(Duration::ZERO);
+        self.compact();
     }
 }
 
