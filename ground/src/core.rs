@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use skein_bp::{Program, ProgramConfig};
-use skein_dbp::{Happened, Node, NodeConfig, NodeError, NodeName};
-use skein_wire::{Fleet, Link, NodeLink, State};
+use skein_dbp::{Authority, Happened, Kept, Node, NodeConfig, NodeError, NodeName};
+use skein_wire::{Fleet, Link, NodeLink, State, Store, joint_roster, standard_authority};
 
 use crate::bthreads::{self, MissionOutcome, Watch, heard};
 use crate::order_log::OrderLog;
@@ -20,6 +20,8 @@ pub struct GroundConfig {
     pub name: NodeName,
     /// The vehicles, in the order in which they take off.
     pub vehicles: Vec<NodeName>,
+    /// Operators' scripts that may speak to the station too; nobody misses one that is not there.
+    pub operators: Vec<NodeName>,
     /// A number that grows with every start of this node.
     pub incarnation: u64,
     /// Orders known in advance, each with its time.
@@ -32,6 +34,10 @@ pub struct GroundConfig {
     pub muster: bool,
     /// Lease of the station's bids.
     pub lease: Duration,
+    /// Who of the others may request and block what here.
+    pub authority: Authority,
+    /// What a former life of this station has kept: joint decisions, and a roster that an operator has given.
+    pub kept: Kept,
     /// Seed of the program's tie-breaks.
     pub seed: u64,
 }
@@ -45,12 +51,15 @@ impl GroundConfig {
             fleet,
             name,
             vehicles,
+            operators: Vec::new(),
             incarnation: 1,
             orders: Vec::new(),
             loaded: true,
             launch_on_order: false,
             muster: false,
             lease,
+            authority: standard_authority(),
+            kept: Kept::default(),
             seed: 0,
         }
     }
@@ -79,19 +88,38 @@ pub struct GroundCore {
 impl GroundCore {
     /// A station that has heard of nobody yet.
     #[must_use]
-    pub fn new(mut config: GroundConfig) -> Self {
+    pub fn new(config: GroundConfig) -> Self {
+        Self::with_store(config, None)
+    }
+
+    /// A station that keeps in `store` what it must not forget, and takes up what its former life has kept.
+    #[must_use]
+    pub fn durable(config: GroundConfig, store: Box<dyn Store>) -> Self {
+        Self::with_store(config, Some(store))
+    }
+
+    fn with_store(mut config: GroundConfig, store: Option<Box<dyn Store>>) -> Self {
         let mut program = Program::new(ProgramConfig::vehicle(config.seed));
         if config.loaded {
             bthreads::load(&mut program, &config);
         }
-        let roster = config.vehicles.iter().chain([&config.name]).cloned().collect();
+        let roster: Vec<_> =
+            config.vehicles.iter().chain([&config.name]).chain(&config.operators).cloned().collect();
         let node_config = NodeConfig {
             lease: config.lease,
+            authority: config.authority,
+            joint: Some(joint_roster(config.name.clone(), &roster)),
+            durable: store.is_some(),
+            kept: config.kept,
             ..NodeConfig::new(config.name.clone(), config.incarnation, roster)
         };
         config.orders.sort_by_key(|(at, _)| *at);
+        let node = Node::new(node_config, program);
         Self {
-            node: NodeLink::new(Node::new(node_config, program), config.fleet),
+            node: match store {
+                Some(store) => NodeLink::durable(node, config.fleet, store),
+                None => NodeLink::new(node, config.fleet),
+            },
             name: config.name,
             orders: config.orders,
             vehicles: config.vehicles,

@@ -20,6 +20,10 @@ pub enum Who {
 pub enum Order {
     /// Take off, one after another, those that stand ready.
     Launch,
+    /// Take off together, once every vehicle of the roster is there and ready.
+    LaunchTogether,
+    /// Land together, wherever you are: every vehicle of the roster learns of it before anything else is decided.
+    Abort,
     /// Stay where you are until resumed.
     Hold(Who),
     /// Go on.
@@ -51,11 +55,13 @@ const SPREAD_M: f64 = 3.0;
 const LEAST_HEIGHT_M: f64 = 1.0;
 
 impl Order {
-    /// The order as one word: `launch`, `hold`, `resume`, `land`, `return`, `goto` or `hand_back`.
+    /// The order as one word: `launch`, `launch_together`, `abort`, `hold`, `resume`, `land`, `return`, `goto` or `hand_back`.
     #[must_use]
     pub fn what(&self) -> &'static str {
         match self {
             Self::Launch => "launch",
+            Self::LaunchTogether => "launch_together",
+            Self::Abort => "abort",
             Self::Hold(_) => "hold",
             Self::Resume(_) => "resume",
             Self::Land(_) => "land",
@@ -69,7 +75,7 @@ impl Order {
     #[must_use]
     pub fn who(&self) -> &Who {
         match self {
-            Self::Launch => &Who::All,
+            Self::Launch | Self::LaunchTogether | Self::Abort => &Who::All,
             Self::Hold(who)
             | Self::Resume(who)
             | Self::Land(who)

@@ -14,7 +14,7 @@ use crate::order::{ordered, ordered_for_all};
 /// How long a vehicle may block its own take-off before the next one gets its turn.
 const PATIENCE: Duration = Duration::from_secs(15);
 /// Who orders the swarm down does not want the rest of it up.
-const CALLING_OFF: [&str; 2] = ["land", "return"];
+const CALLING_OFF: [&str; 3] = ["land", "return", "abort"];
 
 /// Requests `uav/N/takeoff` for each vehicle whose turn it is. Each vehicle's own preflight b-thread may block its
 /// take-off; one that does so for long, or falls silent, has another turn after the others.

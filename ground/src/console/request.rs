@@ -71,6 +71,8 @@ enum Kind {
 #[serde(rename_all = "snake_case")]
 enum What {
     Launch,
+    LaunchTogether,
+    Abort,
     Hold,
     Resume,
     Return,
@@ -108,6 +110,9 @@ fn order(Message { kind: Kind::Order, what, to, point, .. }: Message) -> Result<
     Ok(match what {
         What::Launch if who == Who::All => Order::Launch,
         What::Launch => return Err("a launch is for all: vehicles take off in turn".into()),
+        What::LaunchTogether if who == Who::All => Order::LaunchTogether,
+        What::Abort if who == Who::All => Order::Abort,
+        What::LaunchTogether | What::Abort => return Err("what is decided together is for all".into()),
         What::Hold => Order::Hold(who),
         What::Resume => Order::Resume(who),
         What::Return => Order::Return(who),
@@ -149,6 +154,7 @@ mod tests {
             (r#"{"type":"order","what":"goto","to":"all"}"#, "`point`"),
             (r#"{"type":"order","what":"goto","to":"all","point":[1e999,0,0]}"#, "number out of range"),
             (r#"{"type":"order","what":"launch","to":["uav/1"]}"#, "for all"),
+            (r#"{"type":"order","what":"abort","to":["uav/1"]}"#, "for all"),
         ] {
             let error = read(text).1.expect_err(text);
             assert!(error.contains(fault), "{text}: {error}");

@@ -193,6 +193,16 @@ impl EventSet {
         }
     }
 
+    /// The set without those alternatives that surely hold nothing of `other`, judged by names alone.
+    #[must_use]
+    pub fn about(&self, other: &EventSet) -> EventSet {
+        match self {
+            Self::Or(sets) => Self::any_of(sets.iter().map(|set| set.about(other))),
+            set if set.may_overlap(other) => set.clone(),
+            _ => Self::None,
+        }
+    }
+
     /// Whether the two sets surely share no event.
     fn is_apart_from(&self, other: &EventSet) -> bool {
         match (self, other) {

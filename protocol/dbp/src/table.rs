@@ -423,7 +423,8 @@ impl Rights {
         }
         let denial = |event: &Event| self.denial(node, &bid.bthread, event);
         let mut reasons: Vec<_> = bid.requests.iter().filter_map(denial).collect();
-        let block = match self.authority.may_block(node, &bid.bthread, &bid.block) {
+        // A b-thread blocks with one set what it wants to block at all homes together.
+        let block = match self.authority.may_block(node, &bid.bthread, &bid.block.about(&self.home)) {
             true => self.honoured_block(bid),
             false => {
                 reasons.push(RefusalReason::MayNotBlock);
