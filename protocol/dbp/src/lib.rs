@@ -48,6 +48,8 @@ pub mod facts;
 mod held_blocks;
 mod history;
 mod message;
+#[cfg(feature = "mutants")]
+mod mutant;
 mod name;
 mod node;
 mod outbox;
@@ -62,7 +64,9 @@ pub use message::{
     BidAck, BidRecord, Message, Occurrence, OnLoss, Presence, Recipient, Refusal, RefusalReason, RemoteBid,
     Repair, ServedRequest,
 };
+#[cfg(feature = "mutants")]
+pub use mutant::Mutant;
 pub use name::{NodeName, NodeNameError, first_two_chunks, is_chunk};
-pub use node::{Happened, Node, NodeError, NodeStats};
+pub use node::{Happened, Node, NodeError, NodeStats, ProxyMove};
 pub use peers::Peer;
 pub use table::RemoteParty;

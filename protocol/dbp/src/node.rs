@@ -52,6 +52,17 @@ pub struct Happened {
     pub at: Duration,
 }
 
+/// A proxy's bid as the program was told it: the channel's part in the run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ProxyMove {
+    /// How many of the selections that [`Node::take_selections`] gives next came before it.
+    pub after: usize,
+    /// The proxy, `node#bthread`.
+    pub proxy: Arc<str>,
+    /// Its bid from now on; none if it goes.
+    pub bid: Option<Bid>,
+}
+
 /// Why a step did not go well. What happened in it counts all the same.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NodeError {
@@ -126,6 +137,8 @@ pub struct Node {
     two_homed: BTreeMap<String, u64>,
     outgoing: Vec<(Recipient, Message)>,
     selections: Vec<Happened>,
+    /// How proxies moved, where that is recorded.
+    proxy_moves: Option<Vec<ProxyMove>>,
     stats: NodeStats,
 }
 
@@ -173,6 +186,8 @@ impl Node {
         }
         let facts = facts::all(&config.name);
         let never = facts.clone().or(config.safety.clone()).or(config.gateway.clone());
+        #[cfg(feature = "mutants")]
+        let never = if config.mutant == Some(crate::Mutant::G6) { facts.clone() } else { never };
         let rights = Rights {
             home: home.clone(),
             blockable: home.clone().and(never.not()),
@@ -181,6 +196,8 @@ impl Node {
             gateway: config.gateway.clone(),
             priority: config.remote_priority.clone(),
             longest_lease: config.longest_lease.max(config.lease),
+            #[cfg(feature = "mutants")]
+            mutant: config.mutant,
         };
         Self {
             peers: Peers::new(config.roster.iter().cloned(), config.lease),
@@ -205,6 +222,7 @@ impl Node {
             two_homed: BTreeMap::new(),
             outgoing: Vec::new(),
             selections: Vec::new(),
+            proxy_moves: None,
             stats: NodeStats::default(),
             config,
         }
@@ -265,6 +283,17 @@ impl Node {
     /// What has happened since the last call, here and elsewhere, in the order in which the program saw it.
     pub fn take_selections(&mut self) -> Vec<Happened> {
         std::mem::take(&mut self.selections)
+    }
+
+    /// Records from now on how proxies move, for one who replays the run; see
+    /// [`take_proxy_moves`](Self::take_proxy_moves).
+    pub fn record_proxies(&mut self) {
+        self.proxy_moves.get_or_insert_default();
+    }
+
+    /// How proxies have moved since the last call, in order; to be taken together with the selections.
+    pub fn take_proxy_moves(&mut self) -> Vec<ProxyMove> {
+        self.proxy_moves.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// When [`step`](Self::step) is due even if no message comes.

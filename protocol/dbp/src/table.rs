@@ -9,6 +9,8 @@ use std::time::Duration;
 use skein_bp::{Bid, Event, EventSet};
 
 use crate::history::History;
+#[cfg(feature = "mutants")]
+use crate::mutant::Mutant;
 use crate::{BidRecord, NodeName, OnLoss, Refusal, RefusalReason, RemoteBid, ServedRequest};
 
 /// How many bids one node may have here.
@@ -33,6 +35,8 @@ pub(crate) struct Rights {
     pub(crate) priority: RangeInclusive<i32>,
     /// The longest lease granted.
     pub(crate) longest_lease: Duration,
+    #[cfg(feature = "mutants")]
+    pub(crate) mutant: Option<crate::Mutant>,
 }
 
 /// The change of a proxy: its new bid, or none if it goes.
@@ -134,13 +138,20 @@ impl BidTable {
         bidder.released.clear();
         bidder.knows_this_life |= for_this_life;
         let mut taken = BTreeMap::new();
+        #[cfg(feature = "mutants")]
+        if self.rights.mutant == Some(Mutant::G2) {
+            taken = bidder.bids.clone();
+        }
         for (index, bid) in record.bids.iter().enumerate() {
             let (honoured, reasons) = self.rights.judge(bid, index, bidder.lease);
             bidder.refuse(bid, reasons);
             let Some(mut honoured) = honoured else { continue };
             // What has occurred since the bidder stated this resumes its b-thread, which asks no more (G4).
             let resumed = since.iter().any(|event| bid.requests.contains(event));
-            honoured.open &= for_this_life && !bidder.has_been_served(bid) && !resumed;
+            let over = bidder.has_been_served(bid) || resumed;
+            #[cfg(feature = "mutants")]
+            let over = over && self.rights.mutant != Some(Mutant::G4);
+            honoured.open &= for_this_life && !over;
             taken.insert(bid.bthread.clone(), honoured);
         }
         bidder.served.retain(|bthread, _| taken.contains_key(bthread));
@@ -169,7 +180,7 @@ impl BidTable {
     pub(crate) fn expire(&mut self, now: Duration) -> Vec<ProxyChange> {
         let mut gone = Vec::new();
         for (node, bidder) in &mut self.bidders {
-            if bidder.live && now >= bidder.heard_at + bidder.lease {
+            if bidder.live && now >= self.rights.lapses_at(bidder) {
                 bidder.live = false;
                 bidder.released = bidder.blocking().collect();
                 gone.extend(changes(node, &std::mem::take(&mut bidder.bids), &BTreeMap::new()));
@@ -191,7 +202,7 @@ impl BidTable {
         self.bidders
             .values()
             .filter(|bidder| bidder.live && !bidder.bids.is_empty())
-            .map(|bidder| bidder.heard_at + bidder.lease)
+            .map(|bidder| self.rights.lapses_at(bidder))
             .min()
     }
 
@@ -280,6 +291,17 @@ impl Bidder {
 }
 
 impl Rights {
+    /// When the lease of a bidder runs out, on this home's clock.
+    fn lapses_at(&self, bidder: &Bidder) -> Duration {
+        #[cfg(feature = "mutants")]
+        match self.mutant {
+            Some(Mutant::G3) => return bidder.heard_at + bidder.lease * 8 / 10,
+            Some(Mutant::G5) => return Duration::MAX,
+            _ => {}
+        }
+        bidder.heard_at + bidder.lease
+    }
+
     /// What of the `index`-th bid of a record is honoured, and why not the rest.
     fn judge(
         &self,

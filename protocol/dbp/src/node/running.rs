@@ -22,7 +22,7 @@ impl Node {
             && (self.now >= self.guard_ends() || self.peers.names().all(|member| self.table.knows(member)))
         {
             self.guarding = false;
-            self.program.remove_proxy(RESTART_GUARD);
+            self.change_proxies(vec![(RESTART_GUARD.into(), None)]);
         }
     }
 
@@ -60,6 +60,12 @@ impl Node {
     }
 
     fn run_program(&mut self, before: usize) -> Result<(), NodeError> {
+        #[cfg(feature = "mutants")]
+        if self.config.mutant == Some(crate::Mutant::G9)
+            && let Some(selection) = self.program.step(self.now)?
+        {
+            self.publish(selection);
+        }
         while let Some(delivery) = self.deliveries.pop_front() {
             match delivery {
                 Delivery::Fact(_, Some((bthread, sync))) if self.sync_of(&bthread) != Some(sync) => {}
@@ -128,7 +134,6 @@ impl Node {
     fn publish(&mut self, selection: Selection) {
         let Selection { event, origin, requested_by, .. } = selection;
         let (served, proxies) = self.table.serve(&requested_by);
-        self.change_proxies(proxies);
         self.stalls_due = true;
         self.stats.occurred += 1;
         let travels = self.home.contains(&event);
@@ -154,6 +159,7 @@ impl Node {
             requested_by,
             at: self.now,
         });
+        self.change_proxies(proxies);
     }
 
     fn check_held_blocks(&mut self) {

@@ -1,0 +1,20 @@
+//! Faults on purpose, one for each promise: what a fault campaign must find if it is worth anything.
+
+/// A promise, and the fault that breaks it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Mutant {
+    /// An occurrence is given out as soon as it arrives, whatever is missing before it.
+    G1,
+    /// A bid that the newest record no longer holds stays in the home's table.
+    G2,
+    /// A home lets go of what it keeps after 0.8 of the lease.
+    G3,
+    /// A home forgets which requests it has served.
+    G4,
+    /// A home keeps what a lost node has bid.
+    G5,
+    /// A remote block counts for safety events too.
+    G6,
+    /// A local event is selected before what has occurred elsewhere is told.
+    G9,
+}
