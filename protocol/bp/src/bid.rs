@@ -36,6 +36,8 @@ struct Statement {
     interrupts: EventSet,
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     hot: bool,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    hold_when_lost: bool,
     #[serde(rename = "prio", skip_serializing_if = "Option::is_none")]
     priority: Option<i32>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -88,6 +90,14 @@ impl Bid {
         self
     }
 
+    /// Says that the blocks are to outlive this program: where it is represented by a proxy, that goes on blocking when
+    /// the program is lost. Means nothing in one program.
+    #[must_use]
+    pub fn hold_when_lost(mut self) -> Self {
+        self.0.hold_when_lost = true;
+        self
+    }
+
     /// Priority of the requests under [`Strategy::SyncPriority`](crate::Strategy::SyncPriority): greater wins, none is
     /// lowest.
     #[must_use]
@@ -127,6 +137,11 @@ impl Bid {
     /// Whether the b-thread must not stay here for ever.
     pub fn is_hot(&self) -> bool {
         self.0.hot
+    }
+
+    /// Whether the blocks are to outlive the program.
+    pub fn holds_when_lost(&self) -> bool {
+        self.0.hold_when_lost
     }
 
     /// The priority, if one was given.

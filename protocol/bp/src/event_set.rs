@@ -171,6 +171,42 @@ impl EventSet {
         overlap
     }
 
+    /// Whether every event of this set is surely in `other`. Errs towards no.
+    pub fn is_within(&self, other: &EventSet) -> bool {
+        match (self, other) {
+            (_, Self::All) => true,
+            (inner, outer) if inner == outer || inner.is_none() => true,
+            (Self::Exactly(event), outer) => outer.contains(event),
+            (Self::Or(sets), outer) => sets.iter().all(|set| set.is_within(outer)),
+            (inner, Self::And(sets)) => sets.iter().all(|set| inner.is_within(set)),
+            (inner, Self::Or(sets)) if sets.iter().any(|set| inner.is_within(set)) => true,
+            (inner, Self::Not(set)) => inner.is_apart_from(set),
+            (Self::And(sets), outer) => sets.iter().any(|set| set.is_within(outer)),
+            (Self::Named(inner), Self::Named(outer)) => inner.is_within(outer),
+            (Self::Named(inner), Self::Prefix(outer)) => inner.fixed_start().starts_with(&**outer),
+            (Self::Prefix(inner), Self::Prefix(outer)) => inner.starts_with(&**outer),
+            (Self::Prefix(inner), Self::Named(outer)) => {
+                let start = outer.fixed_start();
+                outer.as_str().strip_suffix("**") == Some(start) && inner.starts_with(start)
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether the two sets surely share no event.
+    fn is_apart_from(&self, other: &EventSet) -> bool {
+        match (self, other) {
+            (Self::Or(sets), other) | (other, Self::Or(sets)) => {
+                sets.iter().all(|set| set.is_apart_from(other))
+            }
+            (Self::And(sets), other) | (other, Self::And(sets)) => {
+                sets.iter().any(|set| set.is_apart_from(other))
+            }
+            (Self::Named(a), Self::Named(b)) => a.is_apart_from(b),
+            (a, b) => !a.may_overlap(b),
+        }
+    }
+
     fn may_reach(&self, scope: &Scope<'_>) -> bool {
         let mut reach = false;
         self.visit_scopes(&mut |own| reach |= own.overlaps(scope));

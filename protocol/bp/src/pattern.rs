@@ -60,6 +60,39 @@ impl Pattern {
         chunks_match(Some(&self.0.text), Some(name))
     }
 
+    /// Whether every name that fits this pattern surely fits `other` too.
+    pub fn is_within(&self, other: &Pattern) -> bool {
+        match (self.0.wild, other.0.wild) {
+            (false, _) => other.matches(&self.0.text),
+            (true, false) => false,
+            (true, true) => chunks_within(Some(&self.0.text), Some(&other.0.text)),
+        }
+    }
+
+    /// Whether surely no name fits both patterns.
+    pub(crate) fn is_apart_from(&self, other: &Pattern) -> bool {
+        match (self.0.wild, other.0.wild) {
+            (false, _) => !other.matches(&self.0.text),
+            (true, false) => !self.matches(&other.0.text),
+            (true, true) => !chunks_meet(Some(&self.0.text), Some(&other.0.text)),
+        }
+    }
+
+    /// The part of every fitting name that is known: up to the first wildcard.
+    pub(crate) fn fixed_start(&self) -> &str {
+        if !self.0.wild {
+            return &self.0.text;
+        }
+        let mut end = 0;
+        for chunk in self.0.text.split_inclusive('/') {
+            if matches!(chunk.trim_end_matches('/'), "*" | "**") {
+                break;
+            }
+            end += chunk.len();
+        }
+        self.0.text.get(..end).unwrap_or_default()
+    }
+
     pub(crate) fn matches_event(&self, event: &Event) -> bool {
         if self.0.wild {
             self.matches(event.name())
@@ -99,6 +132,39 @@ fn chunks_match(pattern: Option<&str>, name: Option<&str>) -> bool {
     let Some(name) = name else { return false };
     let (name_chunk, name_rest) = split_chunk(name);
     (chunk == "*" || chunk == name_chunk) && chunks_match(pattern_rest, name_rest)
+}
+
+/// Whether some name may fit both patterns; both sides lose chunks from the left.
+fn chunks_meet(a: Option<&str>, b: Option<&str>) -> bool {
+    let (Some(left), Some(right)) = (a, b) else {
+        let rest = a.or(b);
+        return rest.is_none_or(|rest| rest.split('/').all(|chunk| chunk == "**"));
+    };
+    let ((left, left_rest), (right, right_rest)) = (split_chunk(left), split_chunk(right));
+    if left == "**" || right == "**" {
+        return true;
+    }
+    (left == "*" || right == "*" || left == right) && chunks_meet(left_rest, right_rest)
+}
+
+/// Whether all names of the pattern `inner` are names of `outer`; both sides lose chunks from the left.
+fn chunks_within(inner: Option<&str>, outer: Option<&str>) -> bool {
+    let Some(outer) = outer else { return inner.is_none() };
+    let (wide, outer_rest) = split_chunk(outer);
+    if wide == "**" {
+        let mut rest = inner;
+        loop {
+            if chunks_within(rest, outer_rest) {
+                return true;
+            }
+            let Some(inner) = rest else { return false };
+            rest = split_chunk(inner).1;
+        }
+    }
+    let Some(inner) = inner else { return false };
+    let (narrow, inner_rest) = split_chunk(inner);
+    let fits = narrow != "**" && (wide == "*" || wide == narrow);
+    fits && chunks_within(inner_rest, outer_rest)
 }
 
 fn split_chunk(text: &str) -> (&str, Option<&str>) {

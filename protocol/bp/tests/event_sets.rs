@@ -154,6 +154,26 @@ fn event_set() -> impl Strategy<Value = EventSet> {
     })
 }
 
+#[test]
+fn what_is_surely_within_a_set_is_known() {
+    let set = |pattern: &str| EventSet::from(pattern);
+    for (inner, outer) in
+        [("uav/3/enter", "uav/*/enter"), ("uav/*/enter", "uav/**"), ("uav/3/**", "**"), ("a/*/c", "a/**")]
+    {
+        assert!(set(inner).is_within(&set(outer)), "{inner} in {outer}");
+        assert!(!set(outer).is_within(&set(inner)), "{outer} in {inner}");
+    }
+    let claim = set("uav/*/enter").and(set("uav/3/enter").not()).and(EventSet::region([0.0; 3], [1.0; 3]));
+    assert!(claim.is_within(&set("uav/*/enter")));
+    assert!(claim.is_within(&set("uav/*/land").or("uav/*/enter")));
+    assert!(claim.is_within(&set("uav/*/land").not()));
+    assert!(!claim.is_within(&set("uav/*/land")));
+    assert!(set("uav/3/*").is_within(&EventSet::prefix("uav/3/")));
+    assert!(EventSet::prefix("uav/3/go").is_within(&set("uav/3/**")));
+    assert!(EventSet::from(goto(1.0, 2.0)).is_within(&EventSet::field_range("x", 0.0, 2.0)));
+    assert!(!EventSet::All.is_within(&set("**").and(EventSet::field_range("x", 0.0, 2.0))));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
@@ -166,6 +186,7 @@ proptest! {
         prop_assert!(!(a.is_none() && in_a));
         prop_assert!(!(in_a && in_b) || a.may_overlap(&b), "they share {}", e);
         prop_assert!(!in_a || a.could_match_home(e.home()));
+        prop_assert!(!a.is_within(&b) || !in_a || in_b, "{} is not in {}", e, b);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use skein_bp::EventSet;
 
-use crate::NodeName;
+use crate::{Authority, Kept, NodeName, Roster};
 
 /// What a [`Node`](crate::Node) is told when it is made.
 #[derive(Clone, Debug)]
@@ -24,11 +24,18 @@ pub struct NodeConfig {
     pub safety: EventSet,
     /// Events that others may request and nobody from afar can block: `<name>/order` unless set.
     pub gateway: EventSet,
+    /// Who of the others may request and block what here (G7): everybody everything unless set.
+    pub authority: Authority,
     /// Events that this home selects, after a start, only once it knows every member's blocks: from their records,
     /// or because the longest lease has passed.
     pub guarded: EventSet,
-    /// Where `swarm/...` events have their home.
-    pub coordinator: Option<NodeName>,
+    /// Who decides on `swarm/...` events in the first term (G8); none: there are no such events.
+    pub joint: Option<Roster>,
+    /// Whether the driver saves what must be kept before it sends: without that, blocks that are to outlive their
+    /// holders are refused.
+    pub durable: bool,
+    /// What a former life of this node has kept.
+    pub kept: Kept,
     /// The band that priorities of remote bids are brought into.
     pub remote_priority: RangeInclusive<i32>,
     /// How many occurrences are kept for those who missed them; at least 1.
@@ -53,8 +60,11 @@ impl NodeConfig {
             longest_lease: Duration::from_secs(10),
             safety: EventSet::None,
             gateway,
+            authority: Authority::default(),
             guarded: EventSet::None,
-            coordinator: None,
+            joint: None,
+            durable: false,
+            kept: Kept::default(),
             remote_priority: i32::MIN..=i32::MAX,
             history: 1024,
             settle_limit: 1000,

@@ -15,6 +15,8 @@ pub const CONFIRMED: &str = "confirmed";
 pub const BLOCK_LAPSED: &str = "block_lapsed";
 /// `home` does not honour a bid of `bthread`, for `reason`.
 pub const REFUSED: &str = "refused";
+/// This home does not honour a bid of `bthread` at `node`, for `reason` (G7): what [`REFUSED`] is to the bidder.
+pub const DENIED: &str = "denied";
 /// `home` has restarted while `bthread` requested `event` there: it may have occurred or not, and is not asked for
 /// again before the b-thread's next synchronisation point (G4).
 pub const UNKNOWN: &str = "unknown";
@@ -25,8 +27,15 @@ pub const GAP: &str = "gap";
 /// `node` is heard, in this `incarnation`.
 pub const PEER_JOINED: &str = "peer_joined";
 /// `node` has not been heard for its lease, or has restarted (G5). `released` names, with blanks between, those of its
-/// b-threads whose blocks ended here with that.
+/// b-threads whose blocks ended here with that, and `held` those whose blocks stay.
 pub const PEER_LOST: &str = "peer_lost";
+/// This node has heard all `decided` decisions of its `term` (G8): told after they were, at the start and after each
+/// loss of the coordinator.
+pub const IN_STEP: &str = "in_step";
+/// `node`, a member of the roster, is in another `term`: nothing can be decided until an operator brings both to one.
+pub const OUT_OF_STEP: &str = "out_of_step";
+/// An order of a new roster was not taken, for the reason `why`.
+pub const ROSTER_REFUSED: &str = "roster_refused";
 /// `event` is requested here and blocked `by` a remote b-thread, `node#bthread`.
 pub const STALLED: &str = "stalled";
 /// `event` is no longer stalled.
@@ -38,15 +47,19 @@ pub const UNROUTABLE: &str = "unroutable";
 /// `event`, whose home is elsewhere, was handed in here as external.
 pub const MISDIRECTED: &str = "misdirected";
 
-const ALL: [&str; 13] = [
+const ALL: [&str; 17] = [
     CONFIRMED,
     BLOCK_LAPSED,
     REFUSED,
+    DENIED,
     UNKNOWN,
     ORPHAN,
     GAP,
     PEER_JOINED,
     PEER_LOST,
+    IN_STEP,
+    OUT_OF_STEP,
+    ROSTER_REFUSED,
     STALLED,
     UNSTALLED,
     DUPLICATE_NAME,

@@ -31,7 +31,7 @@ pub(crate) enum BlockNews {
 impl HeldBlocks {
     /// `bthread` blocks, since its synchronisation point `sync`, something of these homes.
     pub(crate) fn state(&mut self, bthread: &str, sync: u64, homes: Vec<NodeName>) {
-        if self.0.get(bthread).is_none_or(|held| held.sync != sync) {
+        if self.0.get(bthread).is_none_or(|held| held.sync != sync || held.homes != homes) {
             self.0.insert(bthread.into(), HeldBlock { sync, homes, confirmed: false });
         }
     }

@@ -11,8 +11,10 @@
 //! - confirmed block (G3): after `confirmed` a blocked event does not occur until the block is withdrawn, or its holder
 //!   has been told `block_lapsed`;
 //! - once (G4): one request is served at most once;
-//! - loss (G5): requests and blocks of a lost node lapse with its lease;
-//! - safe alone (G6): safety events never wait for another node.
+//! - loss (G5): requests and blocks of a lost node lapse with its lease, but for blocks that are to outlive it;
+//! - safe alone (G6): safety events never wait for another node;
+//! - joint (G8): a `swarm/...` event is decided once, by the coordinator of a [`Roster`], on fresh word from all of it;
+//! - authority (G7): a bid outside its sender's rights counts for nothing, and both ends are told why.
 //!
 //! A node learns of all this through events under its own name, the [`facts`].
 //!
@@ -42,11 +44,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod authority;
 mod config;
 mod explain;
 pub mod facts;
 mod held_blocks;
 mod history;
+mod joint;
+mod kept;
 mod message;
 #[cfg(feature = "mutants")]
 mod mutant;
@@ -54,19 +59,23 @@ mod name;
 mod node;
 mod outbox;
 mod peers;
+mod roster;
 mod stalls;
 mod stream;
 mod table;
 
+pub use authority::{Authority, Grant, Role, SCRIPT};
 pub use config::NodeConfig;
 pub use explain::NodeExplanation;
+pub use kept::{Kept, KeptBlock};
 pub use message::{
-    BidAck, BidRecord, Message, Occurrence, OnLoss, Presence, Recipient, Refusal, RefusalReason, RemoteBid,
-    Repair, ServedRequest,
+    BidAck, BidRecord, JointWord, Message, Occurrence, OnLoss, Presence, Recipient, Refusal, RefusalReason,
+    RemoteBid, Repair, ServedRequest,
 };
 #[cfg(feature = "mutants")]
 pub use mutant::Mutant;
 pub use name::{NodeName, NodeNameError, first_two_chunks, is_chunk};
-pub use node::{Happened, Node, NodeError, NodeStats, ProxyMove};
+pub use node::{Happened, LIFT, Node, NodeError, NodeStats, ProxyMove};
 pub use peers::Peer;
+pub use roster::{ROSTER, Roster, RosterError, SWARM};
 pub use table::RemoteParty;

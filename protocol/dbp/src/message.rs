@@ -67,6 +67,10 @@ pub struct BidRecord {
     pub sent_at: Duration,
     /// Highest number of the home's occurrences that the bidder had applied when this copy was sent.
     pub applied: u64,
+    /// The term that the bidder is in, 0 without joint events. A home in a later term does not listen (G8).
+    pub term: u64,
+    /// Highest number of that term's decisions that the bidder had applied.
+    pub decided: u64,
     /// How long the bids hold without renewal, in milliseconds.
     pub lease_ms: u64,
     /// One bid for each b-thread that requests or blocks something there.
@@ -147,6 +151,12 @@ pub enum RefusalReason {
     LeaseTooLong,
     /// It requests an event by which this home tells facts about itself, see [`facts`](crate::facts).
     Reserved,
+    /// Its sender has no right to request this here (G7).
+    MayNotRequest,
+    /// Its sender has no right to block all of this here (G7).
+    MayNotBlock,
+    /// An authority has lifted the block since.
+    Lifted,
     /// It exceeds the number of bids or requests that one node may have here.
     Quota,
 }
@@ -155,7 +165,15 @@ impl RefusalReason {
     /// Whether a bid refused for this reason blocks nothing.
     #[must_use]
     pub fn voids_block(self) -> bool {
-        matches!(self, Self::Unspecified | Self::HoldUnsupported | Self::LeaseTooLong | Self::Quota)
+        matches!(
+            self,
+            Self::Unspecified
+                | Self::HoldUnsupported
+                | Self::LeaseTooLong
+                | Self::MayNotBlock
+                | Self::Lifted
+                | Self::Quota
+        )
     }
 
     /// The reason as one word.
@@ -168,6 +186,9 @@ impl RefusalReason {
             Self::HoldUnsupported => "hold_unsupported",
             Self::LeaseTooLong => "lease_too_long",
             Self::Reserved => "reserved",
+            Self::Lifted => "lifted",
+            Self::MayNotRequest => "may_not_request",
+            Self::MayNotBlock => "may_not_block",
             Self::Quota => "quota",
         }
     }
@@ -195,6 +216,8 @@ pub struct Occurrence {
     pub incarnation: u64,
     /// Its number there: 1, 2, 3, ... without holes.
     pub seq: u64,
+    /// For a joint event the term in which it was decided, and then the number counts the term's decisions (G8); else 0.
+    pub term: u64,
     /// What.
     pub event: Event,
     /// The remote requests it served.
@@ -216,6 +239,8 @@ pub struct Repair {
     pub from_seq: u64,
     /// Last number missed.
     pub to_seq: u64,
+    /// The term whose decisions are missed; 0 for the home's other occurrences.
+    pub term: u64,
     /// Who asks.
     pub requester: NodeName,
 }
@@ -235,4 +260,19 @@ pub struct Presence {
     pub oldest_seq: u64,
     /// Without a word for so long, it counts as lost; in milliseconds.
     pub lease_ms: u64,
+    /// Where it stands with joint events; none if it takes part in none.
+    pub joint: Option<JointWord>,
+}
+
+/// What a sign of life says about joint events (G8).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JointWord {
+    /// The term that the node is in.
+    pub term: u64,
+    /// The coordinator: how many decisions the term has seen; a member: how many of them it has applied.
+    pub decided: u64,
+    /// A member: `up` of the coordinator's newest sign of life that it had heard.
+    pub heard: Option<Duration>,
+    /// The coordinator: whether it wants every member's word at once.
+    pub asks: bool,
 }

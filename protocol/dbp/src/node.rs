@@ -1,6 +1,7 @@
 //! One node of the fleet: its b-program and what joins it to the others.
 
 mod bidding;
+mod deciding;
 mod receiving;
 mod running;
 mod sending;
@@ -15,17 +16,18 @@ use crate::explain::NodeExplanation;
 use crate::facts::{self, count, tell};
 use crate::held_blocks::HeldBlocks;
 use crate::history::History;
+use crate::joint::Joint;
 use crate::outbox::Outbox;
 use crate::peers::{Peer, Peers};
 use crate::stalls::Stalls;
 use crate::stream::Stream;
 use crate::table::{BidTable, Rights};
-use crate::{Message, NodeConfig, NodeName, Occurrence, Recipient, first_two_chunks};
+use crate::{Kept, Message, NodeConfig, NodeName, Occurrence, Recipient, Roster, SWARM, first_two_chunks};
+
+pub use deciding::LIFT;
 
 /// The shortest lease.
 const LEAST_LEASE: Duration = Duration::from_millis(10);
-/// First chunk of the events that the coordinator is home to.
-const SWARM: &str = "swarm/";
 /// The proxy that keeps `guarded` events back after a start.
 const RESTART_GUARD: &str = "restart guard";
 /// How often one step comes back to facts that its own selections have brought about.
@@ -44,6 +46,8 @@ pub struct Happened {
     pub home: NodeName,
     /// Its number there, from 1; 0 for an event without home, which does not travel.
     pub seq: u64,
+    /// For a joint event its term, and then the number counts that term's decisions; else 0.
+    pub term: u64,
     /// [`Origin::Occurred`] for what was selected elsewhere and for [`facts`].
     pub origin: Origin,
     /// The b-threads that requested it, remote ones as `node#bthread`.
@@ -124,6 +128,14 @@ pub struct Node {
     streams: BTreeMap<NodeName, Stream>,
     held: HeldBlocks,
     stalls: Stalls,
+    /// Joint events: none if there are none.
+    joint: Option<Joint>,
+    /// Whether joint events are kept back.
+    guards_joint: bool,
+    /// Whether the coordinator has asked for word since it wants to decide.
+    asking: bool,
+    /// Whether what this node must keep has changed, but for the table's blocks.
+    unsaved: bool,
     deliveries: VecDeque<Delivery>,
     presence_due: Duration,
     presences: VecDeque<Duration>,
@@ -149,6 +161,8 @@ enum Delivery {
     Fact(Event, Option<(String, u64)>),
     /// What has occurred elsewhere.
     Occurrence(Occurrence),
+    /// What a former life of this node has decided.
+    Recalled(Occurrence),
 }
 
 /// Where an event is decided.
@@ -174,34 +188,38 @@ impl Node {
         config.roster.retain(|member| *member != config.name);
         config.roster.sort();
         config.roster.dedup();
-        let mut home = EventSet::prefix(format!("{}/", config.name));
-        if config.coordinator.as_ref() == Some(&config.name) {
-            home = home.or(EventSet::prefix(SWARM));
-        }
-        let homeless = EventSet::from("*").or(EventSet::from("*/*").and(EventSet::prefix(SWARM).not()));
-        program.set_home(home.clone().or(homeless));
+        let home = EventSet::prefix(format!("{}/", config.name));
+        program.set_home(home.clone().or(deciding::homeless()));
         let guarding = !config.guarded.is_none();
         if guarding {
             program.put_proxy(RESTART_GUARD, &Bid::new().block(config.guarded.clone()));
         }
         let facts = facts::all(&config.name);
-        let never = facts.clone().or(config.safety.clone()).or(config.gateway.clone());
-        #[cfg(feature = "mutants")]
-        let never = if config.mutant == Some(crate::Mutant::G6) { facts.clone() } else { never };
-        let rights = Rights {
-            home: home.clone(),
-            blockable: home.clone().and(never.not()),
+        let mut rights = Rights {
+            home: EventSet::None,
+            blockable: EventSet::None,
             facts,
             safety: config.safety.clone(),
             gateway: config.gateway.clone(),
+            authority: config.authority.clone(),
             priority: config.remote_priority.clone(),
             longest_lease: config.longest_lease.max(config.lease),
+            durable: config.durable,
             #[cfg(feature = "mutants")]
             mutant: config.mutant,
         };
-        Self {
+        rights.set_home(home.clone());
+        let Kept { blocks, roster, term, mut decisions } = std::mem::take(&mut config.kept);
+        let known = |name: &NodeName| config.roster.contains(name);
+        let (table, kept) = BidTable::new(
+            config.incarnation,
+            rights,
+            blocks.into_iter().filter(|block| known(&block.node)).collect(),
+        );
+        let roster = roster.into_iter().chain(config.joint.clone()).max_by_key(|roster| roster.term);
+        let mut node = Self {
             peers: Peers::new(config.roster.iter().cloned(), config.lease),
-            table: BidTable::new(config.incarnation, rights),
+            table,
             history: History::new(config.history),
             outboxes: config.roster.iter().map(|member| (member.clone(), Outbox::new())).collect(),
             streams: config.roster.iter().map(|member| (member.clone(), Stream::default())).collect(),
@@ -211,6 +229,10 @@ impl Node {
             started: None,
             held: HeldBlocks::default(),
             stalls: Stalls::default(),
+            joint: None,
+            guards_joint: false,
+            asking: false,
+            unsaved: false,
             deliveries: VecDeque::new(),
             presence_due: Duration::ZERO,
             presences: VecDeque::new(),
@@ -225,7 +247,13 @@ impl Node {
             proxy_moves: None,
             stats: NodeStats::default(),
             config,
+        };
+        node.change_proxies(kept);
+        if roster.as_ref().is_none_or(|roster| roster.term != term) {
+            decisions.clear();
         }
+        node.begin_term(roster, decisions);
+        node
     }
 
     /// Puts an event from outside at the end of the program's queue. One that has its home elsewhere is not taken in
@@ -280,6 +308,31 @@ impl Node {
         std::mem::take(&mut self.outgoing)
     }
 
+    /// What this node must not forget, if that has changed since the last call: to be on disk before
+    /// [`take_outgoing`](Self::take_outgoing) is sent.
+    pub fn take_unsaved(&mut self) -> Option<Kept> {
+        let blocks = self.table.take_unsaved();
+        (std::mem::take(&mut self.unsaved) || blocks).then(|| self.kept())
+    }
+
+    /// What this node must not forget.
+    #[must_use]
+    pub fn kept(&self) -> Kept {
+        let ordered = self.joint.as_ref().filter(|joint| self.config.joint.as_ref() != Some(&joint.roster));
+        Kept {
+            blocks: self.table.kept(),
+            roster: ordered.map(|joint| joint.roster.clone()),
+            term: self.term(),
+            decisions: self.joint.as_ref().map(Joint::events).unwrap_or_default(),
+        }
+    }
+
+    /// The roster of joint events in the present term.
+    #[must_use]
+    pub fn roster(&self) -> Option<&Roster> {
+        self.joint.as_ref().map(|joint| &joint.roster)
+    }
+
     /// What has happened since the last call, here and elsewhere, in the order in which the program saw it.
     pub fn take_selections(&mut self) -> Vec<Happened> {
         std::mem::take(&mut self.selections)
@@ -304,6 +357,8 @@ impl Node {
         }
         let lease = self.config.lease;
         let guard = self.guarding.then(|| self.guard_ends());
+        let decisions = self.joint.as_ref().filter(|joint| !joint.leads());
+        let decisions = decisions.and_then(|joint| joint.stream.next_deadline());
         [self.program.next_deadline(), self.peers.next_deadline(), self.table.next_deadline(), guard]
             .into_iter()
             .chain(self.outboxes.values().map(|outbox| outbox.next_deadline(lease)))
@@ -311,6 +366,7 @@ impl Node {
             .chain([self.held.next_deadline(|home, bthread, sync| {
                 self.outboxes.get(home)?.kept_until(bthread, sync, lease)
             })])
+            .chain([self.guard_due(), decisions])
             .flatten()
             .fold(self.presence_due, Duration::min)
     }
@@ -382,7 +438,7 @@ impl Node {
             return Home::Here;
         }
         let home = if event.name().starts_with(SWARM) {
-            self.config.coordinator.as_ref()
+            self.joint.as_ref().map(|joint| &joint.roster.coordinator)
         } else {
             let Some(prefix) = first_two_chunks(event.name()) else { return Home::Local };
             self.outboxes.get_key_value(prefix).map(|(name, _)| name)

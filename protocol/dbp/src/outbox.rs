@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use crate::{BidAck, BidRecord, NodeName, Refusal, RemoteBid};
+use crate::{BidAck, BidRecord, NodeName, OnLoss, Refusal, RemoteBid};
 
 /// The newest record for one home, kept alive by renewals.
 #[derive(Clone, Debug)]
@@ -19,6 +19,8 @@ pub(crate) struct Outbox {
     unknown: BTreeMap<String, u64>,
     /// What the home did not honour of the content it acknowledged last.
     refused: Vec<Refusal>,
+    /// Blocks that the home keeps even without renewal: for each b-thread, its synchronisation point (G5).
+    durable: BTreeMap<String, u64>,
     acked_epoch: u64,
     /// When the last acknowledged copy was sent.
     acked_sent_at: Duration,
@@ -32,6 +34,9 @@ pub(crate) struct Sender<'a> {
     pub(crate) node: &'a NodeName,
     pub(crate) incarnation: u64,
     pub(crate) lease: Duration,
+    /// The term it is in, and how many of its decisions it has applied.
+    pub(crate) term: u64,
+    pub(crate) decided: u64,
 }
 
 impl Outbox {
@@ -43,6 +48,7 @@ impl Outbox {
             since: BTreeMap::new(),
             unknown: BTreeMap::new(),
             refused: Vec::new(),
+            durable: BTreeMap::new(),
             acked_epoch: 0,
             acked_sent_at: Duration::ZERO,
             sent_at: None,
@@ -97,32 +103,52 @@ impl Outbox {
             (bid.bthread.clone(), (bid.sync, entered))
         });
         self.since = since.collect();
+        let since = &self.since;
+        self.durable.retain(|bthread, sync| since.get(bthread).is_some_and(|(stated, _)| stated == sync));
         self.sent_at = None;
     }
 
-    /// Takes in an answer of the home's present life; gives its refusals if it is news.
-    pub(crate) fn acknowledged(&mut self, now: Duration, ack: BidAck) -> &[Refusal] {
+    /// Takes in an answer of the home's present life; gives the refusals that are news.
+    pub(crate) fn acknowledged(&mut self, now: Duration, ack: BidAck) -> Vec<Refusal> {
         if self.home_incarnation != Some(ack.home_incarnation) || ack.epoch > self.epoch || ack.sent_at > now
         {
-            return &[];
+            return Vec::new();
         }
+        let late = (ack.epoch, ack.sent_at) <= (self.acked_epoch, self.acked_sent_at);
         self.acked_sent_at = self.acked_sent_at.max(ack.sent_at);
-        if ack.epoch <= self.acked_epoch {
-            return &[];
+        if late || ack.epoch < self.acked_epoch {
+            return Vec::new();
         }
         self.acked_epoch = ack.epoch;
-        self.refused = ack.refused;
-        &self.refused
+        let before = std::mem::replace(&mut self.refused, ack.refused);
+        for bid in self.bids.iter().filter(|bid| bid.on_loss == OnLoss::Hold) {
+            let sync = bid.sync;
+            let acked = self.since.get(&bid.bthread).is_some_and(|(_, epoch)| *epoch <= ack.epoch);
+            if self.block_refused(&bid.bthread, sync) {
+                self.durable.remove(&bid.bthread);
+            } else if acked {
+                self.durable.insert(bid.bthread.clone(), sync);
+            }
+        }
+        self.refused.iter().filter(|refusal| !before.contains(refusal)).cloned().collect()
     }
 
-    /// Until when, on this node's clock, the home surely keeps the block that `bthread` holds since its
-    /// synchronisation point `sync`; none if it has not acknowledged it. Counts 0.9 lease from sending (G3).
-    pub(crate) fn kept_until(&self, bthread: &str, sync: u64, lease: Duration) -> Option<Duration> {
-        let (since_sync, epoch) = *self.since.get(bthread)?;
+    fn block_refused(&self, bthread: &str, sync: u64) -> bool {
         let refused = |refusal: &Refusal| {
             refusal.bthread == bthread && refusal.sync == sync && refusal.reason.voids_block()
         };
-        let kept = since_sync == sync && self.acked_epoch >= epoch && !self.refused.iter().any(refused);
+        self.refused.iter().any(refused)
+    }
+
+    /// Until when, on this node's clock, the home surely keeps the block that `bthread` holds since its
+    /// synchronisation point `sync`; none if it has not acknowledged it. Counts 0.9 lease from sending (G3); a block that
+    /// is kept without renewal has no end.
+    pub(crate) fn kept_until(&self, bthread: &str, sync: u64, lease: Duration) -> Option<Duration> {
+        if self.durable.get(bthread) == Some(&sync) {
+            return Some(Duration::MAX);
+        }
+        let (since_sync, epoch) = *self.since.get(bthread)?;
+        let kept = since_sync == sync && self.acked_epoch >= epoch && !self.block_refused(bthread, sync);
         kept.then(|| self.acked_sent_at + lease * 9 / 10)
     }
 
@@ -147,6 +173,8 @@ impl Outbox {
             epoch: self.epoch,
             sent_at: now,
             applied,
+            term: from.term,
+            decided: from.decided,
             lease_ms: u64::try_from(from.lease.as_millis()).unwrap_or(u64::MAX),
             bids: self.bids.clone(),
         })

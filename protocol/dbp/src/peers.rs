@@ -70,6 +70,11 @@ impl Peers {
         }
     }
 
+    /// The life in which `node` was last heard.
+    pub(crate) fn incarnation(&self, node: &NodeName) -> Option<u64> {
+        self.0.get(node)?.incarnation
+    }
+
     /// Takes over the lease that a peer has announced.
     pub(crate) fn set_lease(&mut self, node: &NodeName, lease: Duration) {
         if let Some(peer) = self.0.get_mut(node) {

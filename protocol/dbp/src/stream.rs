@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use crate::{Occurrence, Presence};
+use crate::Occurrence;
 
 /// How many occurrences wait behind a hole; those too far ahead are asked for again later.
 const MOST_PENDING: usize = 1024;
@@ -68,12 +68,24 @@ impl Stream {
             Self { incarnation: Some(incarnation), applied: known_before.then_some(0), ..Self::default() };
     }
 
-    /// The home lives. `from_start`: it started no earlier than this node, so nothing of it may be missed.
-    pub(crate) fn presence(&mut self, presence: &Presence, from_start: bool, heard: &mut VecDeque<Heard>) {
-        let begin = if from_start { 0 } else { presence.latest_seq };
+    /// Begins with the first occurrence of `incarnation`, whenever that was.
+    pub(crate) fn begin(&mut self, incarnation: u64) {
+        *self = Self { incarnation: Some(incarnation), applied: Some(0), ..Self::default() };
+    }
+
+    /// The home lives: its latest occurrence is `latest`, and it can repeat those from `oldest` on. `from_start`: it
+    /// started no earlier than this node, so nothing of it may be missed.
+    pub(crate) fn presence(
+        &mut self,
+        latest: u64,
+        oldest: u64,
+        from_start: bool,
+        heard: &mut VecDeque<Heard>,
+    ) {
+        let begin = if from_start { 0 } else { latest };
         let applied = *self.applied.get_or_insert(begin);
-        self.latest = self.latest.max(presence.latest_seq);
-        let oldest = presence.oldest_seq.min(presence.latest_seq + 1);
+        self.latest = self.latest.max(latest);
+        let oldest = oldest.min(latest + 1);
         if oldest > applied + 1 {
             self.give_up_before(oldest, heard);
         }
@@ -174,21 +186,11 @@ mod tests {
             home: NodeName::new("uav/1").unwrap(),
             incarnation: 1,
             seq,
+            term: 0,
             event: Event::new("uav/1/x"),
             requests_served: vec![],
             requested_by: vec![],
             at: Duration::ZERO,
-        }
-    }
-
-    fn presence(latest_seq: u64, oldest_seq: u64) -> Presence {
-        Presence {
-            node: NodeName::new("uav/1").unwrap(),
-            incarnation: 1,
-            up: Duration::ZERO,
-            latest_seq,
-            oldest_seq,
-            lease_ms: 1000,
         }
     }
 
@@ -210,7 +212,7 @@ mod tests {
     #[test]
     fn order_is_restored_and_repeats_are_dropped() {
         let (mut stream, mut heard) = started();
-        stream.presence(&presence(0, 1), true, &mut heard);
+        stream.presence(0, 1, true, &mut heard);
         for seq in [2, 1, 1, 2, 4, 4, 3] {
             stream.occurrence(occurrence(seq), &mut heard);
         }
@@ -222,7 +224,7 @@ mod tests {
         let (mut stream, mut heard) = started();
         stream.occurrence(occurrence(3), &mut heard);
         assert!(heard.is_empty());
-        stream.presence(&presence(3, 1), true, &mut heard);
+        stream.presence(3, 1, true, &mut heard);
         assert!(heard.is_empty(), "1 and 2 are still missing");
         assert_eq!(stream.repair(Duration::ZERO, Duration::from_millis(100)), Some((1, vec![(1, 2)])));
         assert_eq!(stream.repair(Duration::ZERO, Duration::from_millis(100)), None, "asked again too soon");
@@ -236,7 +238,7 @@ mod tests {
     #[test]
     fn several_holes_are_asked_for_at_once() {
         let (mut stream, mut heard) = started();
-        stream.presence(&presence(9, 1), true, &mut heard);
+        stream.presence(9, 1, true, &mut heard);
         for seq in [3, 4, 7] {
             stream.occurrence(occurrence(seq), &mut heard);
         }
@@ -246,7 +248,7 @@ mod tests {
     #[test]
     fn a_late_joiner_begins_at_the_present() {
         let (mut stream, mut heard) = started();
-        stream.presence(&presence(40, 1), false, &mut heard);
+        stream.presence(40, 1, false, &mut heard);
         stream.occurrence(occurrence(40), &mut heard);
         stream.occurrence(occurrence(41), &mut heard);
         assert_eq!(numbers(&heard), [41]);
@@ -255,18 +257,18 @@ mod tests {
     #[test]
     fn the_lost_tail_is_asked_for() {
         let (mut stream, mut heard) = started();
-        stream.presence(&presence(0, 1), true, &mut heard);
-        stream.presence(&presence(2, 1), true, &mut heard);
+        stream.presence(0, 1, true, &mut heard);
+        stream.presence(2, 1, true, &mut heard);
         assert_eq!(stream.repair(Duration::ZERO, Duration::ZERO), Some((1, vec![(1, 2)])));
     }
 
     #[test]
     fn what_the_home_has_forgotten_becomes_a_gap() {
         let (mut stream, mut heard) = started();
-        stream.presence(&presence(0, 1), true, &mut heard);
+        stream.presence(0, 1, true, &mut heard);
         stream.occurrence(occurrence(2), &mut heard);
         stream.occurrence(occurrence(7), &mut heard);
-        stream.presence(&presence(7, 6), true, &mut heard);
+        stream.presence(7, 6, true, &mut heard);
         assert_eq!(numbers(&heard), [-1, 2, -5]);
         stream.occurrence(occurrence(6), &mut heard);
         assert_eq!(numbers(&heard), [-1, 2, -5, 6, 7]);
@@ -275,7 +277,7 @@ mod tests {
     #[test]
     fn a_restart_closes_the_old_stream() {
         let (mut stream, mut heard) = started();
-        stream.presence(&presence(0, 1), true, &mut heard);
+        stream.presence(0, 1, true, &mut heard);
         stream.occurrence(occurrence(2), &mut heard);
         stream.latest_is(4);
         stream.restart(2, &mut heard);

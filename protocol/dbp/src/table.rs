@@ -11,7 +11,10 @@ use skein_bp::{Bid, Event, EventSet};
 use crate::history::History;
 #[cfg(feature = "mutants")]
 use crate::mutant::Mutant;
-use crate::{BidRecord, NodeName, OnLoss, Refusal, RefusalReason, RemoteBid, ServedRequest};
+use crate::{
+    Authority, BidRecord, KeptBlock, NodeName, OnLoss, Refusal, RefusalReason, RemoteBid, Roster,
+    ServedRequest,
+};
 
 /// How many bids one node may have here.
 const MOST_BIDS: usize = 256;
@@ -31,10 +34,14 @@ pub(crate) struct Rights {
     pub(crate) gateway: EventSet,
     /// What may be blocked from afar: the home's events without all of these.
     pub(crate) blockable: EventSet,
+    /// Who may do what of the rest.
+    pub(crate) authority: Authority,
     /// The band of priorities.
     pub(crate) priority: RangeInclusive<i32>,
     /// The longest lease granted.
     pub(crate) longest_lease: Duration,
+    /// Whether blocks may outlive their holders, since what must be kept is kept on disk.
+    pub(crate) durable: bool,
     #[cfg(feature = "mutants")]
     pub(crate) mutant: Option<crate::Mutant>,
 }
@@ -42,13 +49,33 @@ pub(crate) struct Rights {
 /// The change of a proxy: its new bid, or none if it goes.
 pub(crate) type ProxyChange = (Arc<str>, Option<Bid>);
 
+/// What has occurred at this home.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Past<'a> {
+    pub(crate) history: &'a History,
+    /// The term it is in.
+    pub(crate) term: u64,
+    /// The decisions of that term, if it makes them.
+    pub(crate) decisions: Option<&'a History>,
+}
+
 /// What became of a record.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum TakenIn {
     /// It counts, and is acknowledged.
-    Yes,
+    Yes {
+        /// How the proxies change.
+        proxies: Vec<ProxyChange>,
+        /// What is not honoured of it, and was not in the record before.
+        denied: Vec<Refusal>,
+    },
     /// It is older than what is known, or its sender has to catch up first: no answer.
     No,
+}
+
+impl TakenIn {
+    /// It counts and changes nothing.
+    const AGAIN: Self = Self::Yes { proxies: Vec::new(), denied: Vec::new() };
 }
 
 /// All remote bids.
@@ -57,6 +84,8 @@ pub(crate) struct BidTable {
     incarnation: u64,
     rights: Rights,
     bidders: BTreeMap<NodeName, Bidder>,
+    /// Whether the blocks to be kept have changed since they were last taken to be saved.
+    unsaved: bool,
 }
 
 /// One node's bids in one of its lives.
@@ -78,6 +107,8 @@ struct Bidder {
     /// Highest synchronisation point of each b-thread at which a request was served (G4).
     served: BTreeMap<String, u64>,
     refused: Vec<Refusal>,
+    /// Blocks that an authority has lifted: for each b-thread, up to which synchronisation point.
+    lifted: BTreeMap<String, u64>,
 }
 
 /// One bid, as far as it is honoured.
@@ -89,6 +120,10 @@ struct TakenBid {
     priority: Option<i32>,
     /// Whether the requests may still be served.
     open: bool,
+    /// Whether the block outlives its holder.
+    keep: bool,
+    /// Whether it is left over from a life of its node that has ended, so that only an authority can lift it.
+    orphaned: bool,
 }
 
 /// A remote b-thread that stands behind a proxy.
@@ -105,35 +140,80 @@ pub struct RemoteParty {
 }
 
 impl BidTable {
-    pub(crate) fn new(incarnation: u64, rights: Rights) -> Self {
-        Self { incarnation, rights, bidders: BTreeMap::new() }
+    /// A table with the blocks that a former life of this home has kept, and the proxies that stand for them.
+    pub(crate) fn new(incarnation: u64, rights: Rights, kept: Vec<KeptBlock>) -> (Self, Vec<ProxyChange>) {
+        let mut bidders: BTreeMap<NodeName, Bidder> = BTreeMap::new();
+        for KeptBlock { node, incarnation, bthread, sync, block } in kept {
+            let bidder = bidders.entry(node).or_default();
+            bidder.incarnation = incarnation;
+            bidder.bids.insert(bthread, TakenBid { sync, block, ..TakenBid::kept() });
+        }
+        let nothing = BTreeMap::new();
+        let proxies =
+            bidders.iter().flat_map(|(node, bidder)| changes(node, &nothing, &bidder.bids)).collect();
+        (Self { incarnation, rights, bidders, unsaved: false }, proxies)
     }
 
-    /// Takes in a record of a roster member in its present life, and says how the proxies change.
-    pub(crate) fn take_in(
-        &mut self,
-        now: Duration,
-        record: &BidRecord,
-        history: &History,
-    ) -> (TakenIn, Vec<ProxyChange>) {
+    /// The rights that this home grants from now on.
+    pub(crate) fn rights_mut(&mut self) -> &mut Rights {
+        &mut self.rights
+    }
+
+    /// The blocks that must outlive this home's life.
+    pub(crate) fn kept(&self) -> Vec<KeptBlock> {
+        let blocks = self.bidders.iter().flat_map(|(node, bidder)| {
+            bidder.bids.iter().filter(|(_, bid)| bid.keep).map(|(bthread, bid)| KeptBlock {
+                node: node.clone(),
+                incarnation: bidder.incarnation,
+                bthread: bthread.clone(),
+                sync: bid.sync,
+                block: bid.block.clone(),
+            })
+        });
+        blocks.collect()
+    }
+
+    /// Whether [`kept`](Self::kept) has changed since the last call.
+    pub(crate) fn take_unsaved(&mut self) -> bool {
+        std::mem::take(&mut self.unsaved)
+    }
+
+    /// An authority lifts the block of `bthread` at `node`.
+    pub(crate) fn lift(&mut self, node: &NodeName, bthread: &str) -> Vec<ProxyChange> {
+        let Some(bidder) = self.bidders.get_mut(node) else { return Vec::new() };
+        let Some(bid) = bidder.bids.get_mut(bthread).filter(|bid| bid.keep) else { return Vec::new() };
+        self.unsaved = true;
+        bidder.lifted.insert(bthread.into(), bid.sync);
+        let before = bidder.bids.clone();
+        bidder.bids.remove(bthread);
+        changes(node, &before, &bidder.bids)
+    }
+
+    /// Takes in a record of a roster member in its present life.
+    pub(crate) fn take_in(&mut self, now: Duration, record: &BidRecord, past: &Past<'_>) -> TakenIn {
         let for_this_life = record.home_incarnation == Some(self.incarnation);
         let mut since = Vec::new();
         if for_this_life {
-            match history.after(record.applied) {
-                Some(occurrences) => since.extend(occurrences.map(|occurrence| &occurrence.event)),
-                None => return (TakenIn::No, Vec::new()),
+            let decided = if record.term == past.term { record.decided } else { 0 };
+            match (past.history.after(record.applied), past.decisions.map(|made| made.after(decided))) {
+                (Some(own), None) => since.extend(own.map(|occurrence| &occurrence.event)),
+                (Some(own), Some(Some(joint))) => {
+                    since.extend(own.chain(joint).map(|occurrence| &occurrence.event));
+                }
+                _ => return TakenIn::No,
             }
         }
         let bidder = self.bidders.entry(record.node.clone()).or_default();
         if record.incarnation != bidder.incarnation {
-            *bidder = Bidder { incarnation: record.incarnation, ..Bidder::default() };
+            *bidder = bidder.reborn(record.incarnation);
         }
         match (record.epoch, record.sent_at).cmp(&(bidder.epoch, bidder.sent_at)) {
-            Ordering::Less => return (TakenIn::No, Vec::new()),
+            Ordering::Less => return TakenIn::No,
             // A repeated copy does not renew the lease.
-            Ordering::Equal => return (if bidder.live { TakenIn::Yes } else { TakenIn::No }, Vec::new()),
+            Ordering::Equal => return if bidder.live { TakenIn::AGAIN } else { TakenIn::No },
             Ordering::Greater => {}
         }
+        let refused_before = std::mem::take(&mut bidder.refused);
         bidder.renew(now, record);
         bidder.released.clear();
         bidder.knows_this_life |= for_this_life;
@@ -143,7 +223,7 @@ impl BidTable {
             taken = bidder.bids.clone();
         }
         for (index, bid) in record.bids.iter().enumerate() {
-            let (honoured, reasons) = self.rights.judge(bid, index, bidder.lease);
+            let (honoured, reasons) = self.rights.judge(&record.node, bid, index, bidder.lease);
             bidder.refuse(bid, reasons);
             let Some(mut honoured) = honoured else { continue };
             // What has occurred since the bidder stated this resumes its b-thread, which asks no more (G4).
@@ -151,12 +231,34 @@ impl BidTable {
             let over = bidder.has_been_served(bid) || resumed;
             #[cfg(feature = "mutants")]
             let over = over && self.rights.mutant != Some(Mutant::G4);
-            honoured.open &= for_this_life && !over;
+            let astray =
+                record.term != past.term && bid.requests.iter().any(|e| Roster::joint_events().contains(e));
+            honoured.open &= for_this_life && !over && !astray;
+            if honoured.keep && bidder.lifted.get(&bid.bthread).is_some_and(|sync| bid.sync <= *sync) {
+                honoured.block = EventSet::None;
+                honoured.keep = false;
+                bidder.refuse(bid, vec![RefusalReason::Lifted]);
+            }
             taken.insert(bid.bthread.clone(), honoured);
         }
         bidder.served.retain(|bthread, _| taken.contains_key(bthread));
+        bidder.lifted.retain(|bthread, _| taken.contains_key(bthread));
+        for (bthread, orphan) in bidder.bids.iter().filter(|(_, bid)| bid.orphaned) {
+            let heir = taken.entry(bthread.clone()).or_insert_with(|| orphan.clone());
+            // The b-thread's new life takes the block over if it states all of it, and then may withdraw it.
+            if !(heir.keep && orphan.block.is_within(&heir.block)) {
+                heir.block = std::mem::take(&mut heir.block).or(orphan.block.clone());
+                heir.keep = true;
+                heir.orphaned = true;
+            }
+        }
+        self.unsaved |= kept_blocks(&bidder.bids).ne(kept_blocks(&taken));
         let before = std::mem::replace(&mut bidder.bids, taken);
-        (TakenIn::Yes, changes(&record.node, &before, &bidder.bids))
+        let denied = bidder.refused.iter().filter(|refusal| !refused_before.contains(refusal));
+        TakenIn::Yes {
+            proxies: changes(&record.node, &before, &bidder.bids),
+            denied: denied.cloned().collect(),
+        }
     }
 
     /// What the last record of `node` asked for in vain.
@@ -171,9 +273,10 @@ impl BidTable {
 
     /// `node` begins a new life: what it bid before is void.
     pub(crate) fn drop_life(&mut self, node: &NodeName) -> Vec<ProxyChange> {
-        self.bidders
-            .remove(node)
-            .map_or_else(Vec::new, |bidder| changes(node, &bidder.bids, &BTreeMap::new()))
+        let Some(bidder) = self.bidders.get_mut(node) else { return Vec::new() };
+        let before = bidder.bids.clone();
+        *bidder = bidder.reborn(0);
+        changes(node, &before, &bidder.bids)
     }
 
     /// Lets go of the bids whose lease has run out (G5).
@@ -182,19 +285,28 @@ impl BidTable {
         for (node, bidder) in &mut self.bidders {
             if bidder.live && now >= self.rights.lapses_at(bidder) {
                 bidder.live = false;
-                bidder.released = bidder.blocking().collect();
-                gone.extend(changes(node, &std::mem::take(&mut bidder.bids), &BTreeMap::new()));
+                bidder.released = bidder.releasing().collect();
+                let before = std::mem::take(&mut bidder.bids);
+                let left = before.iter().filter(|(_, bid)| bid.keep);
+                bidder.bids = left.map(|(bthread, bid)| (bthread.clone(), bid.left_over())).collect();
+                gone.extend(changes(node, &before, &bidder.bids));
             }
         }
         gone
     }
 
-    /// The b-threads of `node` that block something here, or did when its lease ran out.
+    /// The b-threads of `node` whose blocks here end, or did end, with its lease.
     pub(crate) fn released_by(&self, node: &NodeName) -> BTreeSet<String> {
         let bidder = self.bidders.get(node);
         bidder
-            .map(|bidder| bidder.blocking().chain(bidder.released.iter().cloned()).collect())
+            .map(|bidder| bidder.releasing().chain(bidder.released.iter().cloned()).collect())
             .unwrap_or_default()
+    }
+
+    /// The b-threads of `node` whose blocks here stay when it is lost.
+    pub(crate) fn held_for(&self, node: &NodeName) -> BTreeSet<String> {
+        let bids = self.bidders.get(node).into_iter().flat_map(|bidder| &bidder.bids);
+        bids.filter(|(_, bid)| bid.keep).map(|(bthread, _)| bthread.clone()).collect()
     }
 
     /// When the next lease runs out.
@@ -261,9 +373,18 @@ impl BidTable {
 }
 
 impl Bidder {
-    /// Its b-threads that block something.
-    fn blocking(&self) -> impl Iterator<Item = String> + '_ {
-        self.bids.iter().filter(|(_, bid)| !bid.block.is_none()).map(|(bthread, _)| bthread.clone())
+    /// Its b-threads whose blocks end with its lease.
+    fn releasing(&self) -> impl Iterator<Item = String> + '_ {
+        let releasing = |bid: &TakenBid| !bid.block.is_none() && !bid.keep;
+        self.bids.iter().filter(move |(_, bid)| releasing(bid)).map(|(bthread, _)| bthread.clone())
+    }
+
+    /// The same node in a new life: of the old one, only the blocks that are kept count.
+    fn reborn(&mut self, incarnation: u64) -> Self {
+        let mut bids = std::mem::take(&mut self.bids);
+        bids.retain(|_, bid| bid.keep);
+        bids.values_mut().for_each(|bid| *bid = TakenBid { orphaned: true, ..bid.left_over() });
+        Self { incarnation, bids, ..Self::default() }
     }
 
     /// Takes over a newer copy's number, age and lease.
@@ -273,7 +394,6 @@ impl Bidder {
         self.heard_at = now;
         self.lease = Duration::from_millis(record.lease_ms);
         self.live = true;
-        self.refused.clear();
     }
 
     fn has_been_served(&self, bid: &RemoteBid) -> bool {
@@ -302,9 +422,19 @@ impl Rights {
         bidder.heard_at + bidder.lease
     }
 
+    /// From now on, these events have their home here.
+    pub(crate) fn set_home(&mut self, home: EventSet) {
+        let never = self.facts.clone().or(self.safety.clone()).or(self.gateway.clone());
+        #[cfg(feature = "mutants")]
+        let never = if self.mutant == Some(Mutant::G6) { self.facts.clone() } else { never };
+        self.blockable = home.clone().and(never.not());
+        self.home = home;
+    }
+
     /// What of the `index`-th bid of a record is honoured, and why not the rest.
     fn judge(
         &self,
+        node: &NodeName,
         bid: &RemoteBid,
         index: usize,
         lease: Duration,
@@ -315,31 +445,39 @@ impl Rights {
         if lease > self.longest_lease {
             return (None, vec![RefusalReason::LeaseTooLong]);
         }
-        let mut reasons: Vec<_> = bid.requests.iter().filter_map(|event| self.denial(event)).collect();
-        if bid.on_loss == OnLoss::Hold {
+        let denial = |event: &Event| self.denial(node, &bid.bthread, event);
+        let mut reasons: Vec<_> = bid.requests.iter().filter_map(denial).collect();
+        let block = match self.authority.may_block(node, &bid.bthread, &bid.block) {
+            true => self.honoured_block(bid),
+            false => {
+                reasons.push(RefusalReason::MayNotBlock);
+                EventSet::None
+            }
+        };
+        if bid.on_loss == OnLoss::Hold && !self.durable {
             reasons.push(RefusalReason::HoldUnsupported);
         }
         reasons.sort_unstable();
         reasons.dedup();
-        let allowed = bid.requests.iter().filter(|event| self.denial(event).is_none());
+        let allowed = bid.requests.iter().filter(|event| denial(event).is_none());
         let requests: Vec<Event> = allowed.cloned().collect();
         let open = !requests.is_empty();
         let priority =
             bid.priority.map(|priority| priority.max(*self.priority.start()).min(*self.priority.end()));
-        (
-            Some(TakenBid { sync: bid.sync, requests, block: self.honoured_block(bid), priority, open }),
-            reasons,
-        )
+        let keep = bid.on_loss == OnLoss::Hold && !block.is_none();
+        (Some(TakenBid { sync: bid.sync, requests, block, priority, open, keep, orphaned: false }), reasons)
     }
 
-    /// Why `event` may not be requested from afar, if so.
-    fn denial(&self, event: &Event) -> Option<RefusalReason> {
+    /// Why `bthread` of `node` may not request `event` from afar, if so.
+    fn denial(&self, node: &NodeName, bthread: &str, event: &Event) -> Option<RefusalReason> {
         if !self.home.contains(event) {
             Some(RefusalReason::NotHome)
         } else if self.facts.contains(event) {
             Some(RefusalReason::Reserved)
         } else if self.safety.contains(event) && !self.gateway.contains(event) {
             Some(RefusalReason::Safety)
+        } else if !self.authority.may_request(node, bthread, event) {
+            Some(RefusalReason::MayNotRequest)
         } else {
             None
         }
@@ -347,7 +485,7 @@ impl Rights {
 
     /// The block without what may not be blocked from afar.
     fn honoured_block(&self, bid: &RemoteBid) -> EventSet {
-        if bid.block.is_none() || bid.on_loss == OnLoss::Hold {
+        if bid.block.is_none() || (bid.on_loss == OnLoss::Hold && !self.durable) {
             return EventSet::None;
         }
         bid.block.clone().and(self.blockable.clone())
@@ -355,6 +493,24 @@ impl Rights {
 }
 
 impl TakenBid {
+    /// A block that is kept, and nothing else.
+    fn kept() -> Self {
+        Self {
+            sync: 0,
+            requests: Vec::new(),
+            block: EventSet::None,
+            priority: None,
+            open: false,
+            keep: true,
+            orphaned: false,
+        }
+    }
+
+    /// What stays of a bid whose holder is lost.
+    fn left_over(&self) -> Self {
+        Self { sync: self.sync, block: self.block.clone(), orphaned: self.orphaned, ..Self::kept() }
+    }
+
     /// The bid of the proxy.
     fn to_bid(&self) -> Bid {
         let mut bid = Bid::new().block(self.block.clone());
@@ -366,6 +522,11 @@ impl TakenBid {
             None => bid,
         }
     }
+}
+
+/// What of these bids must outlive this home's life.
+fn kept_blocks(bids: &BTreeMap<String, TakenBid>) -> impl Iterator<Item = (&String, u64, &EventSet)> {
+    bids.iter().filter(|(_, bid)| bid.keep).map(|(bthread, bid)| (bthread, bid.sync, &bid.block))
 }
 
 /// How the proxies of `node` change from one set of bids to the next.

@@ -8,8 +8,8 @@ use proptest::prelude::*;
 use skein_bp::script::{Op, Script};
 use skein_bp::{Bid, Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{
-    BidAck, BidRecord, Message, Node, NodeConfig, NodeName, Occurrence, OnLoss, Presence, Recipient,
-    RemoteBid, Repair, ServedRequest,
+    BidAck, BidRecord, JointWord, Message, Node, NodeConfig, NodeName, Occurrence, OnLoss, Presence,
+    Recipient, RemoteBid, Repair, Roster, ServedRequest,
 };
 
 fn name(text: &str) -> NodeName {
@@ -18,6 +18,11 @@ fn name(text: &str) -> NodeName {
 
 /// `uav/1`, which flies, lands and holds `uav/2`.
 fn node() -> Node {
+    node_with(None)
+}
+
+/// A node, of a fleet that decides together under this coordinator.
+fn node_with(coordinator: Option<&str>) -> Node {
     let mut program = Program::new(ProgramConfig::vehicle(1));
     let ask = Bid::new().request("uav/2/a").block("uav/*/b");
     program.add("ask", Script::new(&[Op::forever([Op::Sync(ask)])]).unwrap());
@@ -25,6 +30,9 @@ fn node() -> Node {
     program.add("listen", Script::new(&[Op::forever([Op::Sync(wait)])]).unwrap());
     let config = NodeConfig {
         safety: EventSet::from("uav/1/land"),
+        joint: coordinator
+            .map(|coordinator| Roster::first(name(coordinator), ["uav/1", "uav/2", "uav/3"].map(name))),
+        durable: coordinator.is_some(),
         ..NodeConfig::new(name("uav/1"), 3, vec![name("uav/2"), name("uav/3")])
     };
     let mut node = Node::new(config, program);
@@ -38,6 +46,7 @@ fn occurrence(home: &str, seq: u64, event: &str) -> Message {
         home,
         incarnation: 1,
         seq,
+        term: 0,
         event,
         requests_served: vec![],
         requested_by: Vec::new(),
@@ -54,6 +63,7 @@ fn presence(node: &str, latest_seq: u64) -> Message {
         latest_seq,
         oldest_seq: 1,
         lease_ms: 1000,
+        joint: None,
     })
 }
 
@@ -87,6 +97,7 @@ fn strangers_and_lives_that_are_over_are_not_heard() {
         latest_seq: 0,
         oldest_seq: 1,
         lease_ms: 1000,
+        joint: None,
     };
     node.handle(Duration::ZERO, Message::Presence(young));
     node.handle(Duration::ZERO, occurrence("uav/3", 1, "uav/3/step"));
@@ -143,6 +154,8 @@ fn a_record_that_asks_for_too_much_is_cut_down_and_the_rest_is_told() {
         epoch: 1,
         sent_at: Duration::ZERO,
         applied: 0,
+        term: 0,
+        decided: 0,
         lease_ms: 1000,
         bids,
     };
@@ -176,24 +189,26 @@ prop_compose! {
     fn any_message()(
         (a, b) in (any_name(), any_name()), which in 0..5, event in any_event(), incarnation in 0..4_u64,
         (n, m, far) in (1..6_u64, 0..6_u64, prop::sample::select(vec![1, 5, u64::MAX / 2])),
-        at in 0..3000_u64, known in prop::option::of(2..5_u64), lease_ms in prop::sample::select(vec![0, 1000, u64::MAX]),
+        (term, asks) in (0..3_u64, any::<bool>()), at in 0..3000_u64, known in prop::option::of(2..5_u64), lease_ms in prop::sample::select(vec![0, 1000, u64::MAX]),
     ) -> Message {
         let at = Duration::from_millis(at);
         let served = ServedRequest { node: b.clone(), incarnation: 3, bthread: "ask".into(), sync: n };
         let bid = RemoteBid {
             bthread: "x".into(), sync: n, requests: vec![event.clone()], block: EventSet::from("uav/1/*"),
-            priority: Some(9), on_loss: OnLoss::Release,
+            priority: Some(9), on_loss: if asks { OnLoss::Hold } else { OnLoss::Release },
         };
         match which {
             0 => Message::Bid(BidRecord {
-                node: a, incarnation, home: b, home_incarnation: known, epoch: n, sent_at: at, applied: m, lease_ms, bids: vec![bid],
+                node: a, incarnation, home: b, home_incarnation: known, epoch: n, sent_at: at, applied: m, term, decided: far, lease_ms, bids: vec![bid],
             }),
             1 => Message::Ack(BidAck {
                 home: a, home_incarnation: incarnation, node: b, incarnation: 3, epoch: n, sent_at: at, latest_seq: far, refused: vec![],
             }),
-            2 => Message::Occurrence(Occurrence { home: a, incarnation, seq: n.max(far / 2), event, requests_served: vec![served], requested_by: Vec::new(), at }),
-            3 => Message::Repair(Repair { home: a, incarnation: 3, from_seq: m, to_seq: far, requester: b }),
-            _ => Message::Presence(Presence { node: a, incarnation, up: at, latest_seq: far, oldest_seq: n, lease_ms }),
+            2 => Message::Occurrence(Occurrence { home: a, incarnation, seq: n.max(far / 2), term, event, requests_served: vec![served], requested_by: Vec::new(), at }),
+            3 => Message::Repair(Repair { home: a, incarnation: 3, from_seq: m, to_seq: far, term, requester: b }),
+            _ => Message::Presence(Presence { node: a, incarnation, up: at, latest_seq: far, oldest_seq: n, lease_ms,
+                joint: (term > 0).then_some(JointWord { term, decided: n, heard: known.map(Duration::from_secs), asks }),
+            }),
         }
     }
 }
@@ -202,14 +217,17 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn no_sequence_of_messages_makes_a_node_fail(messages in prop::collection::vec((any_message(), 0..400_u64), 0..60)) {
-        let mut node = node();
+    fn no_sequence_of_messages_makes_a_node_fail(
+        coordinator in prop::sample::select(vec![None, Some("uav/1"), Some("uav/2")]), messages in prop::collection::vec((any_message(), 0..400_u64), 0..60),
+    ) {
+        let mut node = node_with(coordinator);
         let mut now = Duration::ZERO;
         for (message, pause_ms) in messages {
             node.handle(now, message);
             prop_assert!(node.next_deadline() >= Duration::ZERO);
             now += Duration::from_millis(pause_ms);
             node.step(now).unwrap();
+            node.take_unsaved();
             node.take_outgoing();
             for happened in node.take_selections() {
                 prop_assert!(happened.event.name() != "uav/1/land", "a safety event was requested or claimed from afar");

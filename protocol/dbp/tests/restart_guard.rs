@@ -37,6 +37,8 @@ fn record(home_incarnation: Option<u64>, epoch: u64, bids: Vec<RemoteBid>) -> Me
         epoch,
         sent_at: Duration::ZERO,
         applied: 0,
+        term: 0,
+        decided: 0,
         lease_ms: 1000,
         bids,
     })

@@ -7,8 +7,8 @@ use std::time::Duration;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use skein_bp::{Event, EventSet, Pattern, Real, Value};
 use skein_dbp::{
-    BidAck, BidRecord, NodeName, Occurrence, OnLoss, Presence, Refusal, RefusalReason, RemoteBid, Repair,
-    ServedRequest,
+    BidAck, BidRecord, JointWord, NodeName, Occurrence, OnLoss, Presence, Refusal, RefusalReason, RemoteBid,
+    Repair, ServedRequest,
 };
 
 use crate::proto::{self, event_set, value::Kind};
@@ -239,6 +239,8 @@ impl From<&BidRecord> for proto::BidRecord {
             applied: record.applied,
             lease_ms: record.lease_ms,
             bids: record.bids.iter().map(Into::into).collect(),
+            term: record.term,
+            decided: record.decided,
         }
     }
 }
@@ -256,6 +258,8 @@ impl TryFrom<proto::BidRecord> for BidRecord {
             sent_at: Duration::from_nanos(record.sent_at_ns),
             applied: number("BidRecord.applied", record.applied, 0)?,
             lease_ms: record.lease_ms,
+            term: number("BidRecord.term", record.term, 0)?,
+            decided: number("BidRecord.decided", record.decided, 0)?,
             bids: record.bids.into_iter().map(RemoteBid::try_from).collect::<Result<_>>()?,
         })
     }
@@ -303,6 +307,9 @@ impl From<&Refusal> for proto::Refusal {
             RefusalReason::LeaseTooLong => proto::RefusalReason::LeaseTooLong,
             RefusalReason::Reserved => proto::RefusalReason::Reserved,
             RefusalReason::Quota => proto::RefusalReason::Quota,
+            RefusalReason::MayNotRequest => proto::RefusalReason::MayNotRequest,
+            RefusalReason::MayNotBlock => proto::RefusalReason::MayNotBlock,
+            RefusalReason::Lifted => proto::RefusalReason::Lifted,
         };
         Self { bthread: refusal.bthread.clone(), sync: refusal.sync, reason: reason.into() }
     }
@@ -321,6 +328,9 @@ impl TryFrom<proto::Refusal> for Refusal {
             proto::RefusalReason::LeaseTooLong => RefusalReason::LeaseTooLong,
             proto::RefusalReason::Reserved => RefusalReason::Reserved,
             proto::RefusalReason::Quota => RefusalReason::Quota,
+            proto::RefusalReason::MayNotRequest => RefusalReason::MayNotRequest,
+            proto::RefusalReason::MayNotBlock => RefusalReason::MayNotBlock,
+            proto::RefusalReason::Lifted => RefusalReason::Lifted,
         };
         Ok(Self { bthread: refusal.bthread, sync: number("Refusal.sync", refusal.sync, 1)?, reason })
     }
@@ -342,6 +352,7 @@ impl From<&Occurrence> for proto::Occurrence {
             requests_served: occurrence.requests_served.iter().map(served).collect(),
             requested_by: occurrence.requested_by.iter().map(|name| name.as_ref().into()).collect(),
             at_ns: ns(occurrence.at),
+            term: occurrence.term,
         }
     }
 }
@@ -362,6 +373,7 @@ impl TryFrom<proto::Occurrence> for Occurrence {
             home: node("Occurrence.home", &occurrence.home)?,
             incarnation: occurrence.incarnation,
             seq: number("Occurrence.seq", occurrence.seq, 1)?,
+            term: number("Occurrence.term", occurrence.term, 0)?,
             event: required("Occurrence.event", occurrence.event)?.try_into()?,
             requests_served: occurrence.requests_served.into_iter().map(served).collect::<Result<_>>()?,
             requested_by: occurrence.requested_by.into_iter().map(Arc::from).collect(),
@@ -378,6 +390,7 @@ impl From<&Repair> for proto::Repair {
             from_seq: repair.from_seq,
             to_seq: repair.to_seq,
             requester: text(&repair.requester),
+            term: repair.term,
         }
     }
 }
@@ -391,6 +404,7 @@ impl TryFrom<proto::Repair> for Repair {
             incarnation: repair.incarnation,
             from_seq: number("Repair.from_seq", repair.from_seq, 1)?,
             to_seq: number("Repair.to_seq", repair.to_seq, 1)?,
+            term: number("Repair.term", repair.term, 0)?,
             requester: node("Repair.requester", &repair.requester)?,
         })
     }
@@ -405,6 +419,12 @@ impl From<&Presence> for proto::Presence {
             latest_seq: presence.latest_seq,
             oldest_seq: presence.oldest_seq,
             lease_ms: presence.lease_ms,
+            joint: presence.joint.map(|word| proto::JointWord {
+                term: word.term,
+                decided: word.decided,
+                heard_ns: word.heard.map(ns),
+                asks: word.asks,
+            }),
         }
     }
 }
@@ -420,6 +440,20 @@ impl TryFrom<proto::Presence> for Presence {
             latest_seq: number("Presence.latest_seq", presence.latest_seq, 0)?,
             oldest_seq: number("Presence.oldest_seq", presence.oldest_seq, 1)?,
             lease_ms: presence.lease_ms,
+            joint: presence.joint.map(JointWord::try_from).transpose()?,
+        })
+    }
+}
+
+impl TryFrom<proto::JointWord> for JointWord {
+    type Error = DecodeError;
+
+    fn try_from(word: proto::JointWord) -> Result<Self> {
+        Ok(Self {
+            term: number("JointWord.term", word.term, 1)?,
+            decided: number("JointWord.decided", word.decided, 0)?,
+            heard: word.heard_ns.map(Duration::from_nanos),
+            asks: word.asks,
         })
     }
 }

@@ -39,6 +39,7 @@ pub mod proto;
 mod scan;
 mod scene;
 mod state;
+mod store;
 mod trace;
 pub mod vocabulary;
 
@@ -55,3 +56,4 @@ pub use scan::Scan;
 pub use scene::{Form, Scene, Solid};
 pub use skein_dbp::{NodeName, NodeNameError};
 pub use state::{MissionState, State};
+pub use store::{MemoryStore, Store};

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use skein_dbp::{Message, Node, NodeError, NodeName, Recipient};
+use skein_dbp::{Kept, Message, Node, NodeError, NodeName, Recipient};
 
-use crate::{DecodeError, Fleet, Key, Link, Payload, State, Topic};
+use crate::{DecodeError, Fleet, Key, Link, Payload, State, Store, Topic};
 
 /// How many messages one pump takes in, so that a flood cannot keep a node from going on.
 const MOST_PER_PUMP: usize = 4096;
@@ -17,10 +17,13 @@ const MOST_SKEWED: usize = 256;
 ///
 /// [`pump`](Self::pump) is the whole loop of a node: take in what has arrived, go on, send what is to be sent. A
 /// message under a key that its sender may not use, or that is no message, is counted and dropped.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct NodeLink {
     node: Node,
     fleet: Fleet,
+    store: Option<Box<dyn Store>>,
+    /// What the store has not taken yet.
+    unsaved: Option<Kept>,
     states: Vec<State>,
     stats: NodeLinkStats,
     skewed: BTreeMap<NodeName, u32>,
@@ -37,13 +40,22 @@ pub struct NodeLinkStats {
     pub undecodable: u64,
     /// Messages whose content claims another sender, receiver or kind than their key.
     pub forged: u64,
+    /// Times that the store did not take what must be kept; what it bears on was not sent.
+    pub unsaved: u64,
 }
 
 impl NodeLink {
     /// Couples `node` to its fleet.
     #[must_use]
     pub fn new(node: Node, fleet: Fleet) -> Self {
-        Self { node, fleet, states: Vec::new(), stats: NodeLinkStats::default(), skewed: BTreeMap::new() }
+        let (states, skewed) = (Vec::new(), BTreeMap::new());
+        Self { node, fleet, store: None, unsaved: None, states, stats: NodeLinkStats::default(), skewed }
+    }
+
+    /// Couples a node that is configured to be durable to its fleet and to where it keeps what it promises.
+    #[must_use]
+    pub fn durable(node: Node, fleet: Fleet, store: Box<dyn Store>) -> Self {
+        Self { store: Some(store), ..Self::new(node, fleet) }
     }
 
     /// Takes in what has arrived, lets the node go on, and sends what it has to say.
@@ -125,13 +137,31 @@ impl NodeLink {
         }
     }
 
-    /// Sends what the node has to say.
+    /// Sends what the node has to say, once what it promises with that is kept.
     pub fn send(&mut self, link: &mut dyn Link) {
+        if !self.keep() {
+            // To the others it is as if the network had lost it: they ask again.
+            self.node.take_outgoing();
+            return;
+        }
         for (recipient, message) in self.node.take_outgoing() {
             let key = Key::new(&self.fleet, topic(self.node.name(), recipient, &message));
             link.put(&key, Payload::Message(message).encode());
             self.stats.sent += 1;
         }
+    }
+}
+
+impl NodeLink {
+    /// Whether nothing is left to be kept.
+    fn keep(&mut self) -> bool {
+        self.unsaved = self.node.take_unsaved().or_else(|| self.unsaved.take());
+        let (Some(kept), Some(store)) = (&self.unsaved, &mut self.store) else { return true };
+        match store.save(kept) {
+            Ok(()) => self.unsaved = None,
+            Err(_) => self.stats.unsaved += 1,
+        }
+        self.unsaved.is_none()
     }
 }
 

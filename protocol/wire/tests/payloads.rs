@@ -8,8 +8,8 @@ use proptest::prelude::*;
 use prost::Message as _;
 use skein_bp::{Event, EventSet, Pattern};
 use skein_dbp::{
-    BidAck, BidRecord, Message, Occurrence, OnLoss, Presence, Refusal, RefusalReason, RemoteBid, Repair,
-    ServedRequest,
+    BidAck, BidRecord, JointWord, Message, Occurrence, OnLoss, Presence, Refusal, RefusalReason, RemoteBid,
+    Repair, ServedRequest,
 };
 use skein_wire::{DecodeError, NodeName, Payload, State, VERSION, proto};
 
@@ -69,15 +69,17 @@ prop_compose! {
         let refusal = Refusal { bthread: "x".into(), sync: n, reason: RefusalReason::Quota };
         match which {
             0 => Message::Bid(BidRecord {
-                node: a, incarnation, home: b, home_incarnation: known, epoch: n, sent_at: at, applied: m, lease_ms: 1000, bids,
+                node: a, incarnation, home: b, home_incarnation: known, epoch: n, sent_at: at, applied: m, term: n, decided: m, lease_ms: 1000, bids,
             }),
             1 => Message::Ack(BidAck {
                 home: a, home_incarnation: incarnation, node: b, incarnation, epoch: n, sent_at: at, latest_seq: m,
                 refused: vec![refusal],
             }),
-            2 => Message::Occurrence(Occurrence { home: a, incarnation, seq: n, event, requests_served: vec![request], requested_by: vec!["mission".into()], at }),
-            3 => Message::Repair(Repair { home: a, incarnation, from_seq: n, to_seq: m, requester: b }),
-            _ => Message::Presence(Presence { node: a, incarnation, up: at, latest_seq: n, oldest_seq: m, lease_ms: 1000 }),
+            2 => Message::Occurrence(Occurrence { home: a, incarnation, seq: n, term: m, event, requests_served: vec![request], requested_by: vec!["mission".into()], at }),
+            3 => Message::Repair(Repair { home: a, incarnation, from_seq: n, to_seq: m, term: n, requester: b }),
+            _ => Message::Presence(Presence { node: a, incarnation, up: at, latest_seq: n, oldest_seq: m, lease_ms: 1000,
+                joint: known.map(|ns| JointWord { term: n, decided: m, heard: Some(Duration::from_nanos(ns)), asks: incarnation % 2 == 0 }),
+            }),
         }
     }
 }

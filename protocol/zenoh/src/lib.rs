@@ -26,6 +26,7 @@ mod config;
 mod error;
 mod inbox;
 mod incarnation;
+mod kept;
 mod link;
 mod session;
 
@@ -34,5 +35,6 @@ pub use complaints::Complaints;
 pub use config::{Mode, NetworkSettings, Security, ZenohConfig};
 pub use error::ZenohError;
 pub use incarnation::{IncarnationError, next_incarnation};
+pub use kept::{FileStore, KeptError};
 pub use link::{ZenohLink, ZenohLinkStats};
 pub use session::{ZenohSession, ZenohStats};

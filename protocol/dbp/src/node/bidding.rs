@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use skein_bp::{Bid, Event, EventSet};
 
 use crate::facts;
-use crate::node::{Home, Node, NodeError, SWARM, confirmation};
-use crate::{NodeName, OnLoss, RemoteBid};
+use crate::node::{Home, Node, NodeError, confirmation};
+use crate::{NodeName, OnLoss, RemoteBid, Roster};
 
 /// What one b-thread's bid means beyond this node.
 struct BidAbroad {
@@ -22,6 +22,7 @@ struct BidAbroad {
     /// The other homes that its block concerns.
     blocked_homes: Vec<NodeName>,
     priority: Option<i32>,
+    on_loss: OnLoss,
     awaits_confirmation: bool,
 }
 
@@ -87,6 +88,7 @@ impl Node {
             block: bid.blocks().clone(),
             blocked_homes,
             priority: bid.given_priority(),
+            on_loss: if bid.holds_when_lost() { OnLoss::Hold } else { OnLoss::Release },
             awaits_confirmation,
         })
     }
@@ -96,12 +98,15 @@ impl Node {
         if set.is_none() {
             return Vec::new();
         }
+        let roster = self.joint.as_ref().map(|joint| &joint.roster);
         let concerns = |home: &NodeName| {
             set.could_match_home(home.as_str())
-                || (self.config.coordinator.as_ref() == Some(home)
-                    && set.may_overlap(&EventSet::prefix(SWARM)))
+                || roster.is_some_and(|roster| {
+                    roster.coordinator == *home && set.may_overlap(&Roster::joint_events())
+                })
         };
-        self.peers.names().filter(|home| concerns(home)).cloned().collect()
+        let member = |home: &NodeName| roster.is_none_or(|roster| roster.members.contains(home));
+        self.peers.names().filter(|home| member(home) && concerns(home)).cloned().collect()
     }
 
     /// Tells once of a request that can go nowhere.
@@ -138,7 +143,7 @@ impl BidAbroad {
                 requests: self.requests.remove(&home).unwrap_or_default(),
                 block: if blocks { self.block.clone() } else { EventSet::None },
                 priority: self.priority,
-                on_loss: OnLoss::Release,
+                on_loss: if blocks { self.on_loss } else { OnLoss::Release },
             };
             (home, bid)
         };

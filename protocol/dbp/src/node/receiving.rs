@@ -7,7 +7,7 @@ use crate::facts::{self, count};
 use crate::node::{Delivery, LEAST_LEASE, Node, ProxyMove, REPEAT_DOUBLE};
 use crate::peers::Word;
 use crate::stream::{Heard, REPAIR_CHUNK, Stream};
-use crate::table::{ProxyChange, TakenIn};
+use crate::table::{Past, ProxyChange, TakenIn};
 use crate::{BidAck, BidRecord, Message, NodeName, Occurrence, Presence, Recipient, Repair};
 
 /// Each function that takes in a message says whether it counted.
@@ -22,6 +22,9 @@ impl Node {
             Word::Born { was_alive } => {
                 if was_alive {
                     self.tell_loss(node);
+                }
+                if let Some(joint) = &mut self.joint {
+                    joint.forget(node);
                 }
                 self.begin_life(node, incarnation);
             }
@@ -81,7 +84,7 @@ impl Node {
         }
     }
 
-    fn deliver(&mut self, home: &NodeName, heard: VecDeque<Heard>) {
+    pub(super) fn deliver(&mut self, home: &NodeName, heard: VecDeque<Heard>) {
         for heard in heard {
             match heard {
                 Heard::Occurrence(occurrence) => self.deliveries.push_back(Delivery::Occurrence(occurrence)),
@@ -93,13 +96,22 @@ impl Node {
     }
 
     pub(super) fn take_in_bids(&mut self, record: &BidRecord) -> bool {
-        if !self.hear(&record.node, record.incarnation) {
+        let of_a_former_term = (1..self.term()).contains(&record.term);
+        if !self.hear(&record.node, record.incarnation) || of_a_former_term {
             return false;
         }
-        let (taken, changes) = self.table.take_in(self.now, record, &self.history);
-        self.change_proxies(changes);
-        if taken == TakenIn::No {
+        let decisions = self.joint.as_ref().filter(|joint| joint.leads()).map(|joint| &joint.decisions);
+        let past = Past { history: &self.history, term: self.term(), decisions };
+        let TakenIn::Yes { proxies, denied } = self.table.take_in(self.now, record, &past) else {
             return false;
+        };
+        self.change_proxies(proxies);
+        for refusal in denied {
+            self.fact(facts::DENIED, |fact| {
+                fact.with("node", record.node.as_str())
+                    .with("bthread", refusal.bthread.as_str())
+                    .with("reason", refusal.reason.as_str())
+            });
         }
         let ack = BidAck {
             home: self.config.name.clone(),
@@ -123,7 +135,7 @@ impl Node {
             stream.latest_is(ack.latest_seq);
         }
         let home = ack.home.clone();
-        let refused = self.outboxes.get_mut(&home).map(|outbox| outbox.acknowledged(self.now, ack).to_vec());
+        let refused = self.outboxes.get_mut(&home).map(|outbox| outbox.acknowledged(self.now, ack));
         for refusal in refused.into_iter().flatten() {
             self.fact(facts::REFUSED, |fact| {
                 fact.with("bthread", refusal.bthread.as_str())
@@ -138,6 +150,9 @@ impl Node {
         let home = occurrence.home.clone();
         if !self.hear(&home, occurrence.incarnation) {
             return false;
+        }
+        if occurrence.term > 0 {
+            return self.take_in_decision(occurrence);
         }
         let mut heard = VecDeque::new();
         #[cfg(feature = "mutants")]
@@ -162,9 +177,12 @@ impl Node {
         let from_start = presence.up <= self.up() + self.config.lease;
         let mut heard = VecDeque::new();
         if let Some(stream) = self.streams.get_mut(&presence.node) {
-            stream.presence(presence, from_start, &mut heard);
+            stream.presence(presence.latest_seq, presence.oldest_seq, from_start, &mut heard);
         }
         self.deliver(&presence.node, heard);
+        if let Some(word) = &presence.joint {
+            self.take_in_word(presence, word);
+        }
         self.address_home(&presence.node, presence.incarnation);
         true
     }
@@ -174,11 +192,16 @@ impl Node {
             return false;
         }
         let to = repair.to_seq.min(repair.from_seq.saturating_add(REPAIR_CHUNK - 1));
-        let again = self.history.range(repair.from_seq, to).cloned();
+        let history = match &self.joint {
+            _ if repair.term == 0 => &self.history,
+            Some(joint) if joint.term() == repair.term => &joint.decisions,
+            _ => return false,
+        };
+        let again = history.range(repair.from_seq, to).cloned();
         let again = again
             .map(|occurrence| (Recipient::Node(repair.requester.clone()), Message::Occurrence(occurrence)));
         self.outgoing.extend(again);
-        if repair.from_seq < self.history.oldest_seq() {
+        if repair.term == 0 && repair.from_seq < self.history.oldest_seq() {
             // The presence tells what cannot be had any more.
             self.presence_due = self.now;
         }

@@ -9,15 +9,19 @@ use crate::facts::{self, tell};
 use crate::held_blocks::BlockNews;
 use crate::node::{Delivery, Happened, Home, MOST_ROUNDS, Node, NodeError, RESTART_GUARD, confirmation};
 use crate::stalls::StallNews;
-use crate::{Message, NodeName, Occurrence, Recipient};
+use crate::{Message, NodeName, Occurrence, Recipient, Roster};
 
 impl Node {
     pub(super) fn let_go_of_the_lapsed(&mut self) {
         let lapsed = self.table.expire(self.now);
         self.change_proxies(lapsed);
         for node in self.peers.take_lost(self.now) {
+            if let Some(joint) = &mut self.joint {
+                joint.forget(&node);
+            }
             self.tell_loss(&node);
         }
+        self.guard_joint_events();
         if self.guarding
             && (self.now >= self.guard_ends() || self.peers.names().all(|member| self.table.knows(member)))
         {
@@ -28,9 +32,11 @@ impl Node {
 
     /// A node is lost, and with it what its b-threads blocked here.
     pub(super) fn tell_loss(&mut self, node: &NodeName) {
-        let released: Vec<String> = self.table.released_by(node).into_iter().collect();
+        let names = |bthreads: BTreeSet<String>| bthreads.into_iter().collect::<Vec<_>>().join(" ");
+        let (released, held) = (names(self.table.released_by(node)), names(self.table.held_for(node)));
         self.fact(facts::PEER_LOST, |fact| {
-            fact.with("node", node.as_str()).with("released", released.join(" "))
+            let fact = fact.with("node", node.as_str()).with("released", released);
+            if held.is_empty() { fact } else { fact.with("held", held) }
         });
     }
 
@@ -42,6 +48,7 @@ impl Node {
     pub(super) fn run(&mut self) -> Result<(), NodeError> {
         let before = self.selections.len();
         let mut outcome = Ok(());
+        self.tell_step();
         for _ in 0..MOST_ROUNDS {
             self.check_held_blocks();
             if let Err(error) = self.run_program(before) {
@@ -76,6 +83,7 @@ impl Node {
                     }
                 }
                 Delivery::Occurrence(occurrence) => self.apply(occurrence)?,
+                Delivery::Recalled(decision) => self.learn(decision)?,
             }
         }
         while let Some(selection) = self.program.step(self.now)? {
@@ -97,17 +105,19 @@ impl Node {
 
     /// Tells the program what has occurred elsewhere.
     fn apply(&mut self, occurrence: Occurrence) -> Result<(), NodeError> {
-        let Occurrence { home, seq, event, requests_served, requested_by, .. } = occurrence;
-        if self.home_of(&event) != Home::Elsewhere(home.clone()) {
+        let Occurrence { home, event, requests_served, .. } = &occurrence;
+        let joint = Roster::joint_events().contains(event);
+        if self.home_of(event) != Home::Elsewhere(home.clone()) || joint != (occurrence.term > 0) {
             // A home decides on its own events only.
             self.stats.ignored += 1;
             return Ok(());
         }
-        for request in &requests_served {
+        for request in requests_served {
             let ours = request.node == self.config.name;
             let wanted = request.incarnation == self.config.incarnation
                 && self.sync_of(&request.bthread) == Some(request.sync);
             if ours && !wanted {
+                let (event, home) = (event.clone(), home.clone());
                 self.fact(facts::ORPHAN, |fact| {
                     fact.with("event", event.name())
                         .with("home", home.as_str())
@@ -115,14 +125,21 @@ impl Node {
                 });
             }
         }
+        self.stats.heard += 1;
+        self.learn(occurrence)
+    }
+
+    /// Tells the program what it cannot change any more.
+    fn learn(&mut self, occurrence: Occurrence) -> Result<(), NodeError> {
+        let Occurrence { home, seq, term, event, requested_by, .. } = occurrence;
         self.program.occurred(event.clone());
         self.program.step(self.now)?;
-        self.stats.heard += 1;
         self.stalls_due = true;
         self.selections.push(Happened {
             event,
             home,
             seq,
+            term,
             origin: Origin::Occurred,
             requested_by,
             at: self.now,
@@ -137,24 +154,36 @@ impl Node {
         self.stalls_due = true;
         self.stats.occurred += 1;
         let travels = self.home.contains(&event);
-        let seq = if travels { self.history.next_seq() } else { 0 };
+        let joint = self.joint.as_mut().filter(|_| travels && Roster::joint_events().contains(&event));
+        let (term, history) = match joint {
+            Some(joint) => (joint.term(), &mut joint.decisions),
+            None => (0, &mut self.history),
+        };
+        let seq = if travels { history.next_seq() } else { 0 };
         if travels {
             let occurrence = Occurrence {
                 home: self.config.name.clone(),
                 incarnation: self.config.incarnation,
                 seq,
+                term,
                 event: event.clone(),
                 requests_served: served,
                 requested_by: requested_by.clone(),
                 at: self.now,
             };
-            self.history.push(occurrence.clone());
+            history.push(occurrence.clone());
             self.outgoing.push((Recipient::All, Message::Occurrence(occurrence)));
         }
+        if term > 0 {
+            self.unsaved = true;
+            self.guard_joint_events();
+        }
+        self.heed(&event);
         self.selections.push(Happened {
             event,
             home: self.config.name.clone(),
             seq,
+            term,
             origin,
             requested_by,
             at: self.now,

@@ -8,7 +8,7 @@ use std::time::Duration;
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
-use skein_wire::{Fleet, MemoryLink, Network, NetworkConfig, NodeLink};
+use skein_wire::{Fleet, MemoryLink, MemoryStore, Network, NetworkConfig, NodeLink};
 
 pub const TICK: Duration = Duration::from_millis(20);
 pub const LEASE: Duration = Duration::from_secs(1);
@@ -47,6 +47,8 @@ pub struct Swarm {
     pub now: Duration,
     pub members: BTreeMap<NodeName, Member>,
     pub seen: Vec<Seen>,
+    /// What each member must not forget.
+    stores: BTreeMap<NodeName, MemoryStore>,
     roster: Vec<NodeName>,
 }
 
@@ -54,7 +56,14 @@ impl Swarm {
     pub fn new(roster: &[&str], network: NetworkConfig, seed: u64) -> Self {
         let roster = roster.iter().map(|text| name(text)).collect();
         let network = Network::new(network, seed);
-        Self { network, now: Duration::ZERO, members: BTreeMap::new(), seen: Vec::new(), roster }
+        Self {
+            network,
+            now: Duration::ZERO,
+            members: BTreeMap::new(),
+            seen: Vec::new(),
+            stores: BTreeMap::new(),
+            roster,
+        }
     }
 
     pub fn config(&self, node: &str, incarnation: u64) -> NodeConfig {
@@ -65,12 +74,19 @@ impl Swarm {
         }
     }
 
-    /// Starts a member; a second start is a restart.
-    pub fn start_with(&mut self, config: NodeConfig, program: Program) {
+    /// Starts a member; a second start is a restart, and finds what was kept if the member is durable.
+    pub fn start_with(&mut self, mut config: NodeConfig, program: Program) {
         let node = config.name.clone();
         self.network.leave(&node);
         let link = self.network.join(&node);
-        let node_link = NodeLink::new(Node::new(config, program), Fleet::new("test").unwrap());
+        let fleet = Fleet::new("test").unwrap();
+        let node_link = if config.durable {
+            let store = self.stores.entry(node.clone()).or_default();
+            config.kept = store.kept();
+            NodeLink::durable(Node::new(config, program), fleet, Box::new(store.clone()))
+        } else {
+            NodeLink::new(Node::new(config, program), fleet)
+        };
         self.members.insert(node, Member { node: node_link, link });
     }
 

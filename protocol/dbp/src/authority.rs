@@ -1,0 +1,111 @@
+//! Who may request and block what at a home (G7).
+
+use skein_bp::{Event, EventSet, Pattern};
+
+use crate::NodeName;
+
+/// First part of the name of a b-thread that is a script: it needs the rights of its node and those of scripts.
+pub const SCRIPT: &str = "script/";
+
+/// What somebody may do with the events of a home.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Grant {
+    /// What may be requested.
+    pub request: EventSet,
+    /// What may be blocked.
+    pub block: EventSet,
+}
+
+/// A kind of node, and what all of that kind may do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Role {
+    /// Its name, such as `vehicle` or `operator`.
+    pub name: String,
+    /// The nodes that have it.
+    pub nodes: Vec<Pattern>,
+    /// What they may do.
+    pub grant: Grant,
+}
+
+/// The rights that a home grants to the b-threads of other nodes.
+///
+/// A node has the rights of all its roles together; one without a role has none. A home's own safety events and facts
+/// are out of everybody's reach, whatever is granted here.
+///
+/// ```
+/// use skein_bp::EventSet;
+/// use skein_dbp::{Authority, Grant, NodeName, Role};
+/// let ground = Role {
+///     name: "ground".into(),
+///     nodes: vec!["ground/*".into()],
+///     grant: Grant { request: "uav/*/takeoff".into(), block: "uav/*/advance".into() },
+/// };
+/// let authority = Authority::new(vec![ground], None);
+/// let (ground, uav) = (NodeName::new("ground/main")?, NodeName::new("uav/2")?);
+/// assert!(authority.may_request(&ground, "launch", &"uav/1/takeoff".into()));
+/// assert!(!authority.may_request(&uav, "launch", &"uav/1/takeoff".into()));
+/// assert!(!authority.may_block(&ground, "hold all", &EventSet::from("uav/1/**")));
+/// # Ok::<(), skein_dbp::NodeNameError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Authority {
+    roles: Vec<Role>,
+    /// What scripts may do at most; none: what their node may.
+    scripts: Option<Grant>,
+}
+
+impl Authority {
+    /// Only what these roles grant; `scripts` limits b-threads that are scripts further.
+    #[must_use]
+    pub fn new(roles: Vec<Role>, scripts: Option<Grant>) -> Self {
+        Self { roles, scripts }
+    }
+
+    /// Every member may request and block everything.
+    #[must_use]
+    pub fn unrestricted() -> Self {
+        let all = Grant { request: EventSet::All, block: EventSet::All };
+        Self::new(vec![Role { name: "member".into(), nodes: vec!["**".into()], grant: all }], None)
+    }
+
+    /// The roles.
+    #[must_use]
+    pub fn roles(&self) -> &[Role] {
+        &self.roles
+    }
+
+    /// What scripts may do at most, if that is less than their node.
+    #[must_use]
+    pub fn scripts(&self) -> Option<&Grant> {
+        self.scripts.as_ref()
+    }
+
+    /// Whether `bthread` of `node` may request `event`.
+    #[must_use]
+    pub fn may_request(&self, node: &NodeName, bthread: &str, event: &Event) -> bool {
+        self.grants(node).any(|grant| grant.request.contains(event))
+            && self.limit(bthread).is_none_or(|limit| limit.request.contains(event))
+    }
+
+    /// Whether `bthread` of `node` may block all of `set`, judged so that doubt means no.
+    #[must_use]
+    pub fn may_block(&self, node: &NodeName, bthread: &str, set: &EventSet) -> bool {
+        let granted = EventSet::any_of(self.grants(node).map(|grant| &grant.block));
+        set.is_within(&granted) && self.limit(bthread).is_none_or(|limit| set.is_within(&limit.block))
+    }
+
+    fn grants<'a>(&'a self, node: &'a NodeName) -> impl Iterator<Item = &'a Grant> {
+        let has = |role: &&Role| role.nodes.iter().any(|pattern| pattern.matches(node.as_str()));
+        self.roles.iter().filter(has).map(|role| &role.grant)
+    }
+
+    fn limit(&self, bthread: &str) -> Option<&Grant> {
+        self.scripts.as_ref().filter(|_| bthread.starts_with(SCRIPT))
+    }
+}
+
+impl Default for Authority {
+    fn default() -> Self {
+        Self::unrestricted()
+    }
+}

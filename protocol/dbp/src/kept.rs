@@ -1,0 +1,40 @@
+//! What a node must not forget when it restarts.
+
+use serde::{Deserialize, Serialize};
+use skein_bp::{Event, EventSet};
+
+use crate::{NodeName, Roster};
+
+/// What a node has promised and must keep on disk.
+///
+/// A driver saves what [`Node::take_unsaved`](crate::Node::take_unsaved) gives *before* it sends
+/// [`Node::take_outgoing`](crate::Node::take_outgoing), and hands the saved value to the node's next life in
+/// [`NodeConfig::kept`](crate::NodeConfig::kept).
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Kept {
+    /// Blocks that stay although their holders may be lost (G5).
+    pub blocks: Vec<KeptBlock>,
+    /// The roster of the present term, once an operator has changed it (G8).
+    pub roster: Option<Roster>,
+    /// As coordinator: the term whose decisions these are.
+    pub term: u64,
+    /// Its decisions, in order (G8).
+    pub decisions: Vec<Event>,
+}
+
+/// A remote b-thread's block that lasts until it is withdrawn or an authority lifts it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KeptBlock {
+    /// The holder's node.
+    pub node: NodeName,
+    /// The life of that node in which the block was stated.
+    pub incarnation: u64,
+    /// The holder.
+    pub bthread: String,
+    /// At which of its synchronisation points.
+    pub sync: u64,
+    /// What it blocks.
+    pub block: EventSet,
+}

@@ -1,0 +1,201 @@
+//! Deciding together, and learning what was decided (G8).
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use skein_bp::{Bid, Event, EventSet};
+
+use crate::facts::{self, count};
+use crate::joint::Joint;
+use crate::node::{Delivery, Node};
+use crate::{JointWord, Message, NodeName, Occurrence, Presence, ROSTER, Recipient, Repair, Roster};
+
+/// The proxy that keeps joint events back while a member has not been heard, or has yet to apply a decision.
+const JOINT_GUARD: &str = "joint guard";
+/// Last chunk of the event by which an authority lifts a block that outlives its holder: data `node` and `bthread`.
+pub const LIFT: &str = "lift";
+
+impl Node {
+    /// The term that this node is in; 0 without joint events.
+    pub(super) fn term(&self) -> u64 {
+        self.joint.as_ref().map_or(0, Joint::term)
+    }
+
+    /// Takes up the roster that the node starts with, and what a former life has decided under it.
+    pub(super) fn begin_term(&mut self, roster: Option<Roster>, decisions: Vec<Event>) {
+        let Some(roster) = roster else { return };
+        let mut joint = Joint::new(roster, &self.config.name);
+        if joint.leads() {
+            let recalled: Vec<_> =
+                (1..).zip(decisions).map(|(seq, event)| self.decision(joint.term(), seq, event)).collect();
+            self.deliveries.extend(recalled.iter().cloned().map(Delivery::Recalled));
+            joint.recall(recalled);
+        }
+        self.joint = Some(joint);
+        self.take_up_roster();
+    }
+
+    fn decision(&self, term: u64, seq: u64, event: Event) -> Occurrence {
+        Occurrence {
+            home: self.config.name.clone(),
+            incarnation: self.config.incarnation,
+            seq,
+            term,
+            event,
+            requests_served: Vec::new(),
+            requested_by: Vec::new(),
+            at: self.now,
+        }
+    }
+
+    /// Sets what is selected here, and may be bid for here, by the roster.
+    fn take_up_roster(&mut self) {
+        let own = EventSet::prefix(format!("{}/", self.config.name));
+        let leads = self.joint.as_ref().is_some_and(Joint::leads);
+        self.home = if leads { own.or(Roster::joint_events()) } else { own };
+        self.program.set_home(self.home.clone().or(homeless()));
+        let home = self.home.clone();
+        self.table.rights_mut().set_home(home);
+        self.guard_joint_events();
+        self.seen_revision = None;
+    }
+
+    /// An operator gives this node a new roster.
+    fn adopt(&mut self, order: &Event) {
+        let refused = match Roster::ordered(order) {
+            Err(error) => error.to_string(),
+            Ok(roster) if roster.term <= self.term() => format!("term {} is over", roster.term),
+            Ok(roster) => match roster.members.iter().find(|member| !self.knows(member)) {
+                Some(stranger) => format!("{stranger} is not of this fleet"),
+                None => {
+                    self.joint = Some(Joint::new(roster, &self.config.name));
+                    self.unsaved = true;
+                    self.presence_due = self.now;
+                    return self.take_up_roster();
+                }
+            },
+        };
+        self.fact(facts::ROSTER_REFUSED, |fact| fact.with("why", refused));
+    }
+
+    fn knows(&self, node: &NodeName) -> bool {
+        *node == self.config.name || self.outboxes.contains_key(node)
+    }
+
+    /// What an event that was selected here means for the node itself.
+    pub(super) fn heed(&mut self, event: &Event) {
+        let own = event.name().strip_prefix(self.config.name.as_str());
+        match own.and_then(|rest| rest.strip_prefix('/')) {
+            Some(ROSTER) => self.adopt(event),
+            Some(LIFT) => {
+                let node = event.text("node").and_then(|node| NodeName::new(node).ok());
+                if let (Some(node), Some(bthread)) = (node, event.text("bthread")) {
+                    let changes = self.table.lift(&node, bthread);
+                    self.change_proxies(changes);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes in what a sign of life says about joint events.
+    pub(super) fn take_in_word(&mut self, presence: &Presence, word: &JointWord) {
+        let (node, now) = (&presence.node, self.now);
+        let Some(joint) = self.joint.as_mut().filter(|joint| joint.roster.members.contains(node)) else {
+            return;
+        };
+        let astray = joint.hear(node, presence.up, word);
+        let mut heard = VecDeque::new();
+        if word.term == joint.term() && *node == joint.roster.coordinator && !joint.leads() {
+            joint.stream.presence(word.decided, 1, true, &mut heard);
+            if word.asks {
+                self.presence_due = now;
+            }
+        }
+        self.deliver(node, heard);
+        if let Some(term) = astray {
+            self.fact(facts::OUT_OF_STEP, |fact| fact.with("node", node.as_str()).with("term", count(term)));
+        }
+    }
+
+    /// A decision has arrived, in order or not.
+    pub(super) fn take_in_decision(&mut self, decision: Occurrence) -> bool {
+        let home = decision.home.clone();
+        let expected = |joint: &&mut Joint| {
+            !joint.leads() && joint.term() == decision.term && joint.roster.coordinator == home
+        };
+        let Some(joint) = self.joint.as_mut().filter(expected) else { return false };
+        let mut heard = VecDeque::new();
+        joint.stream.occurrence(decision, &mut heard);
+        self.deliver(&home, heard);
+        // The coordinator decides nothing more before it has heard of this.
+        self.presence_due = self.now;
+        true
+    }
+
+    /// Whether joint events are kept back although somebody requests one.
+    pub(super) fn wants_to_decide(&self) -> bool {
+        let is_joint = |event: &Event| Roster::joint_events().contains(event);
+        let asked = |bid: &Bid| bid.requests().iter().any(is_joint);
+        self.guards_joint
+            && (self.program.bids().any(|(_, bid, _)| asked(bid))
+                || self.program.proxies().any(|(_, bid)| asked(bid)))
+    }
+
+    /// Keeps joint events back, or lets them happen, as the members' last words allow.
+    pub(super) fn guard_joint_events(&mut self) {
+        let Some(joint) = self.joint.as_ref().filter(|joint| joint.leads()) else {
+            if std::mem::take(&mut self.guards_joint) {
+                self.program.remove_proxy(JOINT_GUARD);
+            }
+            return;
+        };
+        let guards = !joint.may_decide(self.up(), self.freshness());
+        if std::mem::replace(&mut self.guards_joint, guards) == guards {
+            return;
+        }
+        if guards {
+            self.program.put_proxy(JOINT_GUARD, &Bid::new().block(Roster::joint_events()));
+        } else {
+            self.program.remove_proxy(JOINT_GUARD);
+        }
+    }
+
+    /// When joint events must be kept back again, if nobody is heard until then.
+    pub(super) fn guard_due(&self) -> Option<Duration> {
+        let joint = self.joint.as_ref().filter(|joint| joint.leads() && !self.guards_joint)?;
+        Some(self.started.unwrap_or(self.now) + joint.may_decide_until(self.freshness())?)
+    }
+
+    /// How old an acknowledgement may be on which a joint event is decided.
+    fn freshness(&self) -> Duration {
+        self.config.lease
+    }
+
+    /// Asks the coordinator at once for the decisions that this node has not heard.
+    pub(super) fn ask_for_decisions(&mut self) {
+        let Some(joint) = self.joint.as_mut().filter(|joint| !joint.leads()) else { return };
+        let Some((term, holes)) = joint.stream.repair(self.now, self.config.lease / 10) else { return };
+        let home = joint.roster.coordinator.clone();
+        let Some(incarnation) = self.peers.incarnation(&home) else { return };
+        for (from_seq, to_seq) in holes {
+            let requester = self.config.name.clone();
+            let repair = Repair { home: home.clone(), incarnation, from_seq, to_seq, term, requester };
+            self.outgoing.push((Recipient::Node(home.clone()), Message::Repair(repair)));
+        }
+    }
+
+    /// Tells the program once that it has heard all decisions so far.
+    pub(super) fn tell_step(&mut self) {
+        let Some(joint) = &mut self.joint else { return };
+        if joint.comes_into_step() {
+            let (term, decided) = (joint.term(), joint.decided());
+            self.fact(facts::IN_STEP, |fact| fact.with("term", count(term)).with("decided", count(decided)));
+        }
+    }
+}
+
+/// Events that are selected wherever they are requested, and do not travel.
+pub(super) fn homeless() -> EventSet {
+    EventSet::from("*").or(EventSet::from("*/*").and(!Roster::joint_events()))
+}

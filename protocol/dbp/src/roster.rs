@@ -1,0 +1,88 @@
+//! Who decides together, and who decides for all.
+
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+use skein_bp::{Event, EventSet};
+
+use crate::{NodeName, NodeNameError};
+
+/// First chunk of the events that the coordinator is home to.
+pub const SWARM: &str = "swarm/";
+/// Last chunk of the event by which an operator gives a node a new roster: data `term` (int), `coordinator`, and
+/// `members`, with blanks between.
+pub const ROSTER: &str = "roster";
+
+/// The nodes that decide on joint events, for one term.
+///
+/// `swarm/...` events are selected by the coordinator, and only while it has fresh word from every member that this one
+/// is in the same term and has applied all earlier decisions (G8). Terms follow one another by operator order.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Roster {
+    /// From 1; a later term makes an earlier one void.
+    pub term: u64,
+    /// Where joint events have their home.
+    pub coordinator: NodeName,
+    /// Every node without which nothing is decided, the coordinator among them.
+    pub members: BTreeSet<NodeName>,
+}
+
+/// Why an order is no roster.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RosterError {
+    /// It has no term, or one below 1.
+    #[error("`term` must be a whole number from 1")]
+    Term,
+    /// It names no coordinator, or no members.
+    #[error("`{0}` must name the nodes")]
+    Missing(&'static str),
+    /// A name is none.
+    #[error(transparent)]
+    Name(#[from] NodeNameError),
+    /// The coordinator is not a member.
+    #[error("the coordinator {0} must be a member")]
+    Coordinator(NodeName),
+}
+
+impl Roster {
+    /// The first term.
+    #[must_use]
+    pub fn first(coordinator: NodeName, members: impl IntoIterator<Item = NodeName>) -> Self {
+        let members = members.into_iter().chain([coordinator.clone()]).collect();
+        Self { term: 1, coordinator, members }
+    }
+
+    /// The event by which an operator gives `node` this roster.
+    #[must_use]
+    pub fn order(&self, node: &NodeName) -> Event {
+        let members: Vec<&str> = self.members.iter().map(NodeName::as_str).collect();
+        Event::new(node.event_name(ROSTER))
+            .with("term", i64::try_from(self.term).unwrap_or(i64::MAX))
+            .with("coordinator", self.coordinator.as_str())
+            .with("members", members.join(" "))
+    }
+
+    /// The roster that such an order gives.
+    ///
+    /// # Errors
+    /// [`RosterError`] says what it lacks.
+    pub fn ordered(order: &Event) -> Result<Self, RosterError> {
+        let term = order.int("term").and_then(|term| u64::try_from(term).ok()).filter(|term| *term > 0);
+        let coordinator =
+            NodeName::new(order.text("coordinator").ok_or(RosterError::Missing("coordinator"))?)?;
+        let members = order.text("members").ok_or(RosterError::Missing("members"))?;
+        let members = members.split_whitespace().map(NodeName::new).collect::<Result<BTreeSet<_>, _>>()?;
+        if !members.contains(&coordinator) {
+            return Err(RosterError::Coordinator(coordinator));
+        }
+        Ok(Self { term: term.ok_or(RosterError::Term)?, coordinator, members })
+    }
+
+    /// All joint events.
+    #[must_use]
+    pub fn joint_events() -> EventSet {
+        EventSet::prefix(SWARM)
+    }
+}

@@ -1,0 +1,136 @@
+//! G5: a block that is stated to outlive its holder stays, through the loss of the holder and the restart of the home,
+//! until the holder withdraws it or an authority lifts it.
+
+#![allow(clippy::unwrap_used)] // A test fails by panicking.
+
+mod swarm;
+
+use std::time::Duration;
+
+use skein_bp::{Bid, Event};
+use skein_dbp::NodeConfig;
+use skein_wire::NetworkConfig;
+use swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, name, program};
+
+const ROSTER: [&str; 3] = ["uav/1", "ground/main", "ground/spare"];
+
+fn start_home(swarm: &mut Swarm, incarnation: u64, seed: u64) {
+    let mut home = program(seed);
+    home.add("steps", Requester::new("uav/1/step", i64::MAX, TICK));
+    let config = NodeConfig { durable: true, ..swarm.config("uav/1", incarnation) };
+    swarm.start_with(config, home);
+}
+
+fn start_holder(swarm: &mut Swarm, incarnation: u64, bid: Bid, until: Duration) {
+    let mut ground = program(1);
+    let end = Event::new("ground/main/enough");
+    ground.add("hold", Always(bid.block("uav/1/step").interrupt(&end)));
+    ground.add(
+        "end",
+        swarm::Requester { resting_until: Some(until), ..Requester::new("ground/main/enough_said", 1, TICK) },
+    );
+    ground.add(
+        "tell",
+        skein_bp::script::Script::new(&[
+            skein_bp::script::Op::Sync(Bid::new().wait_for("ground/main/enough_said")),
+            skein_bp::script::Op::Sync(Bid::new().request(end)),
+        ])
+        .unwrap(),
+    );
+    swarm.start("ground/main", incarnation, ground);
+}
+
+fn steps_since(swarm: &Swarm, since: Duration) -> usize {
+    swarm.occurred("uav/1", "uav/1/step").filter(|seen| seen.at >= since).count()
+}
+
+const NEVER: Duration = Duration::from_secs(1_000_000);
+
+#[test]
+fn it_stays_when_its_holder_and_then_its_home_are_lost() {
+    for seed in 0..20 {
+        let mut swarm = Swarm::new(&ROSTER, hostile(), seed);
+        start_home(&mut swarm, 1, seed);
+        start_holder(&mut swarm, 1, Bid::new().hold_when_lost(), NEVER);
+        swarm.run(5 * LEASE);
+        assert_eq!(swarm.saw("ground/main", "ground/main/confirmed").count(), 1, "seed {seed}");
+        assert_eq!(
+            swarm.saw("ground/main", "ground/main/block_lapsed").count(),
+            0,
+            "it cannot lapse, seed {seed}"
+        );
+        swarm.crash("ground/main");
+        let lost = swarm.now;
+        swarm.run(5 * LEASE);
+        assert_eq!(steps_since(&swarm, lost), 0, "the holder is lost, seed {seed}");
+        let told = swarm.saw("uav/1", "uav/1/peer_lost").last().unwrap();
+        assert_eq!(told.happened.event.text("held"), Some("hold"));
+        start_home(&mut swarm, 2, seed);
+        swarm.run(5 * LEASE);
+        assert_eq!(steps_since(&swarm, lost), 0, "the home has restarted, seed {seed}");
+        // Its holder's next life takes it over, and may withdraw it.
+        let until = swarm.now + 2 * LEASE;
+        start_holder(&mut swarm, 2, Bid::new().hold_when_lost(), until);
+        swarm.run(2 * LEASE);
+        assert_eq!(steps_since(&swarm, lost), 0, "the holder is back, seed {seed}");
+        swarm.run(4 * LEASE);
+        assert!(steps_since(&swarm, until) > 0, "it was withdrawn, seed {seed}");
+    }
+}
+
+#[test]
+fn a_new_life_that_does_not_state_it_does_not_end_it_but_an_authority_does() {
+    let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
+    start_home(&mut swarm, 1, 1);
+    start_holder(&mut swarm, 1, Bid::new().hold_when_lost(), NEVER);
+    swarm.run(2 * LEASE);
+    swarm.crash("ground/main");
+    let lost = swarm.now;
+    swarm.start("ground/main", 2, program(1));
+    swarm.run(3 * LEASE);
+    assert_eq!(steps_since(&swarm, lost), 0);
+    let mut spare = program(1);
+    let lift = Event::new("uav/1/lift").with("node", "ground/main").with("bthread", "hold");
+    spare.add(
+        "lift",
+        skein_bp::script::Script::new(&[skein_bp::script::Op::Sync(Bid::new().request(lift))]).unwrap(),
+    );
+    swarm.start("ground/spare", 1, spare);
+    swarm.run(3 * LEASE);
+    assert!(steps_since(&swarm, lost) > 0);
+    start_home(&mut swarm, 2, 1);
+    let restarted = swarm.now;
+    swarm.run(2 * LEASE);
+    assert!(steps_since(&swarm, restarted) > 0, "what was lifted is not kept");
+}
+
+#[test]
+fn one_that_is_lifted_while_its_holder_lives_is_lapsed_and_refused() {
+    let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
+    start_home(&mut swarm, 1, 1);
+    start_holder(&mut swarm, 1, Bid::new().hold_when_lost(), NEVER);
+    swarm.run(2 * LEASE);
+    let held = swarm.now;
+    let home = name("uav/1");
+    let lift = Event::new(home.event_name("lift")).with("node", "ground/main").with("bthread", "hold");
+    swarm.node("uav/1").enqueue(lift);
+    swarm.run(2 * LEASE);
+    assert!(steps_since(&swarm, held) > 0);
+    let reasons: Vec<_> = swarm
+        .saw("ground/main", "ground/main/refused")
+        .map(|seen| seen.happened.event.text("reason").unwrap().to_owned())
+        .collect();
+    assert_eq!(reasons, ["lifted"]);
+    assert_eq!(swarm.saw("ground/main", "ground/main/block_lapsed").count(), 1);
+}
+
+#[test]
+fn a_home_without_a_store_refuses_it() {
+    let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
+    swarm.start("uav/1", 1, program(1));
+    start_holder(&mut swarm, 1, Bid::new().hold_when_lost(), NEVER);
+    swarm.run(2 * LEASE);
+    assert_eq!(swarm.saw("ground/main", "ground/main/confirmed").count(), 0);
+    let refused = swarm.saw("ground/main", "ground/main/refused").next().unwrap();
+    assert_eq!(refused.happened.event.text("reason"), Some("hold_unsupported"));
+}

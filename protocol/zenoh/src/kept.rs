@@ -1,0 +1,109 @@
+//! What a node must not forget, in a file.
+
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use skein_dbp::Kept;
+use skein_wire::{NodeName, Store};
+
+/// Why what was kept cannot be had.
+#[derive(Debug, thiserror::Error)]
+pub enum KeptError {
+    /// The file cannot be read.
+    #[error("`{}`: {source}; what this node must not forget is kept there", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file holds something else.
+    #[error("`{}`: {source}; it should hold the blocks that this node must keep, as JSON. Remove it only if none of them is to hold any more", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with line and column.
+        source: serde_json::Error,
+    },
+}
+
+/// Keeps what a node must not forget in `<folder>/<node>.kept.json`, written whole each time.
+#[derive(Debug)]
+pub struct FileStore(PathBuf);
+
+impl FileStore {
+    /// The store of `node` in `folder`, and what a former life has kept there.
+    ///
+    /// # Errors
+    /// [`KeptError`] when there is a file that cannot be understood: it is left alone.
+    pub fn open(folder: &Path, node: &NodeName) -> Result<(Self, Kept), KeptError> {
+        let path = folder.join(format!("{}.kept.json", node.as_str().replace('/', "-")));
+        let kept = match fs::read(&path) {
+            Ok(text) => serde_json::from_slice(&text)
+                .map_err(|source| KeptError::Content { path: path.clone(), source })?,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Kept::default(),
+            Err(source) => return Err(KeptError::File { path, source }),
+        };
+        Ok((Self(path), kept))
+    }
+
+    fn write(&self, kept: &Kept) -> io::Result<()> {
+        let beside = self.0.with_extension("new");
+        if let Some(folder) = self.0.parent() {
+            fs::create_dir_all(folder)?;
+        }
+        let mut file = File::create(&beside)?;
+        file.write_all(&serde_json::to_vec_pretty(kept)?)?;
+        file.sync_all()?;
+        fs::rename(&beside, &self.0)?;
+        match self.0.parent() {
+            Some(folder) if cfg!(unix) => File::open(folder)?.sync_all(),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Store for FileStore {
+    fn save(&mut self, kept: &Kept) -> Result<(), String> {
+        self.write(kept).map_err(|error| format!("`{}`: {error}", self.0.display()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use skein_bp::EventSet;
+    use skein_dbp::{KeptBlock, Roster};
+
+    use super::*;
+
+    #[test]
+    fn what_is_kept_is_there_in_the_next_life() {
+        let folder = tempfile::tempdir().unwrap();
+        let node = NodeName::new("uav/1").unwrap();
+        let (mut store, nothing) = FileStore::open(folder.path(), &node).unwrap();
+        assert_eq!(nothing, Kept::default());
+        let block = KeptBlock {
+            node: NodeName::new("ground/main").unwrap(),
+            incarnation: 4,
+            bthread: "curfew".into(),
+            sync: 7,
+            block: EventSet::from("uav/*/enter").and(EventSet::region([0.0; 3], [f64::INFINITY, 2.0, 3.0])),
+        };
+        let roster = Some(Roster::first(node.clone(), [NodeName::new("uav/2").unwrap()]));
+        let decisions = vec![skein_bp::Event::new("swarm/launch").with("n", 1)];
+        let kept = Kept { blocks: vec![block], roster, term: 1, decisions };
+        store.save(&kept).unwrap();
+        assert_eq!(FileStore::open(folder.path(), &node).unwrap().1, kept);
+    }
+
+    #[test]
+    fn a_file_that_is_not_understood_is_named_and_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("uav-1.kept.json");
+        fs::write(&path, "{\"blocks\": 3}").unwrap();
+        let error = FileStore::open(folder.path(), &NodeName::new("uav/1").unwrap()).unwrap_err().to_string();
+        assert!(error.contains("uav-1.kept.json") && error.contains("line 1"), "{error}");
+        assert!(path.exists());
+    }
+}
