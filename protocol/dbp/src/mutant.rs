@@ -15,6 +15,10 @@ pub enum Mutant {
     G5,
     /// A remote block counts for safety events too.
     G6,
+    /// A home serves requests whoever sends them.
+    G7,
+    /// A coordinator decides without the members that it has not heard.
+    G8,
     /// A local event is selected before what has occurred elsewhere is told.
     G9,
 }

@@ -446,6 +446,11 @@ impl Rights {
             return (None, vec![RefusalReason::LeaseTooLong]);
         }
         let denial = |event: &Event| self.denial(node, &bid.bthread, event);
+        #[cfg(feature = "mutants")]
+        let denial = |event: &Event| {
+            denial(event)
+                .filter(|why| self.mutant != Some(Mutant::G7) || *why != RefusalReason::MayNotRequest)
+        };
         let mut reasons: Vec<_> = bid.requests.iter().filter_map(denial).collect();
         let block = match self.authority.may_block(node, &bid.bthread, &bid.block) {
             true => self.honoured_block(bid),

@@ -1,4 +1,5 @@
-//! The campaign without the simulator around it: `cargo run --release -p skein-promises --example campaign -- 1000`.
+//! The campaign without the simulator around it: seeds, the first of them, and how many failing stories are shrunk, as in
+//! `cargo run --release -p skein-promises --example campaign -- 1000 1 3`.
 
 #![allow(clippy::expect_used)] // An example ends when it is used wrongly.
 
@@ -9,8 +10,9 @@ use skein_promises::{Campaign, Settings, campaign};
 fn main() {
     let mut numbers = std::env::args().skip(1).map(|text| text.parse().expect("a number"));
     let (seeds, from) = (numbers.next().unwrap_or(100), numbers.next().unwrap_or(1));
+    let shrunk = usize::try_from(numbers.next().unwrap_or(1)).expect("few");
     let began = Instant::now();
-    let report = campaign(&Campaign { from, seeds, jobs: 2, settings: Settings::default() }, &|_, _| {});
+    let report = campaign(&Campaign { from, seeds, jobs: 2, shrunk, settings: Settings::default() }, &|_, _| {});
     for failure in &report.failures {
         println!("seed {}: {}", failure.seed, failure.violation);
     }

@@ -8,9 +8,6 @@ use crate::run::{Settings, run};
 use crate::shrink::{Shrunk, shrink};
 use crate::story::{Faults, Story};
 
-/// How many failing stories are shrunk; of the others only the seed is kept.
-const MOST_SHRUNK: usize = 3;
-
 /// What a campaign runs.
 #[derive(Clone, Copy, Debug)]
 pub struct Campaign {
@@ -20,6 +17,8 @@ pub struct Campaign {
     pub seeds: u64,
     /// How many threads.
     pub jobs: usize,
+    /// How many failing stories are shrunk.
+    pub shrunk: usize,
     /// How each story is played.
     pub settings: Settings,
 }
@@ -88,7 +87,7 @@ pub fn campaign(campaign: &Campaign, progress: &(dyn Fn(u64, usize) + Sync)) -> 
     });
     let mut report = report.into_inner().unwrap_or_else(PoisonError::into_inner);
     report.failures.sort_by_key(|failure| failure.seed);
-    for failure in report.failures.iter_mut().take(MOST_SHRUNK) {
+    for failure in report.failures.iter_mut().take(campaign.shrunk) {
         let story = Story::invent(failure.seed);
         failure.shrunk = Some(shrink(&story, &failure.violation, &campaign.settings));
     }

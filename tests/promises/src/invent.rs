@@ -9,7 +9,7 @@ use skein_dbp::NodeName;
 use skein_wire::NetworkConfig;
 
 use crate::programs::Role;
-use crate::story::{Cast, Fault, Story, Weather};
+use crate::story::{Cast, Fault, Grants, Order, Ordered, Story, Weather};
 
 /// Faults end here ...
 const CALM: Duration = Duration::from_secs(50);
@@ -43,7 +43,10 @@ impl Author {
         let weather = self.weather();
         let mut faults = self.faults(size);
         faults.sort_by_key(Fault::at);
-        Story { seed, casts, weather, faults, calm: CALM, end: END }
+        let joint = self.chance(0.4);
+        let mut casts = casts;
+        let orders = self.orders(&mut casts, joint);
+        Story { seed, casts, weather, faults, joint, orders, calm: CALM, end: END }
     }
 
     fn cast(&mut self, node: usize, lease_ms: u64) -> Cast {
@@ -59,6 +62,7 @@ impl Author {
             tick: Duration::from_millis(self.pick(ticks)),
             clock_offset: self.between(0, 100_000),
             drift_ppm: self.random.random_range(-5000..=5000),
+            grants: if self.chance(0.3) { Some(self.grants()) } else { None },
             joins: if late { self.between(1000, 20_000) } else { Duration::ZERO },
             senses: if self.chance(0.3) { Some(self.between(300, 3000)) } else { None },
             roles: self.roles(node),
@@ -100,6 +104,7 @@ impl Author {
                     set: self.blocked(&other),
                     on: self.between(800, 6000),
                     off: self.between(300, 3000),
+                    hold: self.chance(0.2),
                 };
                 let acts = Role::Acts { holder: holder.clone(), event: me.event_name("act") };
                 let mut roles = vec![(holder, blocks)];
@@ -113,6 +118,7 @@ impl Author {
                     set: EventSet::from(me.event_name(self.pick(&["do", "step", "land", "turn"]))),
                     on: self.between(100, 3000),
                     off: self.between(300, 3000),
+                    hold: false,
                 };
                 vec![(format!("gate-{number}"), gate)]
             }
@@ -138,6 +144,57 @@ impl Author {
                 vec![(format!("meddle-{number}"), asks)]
             }
         }
+    }
+
+    fn grants(&mut self) -> Grants {
+        let mut some = |of: &[&'static str]| -> Vec<&'static str> {
+            of.iter().copied().filter(|_| self.random.random::<f64>() < 0.6).collect()
+        };
+        Grants { requests: some(&["do", "turn", "order", "left", "right"]), blocks: some(&["step", "do", "left"]) }
+    }
+
+    /// What an operator orders; gives the nodes reason to heed it.
+    fn orders(&mut self, casts: &mut [Cast], joint: bool) -> Vec<Order> {
+        let size = casts.len();
+        let mut orders = Vec::new();
+        let holding: Vec<(usize, String)> = casts
+            .iter()
+            .enumerate()
+            .flat_map(|(node, cast)| cast.roles.iter().map(move |(name, role)| (node, name, role)))
+            .filter(|(_, _, role)| matches!(role, Role::Blocks { hold: true, .. }))
+            .map(|(node, name, _)| (node, name.clone()))
+            .collect();
+        for (holder, bthread) in holding {
+            let (at, spread) = (self.between(5000, 45_000), self.between(0, 500));
+            orders.push(Order { at, spread, what: Ordered::Lift { holder, bthread } });
+        }
+        if joint {
+            for node in 0..size {
+                if node == 0 || self.chance(0.3) {
+                    let every = self.between(200, 3000);
+                    let asks = Role::Asks { event: "swarm/go".to_owned(), every, patience: None };
+                    casts[node].roles.push(("decide".to_owned(), asks));
+                }
+            }
+            let mut times: Vec<Duration> =
+                (0..self.random.random_range(0..=2)).map(|_| self.between(8000, 45_000)).collect();
+            times.sort_unstable();
+            let mut terms = 2..;
+            for (at, term) in times.into_iter().zip(&mut terms) {
+                let coordinator = self.random.random_range(0..size);
+                let members: Vec<usize> =
+                    (0..size).filter(|node| *node == coordinator || self.random.random::<f64>() < 0.8).collect();
+                let what = Ordered::Roster { term, coordinator, members };
+                orders.push(Order { at, spread: self.between(0, 300), what });
+            }
+            // In the end everybody is brought to one term.
+            for (term, coordinator) in terms.zip([0]) {
+                let what = Ordered::Roster { term, coordinator, members: (0..size).collect() };
+                orders.push(Order { at: CALM, spread: Duration::ZERO, what });
+            }
+        }
+        orders.sort_by_key(|order| order.at);
+        orders
     }
 
     /// A set that concerns `other`, and perhaps everybody.

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use skein_bp::{Bid, Event, EventSet, Origin, Program};
-use skein_dbp::{BidRecord, Happened, NodeName, ProxyMove, facts};
+use skein_bp::{Bid, Event, EventSet, Program};
+use skein_dbp::{BidRecord, Happened, LIFT, NodeName, OnLoss, ProxyMove, ROSTER, Roster, facts};
 
-use crate::story::{Cast, Story};
+use crate::story::{Cast, Grants, Story};
 
 /// One step of one node, as it is seen from outside.
 pub(crate) struct Step<'a> {
@@ -55,6 +55,21 @@ pub(crate) struct Member {
     revision: Option<u64>,
     /// The newest record of each other node that has come to it in this life.
     pub(crate) table: BTreeMap<usize, Heard>,
+    /// The blocks that it has to keep whatever becomes of their holders: by holder and b-thread.
+    pub(crate) kept: BTreeMap<(usize, String), Keeping>,
+    /// Those that were lifted: at which life and synchronisation point of the holder.
+    lifted: BTreeMap<(usize, String), (u64, u64)>,
+    /// Who decides on joint events, as this node was told last, and as it was told before its last step.
+    pub(crate) roster: Option<Roster>,
+    pub(crate) former_roster: Option<Roster>,
+}
+
+/// A block that is to outlive its holder.
+pub(crate) struct Keeping {
+    /// The holder's life in which it was stated, and at which synchronisation point.
+    pub(crate) incarnation: u64,
+    pub(crate) sync: u64,
+    pub(crate) set: EventSet,
 }
 
 /// One life of a node.
@@ -85,7 +100,7 @@ pub(crate) struct Heard {
 
 impl Knowledge {
     pub(crate) fn new(story: &Story) -> Self {
-        let members: Vec<Member> = story.casts.iter().map(Member::new).collect();
+        let members: Vec<Member> = story.casts.iter().map(|cast| Member::new(cast, story.first_roster())).collect();
         let numbers = members.iter().enumerate().map(|(at, member)| (member.name.clone(), at)).collect();
         Self { members, numbers, longest_lease: story.longest_lease(), stated: BTreeMap::new() }
     }
@@ -99,8 +114,11 @@ impl Knowledge {
         &self.members[node]
     }
 
-    /// The node whose events these are.
-    pub(crate) fn home_of(&self, event: &Event) -> Option<usize> {
+    /// The node whose events these are, as `node` was told last.
+    pub(crate) fn home_of(&self, event: &Event, node: usize) -> Option<usize> {
+        if Roster::joint_events().contains(event) {
+            return self.number(self.member(node).roster.as_ref()?.coordinator.as_str());
+        }
         self.number(event.home())
     }
 
@@ -130,20 +148,21 @@ impl Knowledge {
 
     /// Takes note of what came in with a step and of what occurred in it, before it is judged.
     pub(crate) fn receive(&mut self, step: &Step<'_>) {
+        for record in step.received {
+            if let Some(bidder) = self.number(record.node.as_str()) {
+                self.members[step.node].hears(bidder, record, step.clock);
+            }
+        }
+        let numbers = &self.numbers;
         let member = &mut self.members[step.node];
-        let here = step.happened.iter().filter(|happened| happened.home == member.name && happened.seq > 0);
+        member.former_roster = member.roster.clone();
+        for happened in step.happened {
+            if happened.home == member.name {
+                member.does(happened, |name| numbers.get(name).copied());
+            }
+        }
         if let Some(life) = member.lives.last_mut() {
             life.began_clock.get_or_insert(step.clock);
-            life.occurred.extend(here.map(|happened| happened.event.clone()));
-        }
-        for record in step.received {
-            let Some(bidder) = self.number(record.node.as_str()) else { continue };
-            let heard = self.members[step.node].table.get(&bidder).map(|heard| &heard.record);
-            let number = |record: &BidRecord| (record.incarnation, record.epoch, record.sent_at);
-            if heard.is_none_or(|heard| number(record) > number(heard)) {
-                let heard = Heard { record: record.clone(), clock: step.clock };
-                self.members[step.node].table.insert(bidder, heard);
-            }
         }
     }
 
@@ -175,7 +194,7 @@ impl Knowledge {
 }
 
 impl Member {
-    fn new(cast: &Cast) -> Self {
+    fn new(cast: &Cast, roster: Option<Roster>) -> Self {
         let name = cast.name.clone();
         Self {
             home: EventSet::prefix(format!("{name}/")),
@@ -191,7 +210,105 @@ impl Member {
             bids: BTreeMap::new(),
             revision: None,
             table: BTreeMap::new(),
+            kept: BTreeMap::new(),
+            lifted: BTreeMap::new(),
+            former_roster: roster.clone(),
+            roster,
         }
+    }
+
+    /// A record has come. One that this home does not listen to changes nothing: it is older than what is known, of a
+    /// former term, or its sender has missed too much.
+    fn hears(&mut self, bidder: usize, record: &BidRecord, clock: Duration) {
+        let number = |record: &BidRecord| (record.incarnation, record.epoch, record.sent_at);
+        let newer = self.table.get(&bidder).is_none_or(|heard| number(record) > number(&heard.record));
+        let term = self.roster.as_ref().map_or(0, |roster| roster.term);
+        let occurred = self.present().map_or(0, |life| life.occurred.len() as u64);
+        let forgotten = occurred.saturating_sub(self.cast.history as u64);
+        let missed_too_much =
+            record.home_incarnation == Some(self.incarnation()) && record.applied < forgotten;
+        if !newer || (1..term).contains(&record.term) || missed_too_much {
+            return;
+        }
+        self.table.insert(bidder, Heard { record: record.clone(), clock });
+        let states = |bthread: &str| {
+            record.bids.iter().any(|bid| bid.bthread == bthread && bid.on_loss == OnLoss::Hold)
+        };
+        self.kept.retain(|(holder, bthread), kept| {
+            *holder != bidder || kept.incarnation != record.incarnation || states(bthread)
+        });
+        for bid in record.bids.iter().filter(|bid| bid.on_loss == OnLoss::Hold && !bid.block.is_none()) {
+            let key = (bidder, bid.bthread.clone());
+            let stay = (record.incarnation, bid.sync);
+            let known = self.kept.get(&key).is_some_and(|kept| (kept.incarnation, kept.sync) == stay);
+            let lifted = self.lifted.get(&key).is_some_and(|lifted| *lifted >= stay);
+            if !known && !lifted && self.may_block(record.node.as_str(), &bid.block) {
+                let (incarnation, sync) = stay;
+                let set = bid.block.clone();
+                self.kept.insert(key, Keeping { incarnation, sync, set });
+            }
+        }
+    }
+
+    /// Something has happened that is its own: what that means for it.
+    fn does(&mut self, happened: &Happened, number: impl Fn(&str) -> Option<usize>) {
+        let event = &happened.event;
+        if happened.seq > 0
+            && happened.term == 0
+            && let Some(life) = self.lives.last_mut()
+        {
+            life.occurred.push(event.clone());
+        }
+        if event.kind() == ROSTER
+            && let Ok(roster) = Roster::ordered(event)
+            && self.roster.as_ref().is_none_or(|known| roster.term > known.term)
+        {
+            self.roster = Some(roster);
+        }
+        if event.kind() == LIFT
+            && let (Some(holder), Some(bthread)) =
+                (event.text("node").and_then(number), event.text("bthread"))
+        {
+            let key = (holder, bthread.to_owned());
+            if let Some(kept) = self.kept.remove(&key) {
+                self.lifted.insert(key, (kept.incarnation, kept.sync));
+            }
+        }
+    }
+
+    /// Whether this home lets `node` request `event`, safety aside.
+    pub(crate) fn may_request(&self, node: &str, event: &Event) -> bool {
+        let granted = |grants: &Grants| grants.requests.contains(&event.kind());
+        self.cast.grants.as_ref().is_none_or(granted)
+            || !node.starts_with("uav/")
+            || Roster::joint_events().contains(event)
+    }
+
+    /// Whether this home lets `node` block a set.
+    pub(crate) fn may_block(&self, node: &str, set: &EventSet) -> bool {
+        let Some(grants) = self.cast.grants.as_ref().filter(|_| node.starts_with("uav/")) else { return true };
+        match set {
+            EventSet::None => true,
+            EventSet::Named(pattern) => {
+                let kind = pattern.as_str().rsplit('/').next().unwrap_or_default();
+                grants.blocks.contains(&kind)
+            }
+            EventSet::Or(sets) => sets.iter().all(|set| self.may_block(node, set)),
+            _ => false,
+        }
+    }
+
+    /// Whether a block of this node concerns the events of `home`, under the roster it had before its last step and
+    /// under the present one.
+    pub(crate) fn concerns(&self, set: &EventSet, home: &NodeName) -> bool {
+        let under = |roster: &Option<Roster>| {
+            let joint = roster.as_ref().is_some_and(|roster| {
+                roster.coordinator == *home && set.may_overlap(&Roster::joint_events())
+            });
+            let member = roster.as_ref().is_none_or(|roster| roster.members.contains(home));
+            member && !set.is_none() && (set.could_match_home(home.as_str()) || joint)
+        };
+        *home != self.name && under(&self.former_roster) && under(&self.roster)
     }
 
     /// Its present life's number, from 1; 0 before the first.
@@ -217,7 +334,7 @@ impl Member {
 
     /// Whether this is one of its own facts.
     pub(crate) fn is_fact(&self, happened: &Happened) -> bool {
-        happened.home == self.name && happened.origin == Origin::Occurred
+        happened.home == self.name && self.facts.contains(&happened.event)
     }
 }
 

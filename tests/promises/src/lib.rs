@@ -27,7 +27,7 @@ pub use campaign::{Campaign, Failure, Report, campaign};
 pub use promise::{Promise, Violation};
 pub use run::{Outcome, Settings, run};
 pub use shrink::{Shrunk, shrink};
-pub use story::{Cast, Fault, Faults, Story, Weather};
+pub use story::{Cast, Fault, Faults, Grants, Order, Ordered, Story, Weather};
 
 #[cfg(feature = "mutants")]
 pub use skein_dbp::Mutant;

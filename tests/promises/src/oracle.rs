@@ -5,11 +5,16 @@ mod g2_cause;
 mod g3_confirmed_block;
 mod g4_once;
 mod g5_loss;
+mod g5_hold;
 mod g6_safe_alone;
+mod g7_authority;
+mod g8_joint;
 mod g9_equivalence;
 mod goes_on;
 
 use std::time::Duration;
+
+use skein_bp::Program;
 
 use crate::knowledge::{Knowledge, Step};
 use crate::promise::{Promise, Violation};
@@ -17,9 +22,9 @@ use crate::story::Story;
 
 /// Watches over one promise.
 trait Oracle {
-    /// A node begins a life.
-    fn starts(&mut self, node: usize, knowledge: &Knowledge) {
-        let _ = (node, knowledge);
+    /// A node begins a life, with this program.
+    fn starts(&mut self, node: usize, program: &Program, knowledge: &Knowledge) {
+        let _ = (node, program, knowledge);
     }
 
     /// A node has made a step: what it received is known already, what its b-threads state now is not yet.
@@ -59,15 +64,19 @@ impl Court {
                 Box::new(g4_once::Once::default()),
                 Box::new(g5_loss::Loss),
                 Box::new(g6_safe_alone::SafeAlone),
+                Box::new(g5_hold::Hold::default()),
+                Box::new(g7_authority::Rights::default()),
+                Box::new(g8_joint::Joint::new(story)),
                 Box::new(g9_equivalence::Equivalence::new(story)),
                 Box::new(goes_on::GoesOn::new(story)),
             ],
         }
     }
 
-    pub(crate) fn starts(&mut self, node: usize, at: Duration) {
+    /// A node begins a life with this program.
+    pub(crate) fn starts(&mut self, node: usize, at: Duration, program: &Program) {
         self.knowledge.starts(node, at);
-        self.oracles.iter_mut().for_each(|oracle| oracle.starts(node, &self.knowledge));
+        self.oracles.iter_mut().for_each(|oracle| oracle.starts(node, program, &self.knowledge));
     }
 
     pub(crate) fn dies(&mut self, node: usize) {

@@ -29,6 +29,8 @@ pub enum Role {
         on: Duration,
         /// After how long a pause.
         off: Duration,
+        /// Whether the block is to stay when this node is lost.
+        hold: bool,
     },
     /// Requests an event of its own node each time that a block is confirmed, unless it lapses before.
     Acts {
@@ -63,8 +65,8 @@ impl Role {
             Self::Asks { event, every, patience } => {
                 program.add(name, Asker { event, every, patience, next: 1, phase: Phase::Resting(every), told })
             }
-            Self::Blocks { set, on, off } => {
-                program.add(name, Blocker { set, on, off, blocking: false, until: off })
+            Self::Blocks { set, on, off, hold } => {
+                program.add(name, Blocker { set, on, off, hold, blocking: false, until: off })
             }
             Self::Acts { holder, event } => {
                 let told = Told { me: me.clone(), bthread: holder };
@@ -99,8 +101,9 @@ impl fmt::Display for Role {
                 write!(f, "asks for {event}, resting {}", Seconds(*every))?;
                 patience.map_or(Ok(()), |patience| write!(f, ", giving up after {}", Seconds(patience)))
             }
-            Self::Blocks { set, on, off } => {
-                write!(f, "blocks {set} for {} after {}", Seconds(*on), Seconds(*off))
+            Self::Blocks { set, on, off, hold } => {
+                let kept = if *hold { ", even when it is lost" } else { "" };
+                write!(f, "blocks {set} for {} after {}{kept}", Seconds(*on), Seconds(*off))
             }
             Self::Acts { holder, event } => write!(f, "does {event} when the block of {holder} is confirmed"),
             Self::Echoes { of, event, rest } => {
@@ -179,6 +182,7 @@ struct Blocker {
     set: EventSet,
     on: Duration,
     off: Duration,
+    hold: bool,
     blocking: bool,
     until: Duration,
 }
@@ -186,6 +190,7 @@ struct Blocker {
 impl BThread for Blocker {
     fn bid(&self) -> Option<Bid> {
         let bid = Bid::new().deadline(self.until);
+        let bid = if self.hold { bid.hold_when_lost() } else { bid };
         Some(if self.blocking { bid.block(self.set.clone()) } else { bid })
     }
 

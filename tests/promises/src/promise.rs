@@ -20,6 +20,10 @@ pub enum Promise {
     G5,
     /// Safety events wait for nobody, and enter from afar by the gateway only.
     G6,
+    /// A bid beyond its sender's rights counts for nothing, and both ends are told.
+    G7,
+    /// A joint event has one decision, taken on fresh word from all, which all learn before a later one.
+    G8,
     /// A node's run is that of its program with proxies moved by the channel.
     G9,
     /// When faults end, everything goes on: streams converge, blocks are confirmed, requests are served.
@@ -35,6 +39,8 @@ impl fmt::Display for Promise {
             Self::G4 => "G4",
             Self::G5 => "G5",
             Self::G6 => "G6",
+            Self::G7 => "G7",
+            Self::G8 => "G8",
             Self::G9 => "G9",
             Self::GoesOn => "goes on",
         })

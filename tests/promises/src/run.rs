@@ -3,15 +3,15 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use skein_bp::{Event, Program, ProgramConfig};
-use skein_dbp::{Happened, Node, NodeConfig, NodeName};
-use skein_wire::{Fleet, Network, NetworkConfig, NodeLink};
+use skein_bp::{Event, EventSet, Program, ProgramConfig};
+use skein_dbp::{Authority, Grant, Happened, Node, NodeConfig, NodeName, Role, Roster};
+use skein_wire::{Fleet, MemoryStore, Network, NetworkConfig, NodeLink};
 
 use crate::clock::Clock;
 use crate::knowledge::{self, Step};
 use crate::oracle::Court;
 use crate::promise::{Promise, Violation};
-use crate::story::{Cast, Fault, Faults, Story};
+use crate::story::{Cast, Fault, Faults, Grants, Story};
 use crate::tap::TappedLink;
 
 /// A run goes on past its story's end until so much has occurred ...
@@ -72,6 +72,16 @@ pub(crate) fn program(cast: &Cast, seed: u64, node: usize) -> Program {
     program
 }
 
+/// What a home lets others do, as its node is configured.
+fn authority(cast: &Cast) -> Authority {
+    let Some(Grants { requests, blocks }) = &cast.grants else { return Authority::unrestricted() };
+    let kinds = |kinds: &[&str]| EventSet::any_of(kinds.iter().map(|kind| format!("*/*/{kind}")));
+    let all = Grant { request: EventSet::All, block: EventSet::All };
+    let some = Grant { request: kinds(requests).or(Roster::joint_events()), block: kinds(blocks) };
+    let role = |name: &str, nodes: &str, grant| Role { name: name.into(), nodes: vec![nodes.into()], grant };
+    Authority::new(vec![role("ground", "ground/*", all), role("vehicle", "uav/*", some)], None)
+}
+
 /// Something that a story says will be done.
 #[derive(Clone, Debug)]
 enum Turn {
@@ -82,6 +92,8 @@ enum Turn {
     Gone(usize, bool),
     /// One reason more, or one less, for a process to stand still.
     Still(usize, bool),
+    /// An operator tells a node this.
+    Order(usize, Event),
 }
 
 struct Stage<'a> {
@@ -112,6 +124,10 @@ struct Player<'a> {
     stepped: Option<Duration>,
     senses_next: Option<Duration>,
     sensed: i64,
+    /// What an operator has told it since its last step.
+    ordered: Vec<Event>,
+    /// What survives its restarts.
+    store: MemoryStore,
 }
 
 impl<'a> Stage<'a> {
@@ -184,6 +200,13 @@ impl<'a> Stage<'a> {
                     self.start(node);
                 }
             }
+            Turn::Order(node, event) => {
+                let player = &mut self.players[node];
+                if player.alive.is_some() {
+                    player.ordered.push(event);
+                    player.due = self.now;
+                }
+            }
             Turn::Still(node, begins) => {
                 let player = &mut self.players[node];
                 player.still = if begins { player.still + 1 } else { player.still - 1 };
@@ -227,21 +250,27 @@ impl<'a> Stage<'a> {
             longest_lease: self.story.longest_lease(),
             safety: knowledge::safety(cast),
             guarded: knowledge::guarded(cast),
+            authority: authority(cast),
+            joint: self.story.first_roster(),
+            durable: true,
+            kept: player.store.kept(),
             history: cast.history,
             #[cfg(feature = "mutants")]
             mutant: self.settings.mutant,
             ..NodeConfig::new(cast.name.clone(), player.incarnation, self.roster.clone())
         };
-        let mut node_of = Node::new(config, program(cast, self.story.seed, node));
-        node_of.record_proxies();
+        let mut started = Node::new(config, program(cast, self.story.seed, node));
+        started.record_proxies();
         let fleet = Fleet::new("promises").expect("a plain name");
         let link = TappedLink::new(self.network.join(&cast.name));
-        player.alive = Some((NodeLink::new(node_of, fleet), link));
+        self.court.starts(node, self.now, started.program());
+        let store = Box::new(player.store.clone());
+        player.alive = Some((NodeLink::durable(started, fleet, store), link));
+        player.ordered.clear();
         player.due = self.now;
         player.stepped = None;
         player.senses_next = cast.senses.map(|every| self.now + every);
         let still = player.still > 0;
-        self.court.starts(node, self.now);
         self.court.pauses(node, still);
     }
 
@@ -251,7 +280,8 @@ impl<'a> Stage<'a> {
         let player = &mut self.players[node];
         let clock = player.clock.shows(now);
         let (node_link, link) = player.alive.as_mut()?;
-        let mut enqueued = Vec::new();
+        let mut enqueued = std::mem::take(&mut player.ordered);
+        enqueued.iter().for_each(|event| node_link.node_mut().enqueue(event.clone()));
         while let Some(every) = player.cast.senses
             && player.senses_next.is_some_and(|at| at <= now)
         {
@@ -326,6 +356,8 @@ impl<'a> Player<'a> {
             stepped: None,
             senses_next: None,
             sensed: 0,
+            ordered: Vec::new(),
+            store: MemoryStore::default(),
         }
     }
 
@@ -358,6 +390,11 @@ fn turns(story: &Story) -> Vec<(Duration, Turn)> {
             Fault::Restart { node, .. } => Turn::Gone(*node, begins),
         };
         turns.extend([(fault.at(), turn(true)), (fault.ends(), turn(false))]);
+    }
+    for order in &story.orders {
+        for (node, at) in (0..story.casts.len()).zip(std::iter::successors(Some(order.at), |at| Some(*at + order.spread))) {
+            turns.extend(story.event_of(order, node).map(|event| (at, Turn::Order(node, event))));
+        }
     }
     let late = story.casts.iter().enumerate().filter(|(_, cast)| !cast.joins.is_zero());
     turns.extend(late.map(|(node, cast)| (cast.joins, Turn::Gone(node, false))));

@@ -7,7 +7,7 @@ use skein_wire::NetworkConfig;
 
 use crate::promise::Violation;
 use crate::run::{Outcome, Settings, run};
-use crate::story::{Cast, Fault, Story};
+use crate::story::{Cast, Fault, Ordered, Story};
 
 /// How many runs shrinking may take.
 const MOST_RUNS: usize = 400;
@@ -75,6 +75,11 @@ fn simpler(story: &Story, broken: Duration) -> Vec<Story> {
     for node in (0..story.casts.len()).rev().filter(|_| story.casts.len() > 1) {
         with(&|story| without_node(story, node));
     }
+    with(&|story| story.orders.retain(|order| order.at < broken));
+    with(&|story| story.joint = false);
+    for number in 0..story.orders.len() {
+        with(&|story| drop(story.orders.remove(number)));
+    }
     for number in 0..story.faults.len() {
         with(&|story| drop(story.faults.remove(number)));
     }
@@ -92,6 +97,7 @@ fn simpler(story: &Story, broken: Duration) -> Vec<Story> {
         with(&|story| story.casts[node].joins = Duration::ZERO);
         with(&|story| story.casts[node].history = Cast::ROOMY);
         with(&|story| story.casts[node].guarded = false);
+        with(&|story| story.casts[node].grants = None);
         with(&|story| (story.casts[node].drift_ppm, story.casts[node].clock_offset) = (0, Duration::ZERO));
         with(&|story| story.casts[node].tick = Duration::from_millis(20));
     }
@@ -120,6 +126,21 @@ fn without_node(story: &mut Story, gone: usize) {
             }
         }
     }
+    for order in &mut story.orders {
+        match &mut order.what {
+            Ordered::Roster { coordinator, members, .. } => {
+                members.retain(|node| *node != gone);
+                members.iter_mut().for_each(|node| *node = renumber(*node));
+                *coordinator = if *coordinator == gone { usize::MAX } else { renumber(*coordinator) };
+            }
+            Ordered::Lift { holder, .. } => {
+                *holder = if *holder == gone { usize::MAX } else { renumber(*holder) };
+            }
+        }
+    }
+    story.orders.retain(|order| match &order.what {
+        Ordered::Roster { coordinator: node, .. } | Ordered::Lift { holder: node, .. } => *node != usize::MAX,
+    });
     story.faults.retain(|fault| match fault {
         Fault::Partition { apart, .. } => !apart.is_empty(),
         Fault::Pause { node, .. } | Fault::Restart { node, .. } => *node != usize::MAX,

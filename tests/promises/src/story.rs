@@ -4,7 +4,8 @@ use std::fmt;
 use std::ops::AddAssign;
 use std::time::Duration;
 
-use skein_dbp::NodeName;
+use skein_bp::Event;
+use skein_dbp::{LIFT, NodeName, Roster};
 use skein_wire::NetworkConfig;
 
 use crate::programs::Role;
@@ -20,6 +21,10 @@ pub struct Story {
     pub weather: Vec<Weather>,
     /// What goes wrong, in order of time.
     pub faults: Vec<Fault>,
+    /// Whether there are joint events, with the first node as their first coordinator.
+    pub joint: bool,
+    /// What an operator orders, in order of time.
+    pub orders: Vec<Order>,
     /// From when on nothing goes wrong any more: the network is good and every node is up.
     pub calm: Duration,
     /// The least length of the run.
@@ -43,12 +48,55 @@ pub struct Cast {
     pub clock_offset: Duration,
     /// How many millionths its clock gains.
     pub drift_ppm: i32,
+    /// What vehicles may request and block here: last chunks of names; everything if none.
+    pub grants: Option<Grants>,
     /// When it is started first.
     pub joins: Duration,
     /// How often something happens to it from outside.
     pub senses: Option<Duration>,
     /// Its b-threads, by name.
     pub roles: Vec<(String, Role)>,
+}
+
+/// What vehicles may do at a home; the ground station may do everything.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Grants {
+    /// Last chunks of the names of events that they may request.
+    pub requests: Vec<&'static str>,
+    /// Last chunks of the names of events that they may block.
+    pub blocks: Vec<&'static str>,
+}
+
+/// An operator's order to every node that runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Order {
+    /// When it begins to be given out.
+    pub at: Duration,
+    /// How much later each next node is told.
+    pub spread: Duration,
+    /// What is ordered.
+    pub what: Ordered,
+}
+
+/// What an operator may order. Nodes are numbered as in [`Story::casts`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Ordered {
+    /// A new term of joint decisions.
+    Roster {
+        /// Its number.
+        term: u64,
+        /// Who decides.
+        coordinator: usize,
+        /// Without whom nothing is decided.
+        members: Vec<usize>,
+    },
+    /// That a block is lifted which stays although its holder may be lost.
+    Lift {
+        /// Whose.
+        holder: usize,
+        /// Of which of its b-threads.
+        bthread: String,
+    },
 }
 
 /// The network's habits from a time on.
@@ -174,6 +222,29 @@ impl Story {
         self.casts.iter().map(|cast| cast.lease).max().unwrap_or_default()
     }
 
+    /// Who decides on joint events first, if there are any.
+    #[must_use]
+    pub fn first_roster(&self) -> Option<Roster> {
+        let coordinator = self.casts.first().filter(|_| self.joint)?.name.clone();
+        Some(Roster::first(coordinator, self.roster()))
+    }
+
+    /// The event by which `order` is given to a node; none if it names nobody.
+    pub(crate) fn event_of(&self, order: &Order, node: usize) -> Option<Event> {
+        let name = |node: &usize| self.casts.get(*node).map(|cast| cast.name.clone());
+        let to = name(&node)?;
+        match &order.what {
+            Ordered::Roster { term, coordinator, members } => {
+                let first = Roster::first(name(coordinator)?, members.iter().filter_map(name));
+                Some(Roster { term: *term, ..first }.order(&to))
+            }
+            Ordered::Lift { holder, bthread } => {
+                let lift = Event::new(to.event_name(LIFT));
+                Some(lift.with("node", name(holder)?.as_str()).with("bthread", bthread.as_str()))
+            }
+        }
+    }
+
     fn name(&self, node: usize) -> &str {
         self.casts.get(node).map_or("nobody", |cast| cast.name.as_str())
     }
@@ -181,7 +252,7 @@ impl Story {
 
 impl fmt::Display for Story {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "Seed {}:", self.seed)?;
+        writeln!(f, "Seed {}{}:", self.seed, if self.joint { ", with joint events" } else { "" })?;
         for cast in &self.casts {
             write!(f, "{cast}")?;
         }
@@ -197,6 +268,18 @@ impl fmt::Display for Story {
                 least.as_secs_f64() * 1e3,
                 greatest.as_secs_f64() * 1e3,
             )?;
+        }
+        for Order { at, what, .. } in &self.orders {
+            match what {
+                Ordered::Roster { term, coordinator, members } => {
+                    let members: Vec<&str> = members.iter().map(|node| self.name(*node)).collect();
+                    let (at, coordinator) = (Seconds(*at), self.name(*coordinator));
+                    writeln!(f, "  at {at}: term {term} is ordered, of {} under {coordinator}", members.join(", "))?;
+                }
+                Ordered::Lift { holder, bthread } => {
+                    writeln!(f, "  at {}: the block of {bthread} at {} is lifted", Seconds(*at), self.name(*holder))?;
+                }
+            }
         }
         for fault in &self.faults {
             match fault {
@@ -232,6 +315,9 @@ impl fmt::Display for Cast {
         }
         if self.guarded {
             f.write_str(", guarded")?;
+        }
+        if let Some(Grants { requests, blocks }) = &self.grants {
+            write!(f, ", lets vehicles request {} and block {}", requests.join(", "), blocks.join(", "))?;
         }
         if self.drift_ppm != 0 {
             write!(f, ", clock {:+} ppm", self.drift_ppm)?;

@@ -50,6 +50,10 @@ impl Node {
 
     /// Sets what is selected here, and may be bid for here, by the roster.
     fn take_up_roster(&mut self) {
+        #[cfg(feature = "mutants")]
+        if let Some(joint) = &mut self.joint {
+            joint.mutant = self.config.mutant;
+        }
         let own = EventSet::prefix(format!("{}/", self.config.name));
         let leads = self.joint.as_ref().is_some_and(Joint::leads);
         self.home = if leads { own.or(Roster::joint_events()) } else { own };
@@ -146,7 +150,7 @@ impl Node {
     pub(super) fn guard_joint_events(&mut self) {
         let Some(joint) = self.joint.as_ref().filter(|joint| joint.leads()) else {
             if std::mem::take(&mut self.guards_joint) {
-                self.program.remove_proxy(JOINT_GUARD);
+                self.change_proxies(vec![(JOINT_GUARD.into(), None)]);
             }
             return;
         };
@@ -154,11 +158,8 @@ impl Node {
         if std::mem::replace(&mut self.guards_joint, guards) == guards {
             return;
         }
-        if guards {
-            self.program.put_proxy(JOINT_GUARD, &Bid::new().block(Roster::joint_events()));
-        } else {
-            self.program.remove_proxy(JOINT_GUARD);
-        }
+        let block = guards.then(|| Bid::new().block(Roster::joint_events()));
+        self.change_proxies(vec![(JOINT_GUARD.into(), block)]);
     }
 
     /// When joint events must be kept back again, if nobody is heard until then.

@@ -174,13 +174,8 @@ impl Node {
             history.push(occurrence.clone());
             self.outgoing.push((Recipient::All, Message::Occurrence(occurrence)));
         }
-        if term > 0 {
-            self.unsaved = true;
-            self.guard_joint_events();
-        }
-        self.heed(&event);
         self.selections.push(Happened {
-            event,
+            event: event.clone(),
             home: self.config.name.clone(),
             seq,
             term,
@@ -188,6 +183,11 @@ impl Node {
             requested_by,
             at: self.now,
         });
+        if term > 0 {
+            self.unsaved = true;
+            self.guard_joint_events();
+        }
+        self.heed(&event);
         self.change_proxies(proxies);
     }
 

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use skein_bp::Event;
+use skein_bp::{Event, Program};
 use skein_dbp::{Happened, facts};
 
 use super::{Findings, Oracle};
@@ -38,7 +38,7 @@ impl Order {
 }
 
 impl Oracle for Order {
-    fn starts(&mut self, node: usize, _: &Knowledge) {
+    fn starts(&mut self, node: usize, _: &Program, _: &Knowledge) {
         self.observers[node] = Observer::default();
     }
 
@@ -54,6 +54,10 @@ impl Oracle for Order {
 
 impl Observer {
     fn sees(&mut self, me: usize, happened: &Happened, knowledge: &Knowledge) -> Result<(), String> {
+        if happened.term > 0 {
+            // The decisions of a term are numbered on their own: G8.
+            return Ok(());
+        }
         let member = knowledge.member(me);
         if happened.home != member.name {
             return self.hears(happened, knowledge);

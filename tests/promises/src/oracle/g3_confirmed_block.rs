@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use skein_bp::{Event, EventSet, Origin};
+use skein_bp::{Event, EventSet, Origin, Program};
 use skein_dbp::facts;
 
 use super::{Findings, Oracle};
@@ -23,13 +23,15 @@ pub(super) struct ConfirmedBlock {
 struct Sure {
     sync: u64,
     set: EventSet,
+    /// The homes that it concerned.
+    homes: Vec<usize>,
     since: Duration,
     /// What occurred in spite of it while its holder stood still, and could be told nothing.
     overtaken: Option<String>,
 }
 
 impl Oracle for ConfirmedBlock {
-    fn starts(&mut self, node: usize, _: &Knowledge) {
+    fn starts(&mut self, node: usize, _: &Program, _: &Knowledge) {
         self.sure.retain(|(holder, _), _| *holder != node);
     }
 
@@ -61,8 +63,13 @@ impl Oracle for ConfirmedBlock {
         let settled = at.saturating_sub(4 * knowledge.longest_lease);
         for (node, member) in knowledge.members.iter().enumerate().filter(|(_, member)| member.up) {
             for (bthread, stated) in member.bids.iter().filter(|(_, stated)| stated.since < settled) {
-                let concerned = concerned(knowledge, node, stated.bid.blocks()).count() > 0;
-                if concerned && !self.sure.contains_key(&(node, bthread.clone())) {
+                let set = stated.bid.blocks();
+                let homes: Vec<usize> = concerned(knowledge, node, set).collect();
+                let granted =
+                    homes.iter().all(|home| knowledge.member(*home).may_block(member.name.as_str(), set));
+                // What was lifted is not confirmed any more.
+                let kept = !stated.bid.holds_when_lost();
+                if !homes.is_empty() && granted && kept && !self.sure.contains_key(&(node, bthread.clone())) {
                     let what = format!("the block of {bthread} has waited in vain for its confirmation");
                     findings.broken(Promise::GoesOn, node, what);
                 }
@@ -96,15 +103,24 @@ impl ConfirmedBlock {
             findings.broken(Promise::G3, step.node, format!("{fact}, which was never stated"));
             return;
         };
-        for home in concerned(knowledge, step.node, bid.blocks()) {
-            let key = (home, step.node, incarnation, bthread.to_owned(), sync);
-            let recent = step.at.saturating_sub(lease_of(knowledge.member(step.node)));
+        let homes: Vec<usize> = concerned(knowledge, step.node, bid.blocks()).collect();
+        for home in &homes {
+            if !knowledge.member(*home).may_block(knowledge.member(step.node).name.as_str(), bid.blocks()) {
+                let name = &knowledge.member(*home).name;
+                findings.broken(Promise::G7, step.node, format!("{fact}, which {name} does not let it block"));
+            }
+            let key = (*home, step.node, incarnation, bthread.to_owned(), sync);
+            // One that is kept without renewal may have been heard of long ago.
+            let recent = match bid.holds_when_lost() {
+                true => Duration::ZERO,
+                false => step.at.saturating_sub(lease_of(knowledge.member(step.node))),
+            };
             if self.received.get(&key).is_none_or(|at| *at < recent) {
-                let name = &knowledge.member(home).name;
+                let name = &knowledge.member(*home).name;
                 findings.broken(Promise::G3, step.node, format!("{fact}, which {name} has not heard of"));
             }
         }
-        let sure = Sure { sync, set: bid.blocks().clone(), since: step.at, overtaken: None };
+        let sure = Sure { sync, set: bid.blocks().clone(), homes, since: step.at, overtaken: None };
         self.sure.insert((step.node, bthread.to_owned()), sure);
     }
 
@@ -119,7 +135,8 @@ impl ConfirmedBlock {
                 }
                 continue;
             }
-            if !sure.set.contains(event) || !home.lets_block(event) {
+            let concerned = sure.homes.contains(&step.node) && who.concerns(&sure.set, &home.name);
+            if !concerned || !sure.set.contains(event) || !home.lets_block(event) {
                 continue;
             }
             // Unless guarded, a home that has restarted knows of no block before its holder has told it again.
@@ -138,16 +155,11 @@ impl ConfirmedBlock {
     }
 }
 
-/// The other homes that a block concerns.
-fn concerned<'a>(
-    knowledge: &'a Knowledge,
-    holder: usize,
-    set: &'a EventSet,
-) -> impl Iterator<Item = usize> + 'a {
-    let others = knowledge.members.iter().enumerate().filter(move |(node, _)| *node != holder);
-    others
-        .filter(|(_, home)| !set.is_none() && set.could_match_home(home.name.as_str()))
-        .map(|(node, _)| node)
+/// The other homes that a block concerns, and that let its holder have it.
+fn concerned<'a>(knowledge: &'a Knowledge, holder: usize, set: &'a EventSet) -> impl Iterator<Item = usize> + 'a {
+    let who = knowledge.member(holder);
+    let homes = knowledge.members.iter().enumerate();
+    homes.filter(move |(_, home)| who.concerns(set, &home.name)).map(|(node, _)| node)
 }
 
 /// A node's lease in true time, however slow its clock.

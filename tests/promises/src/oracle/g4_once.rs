@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use skein_bp::Origin;
+use skein_bp::{Origin, Program};
 use skein_dbp::{Happened, facts};
 
 use super::{Findings, Oracle};
@@ -23,7 +23,7 @@ pub(super) struct Once {
 }
 
 impl Oracle for Once {
-    fn starts(&mut self, node: usize, _: &Knowledge) {
+    fn starts(&mut self, node: usize, _: &Program, _: &Knowledge) {
         self.met.retain(|(observer, _), _| *observer != node);
     }
 
@@ -82,7 +82,7 @@ impl Once {
             let since = usize::try_from(record.applied).unwrap_or(usize::MAX);
             let until = usize::try_from(happened.seq.saturating_sub(1)).unwrap_or(usize::MAX);
             let occurred = home.present().and_then(|life| life.occurred.get(since..until)).unwrap_or_default();
-            if occurred.iter().any(|occurred| bid.requests.contains(occurred)) {
+            if happened.term == 0 && occurred.iter().any(|occurred| bid.requests.contains(occurred)) {
                 broken("which an earlier occurrence had satisfied".to_owned());
             }
         }

@@ -38,7 +38,10 @@ fn has_reason_to_wait(step: &Step<'_>, event: &Event, knowledge: &Knowledge) -> 
     let guarded = home.guarded.contains(event) && step.clock < began + knowledge.longest_lease;
     let blocked = home.lets_block(event)
         && home.table.values().any(|heard| {
-            !heard.has_lapsed(step.clock) && heard.record.bids.iter().any(|bid| bid.block.contains(event))
+            let who = heard.record.node.as_str();
+            !heard.has_lapsed(step.clock)
+                && heard.record.bids.iter().any(|bid| bid.block.contains(event) && home.may_block(who, &bid.block))
         });
-    safe || guarded || blocked
+    let kept = home.lets_block(event) && home.kept.values().any(|kept| kept.set.contains(event));
+    safe || guarded || blocked || kept
 }

@@ -1,13 +1,14 @@
 //! G9: a node's run is a run of its program alone, in which the bids of others are proxies that the channel moves, and
 //! what has occurred elsewhere comes before anything is selected.
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use skein_bp::{Event, Origin, Program};
-use skein_dbp::Happened;
+use skein_bp::{Event, EventSet, Origin, Program};
+use skein_dbp::{Happened, ROSTER, Roster};
 
 use super::{Findings, Oracle};
-use crate::knowledge::{Knowledge, Step};
+use crate::knowledge::{Knowledge, Member, Step};
 use crate::promise::Promise;
 use crate::run;
 use crate::story::{Cast, Story};
@@ -27,15 +28,11 @@ impl Equivalence {
 }
 
 impl Oracle for Equivalence {
-    fn starts(&mut self, node: usize, knowledge: &Knowledge) {
-        let cast = &self.casts[node];
-        let mut program = run::program(cast, self.seed, node);
-        let homeless = skein_bp::EventSet::from("*").or("*/*");
-        program.set_home(knowledge.member(node).home.clone().or(homeless));
-        let guarded = &knowledge.member(node).guarded;
-        if !guarded.is_none() {
-            program.put_proxy("restart guard", &skein_bp::Bid::new().block(guarded.clone()));
-        }
+    fn starts(&mut self, node: usize, started: &Program, knowledge: &Knowledge) {
+        let mut program = run::program(&self.casts[node], self.seed, node);
+        program.set_home(home(knowledge.member(node), knowledge.member(node).roster.as_ref()));
+        // Blocks that outlive their holders, and those that keep events back after a start, are there from the first.
+        started.proxies().for_each(|(proxy, bid)| program.put_proxy(proxy, bid));
         self.programs[node] = Some(program);
     }
 
@@ -47,8 +44,20 @@ impl Oracle for Equivalence {
     }
 }
 
+/// What is selected at a node, as it was told who decides on joint events.
+fn home(member: &Member, roster: Option<&Roster>) -> EventSet {
+    let homeless = EventSet::from("*").or(EventSet::from("*/*").and(!Roster::joint_events()));
+    let home = member.home.clone().or(homeless);
+    match roster.filter(|roster| roster.coordinator == member.name) {
+        Some(_) => home.or(Roster::joint_events()),
+        None => home,
+    }
+}
+
 fn replay(program: &mut Program, step: &Step<'_>, knowledge: &Knowledge) -> Result<(), String> {
-    let me = &knowledge.member(step.node).name;
+    let member = knowledge.member(step.node);
+    let me = &member.name;
+    let mut term = member.former_roster.as_ref().map_or(0, |roster| roster.term);
     let mut moves = step.moves.iter().peekable();
     let mut move_proxies = |program: &mut Program, before: usize| {
         while let Some(next) = moves.next_if(|next| next.after <= before) {
@@ -73,6 +82,14 @@ fn replay(program: &mut Program, step: &Step<'_>, knowledge: &Knowledge) -> Resu
             Origin::External | Origin::Internal => selected_here = Some(event),
         }
         expect(program, step.clock, Some(happened))?;
+        if home == me
+            && event.kind() == ROSTER
+            && let Ok(roster) = Roster::ordered(event)
+            && roster.term > term
+        {
+            term = roster.term;
+            program.set_home(self::home(member, Some(&roster)));
+        }
     }
     move_proxies(program, step.happened.len());
     expect(program, step.clock, None)
@@ -81,7 +98,11 @@ fn replay(program: &mut Program, step: &Step<'_>, knowledge: &Knowledge) -> Resu
 /// Lets the program go on by one selection, which has to be this one.
 fn expect(program: &mut Program, now: Duration, happened: Option<&Happened>) -> Result<(), String> {
     let selected = program.step(now).map_err(|error| format!("alone, the program fails: {error}"))?;
-    let names = |requesters: &[std::sync::Arc<str>]| requesters.iter().map(ToString::to_string).collect();
+    let names = |requesters: &[Arc<str>]| {
+        let mut names: Vec<String> = requesters.iter().map(ToString::to_string).collect();
+        names.sort_unstable();
+        names
+    };
     let alone: Option<(&Event, Origin, Vec<String>)> =
         selected.as_ref().map(|selected| (&selected.event, selected.origin, names(&selected.requested_by)));
     let seen = happened.map(|happened| {

@@ -4,8 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use skein_bp::Event;
-use skein_dbp::{RefusalReason, facts};
+use skein_bp::{Event, Program};
+use skein_dbp::{RefusalReason, Roster, facts};
 
 use super::{Findings, Oracle};
 use crate::knowledge::{Knowledge, Member, Step};
@@ -31,14 +31,14 @@ impl GoesOn {
 }
 
 impl Oracle for GoesOn {
-    fn starts(&mut self, node: usize, _: &Knowledge) {
+    fn starts(&mut self, node: usize, _: &Program, _: &Knowledge) {
         self.heard.retain(|(observer, home), _| *observer != node && *home != node);
         self.refused.retain(|(observer, _)| *observer != node);
     }
 
     fn judge(&mut self, step: &Step<'_>, knowledge: &Knowledge, _: &mut Findings) {
         let me = knowledge.member(step.node);
-        for happened in step.happened {
+        for happened in step.happened.iter().filter(|happened| happened.term == 0) {
             if happened.home != me.name {
                 if let Some(home) = knowledge.number(happened.home.as_str()) {
                     self.heard.insert((step.node, home), happened.seq);
@@ -74,13 +74,15 @@ impl Oracle for GoesOn {
         for (node, member) in knowledge.members.iter().enumerate() {
             for (bthread, stated) in member.bids.iter().filter(|(_, stated)| stated.since < settled) {
                 for event in stated.bid.requests() {
-                    let Some(home) = knowledge.home_of(event).filter(|home| *home != node) else { continue };
+                    let Some(home) = knowledge.home_of(event, node).filter(|home| *home != node) else { continue };
                     if knowledge.member(home).safety.contains(event) {
                         if !self.refused.contains(&(node, bthread.clone())) {
                             let what = format!("{bthread} was not told that {event} is refused");
                             findings.broken(Promise::G6, node, what);
                         }
-                    } else if is_free(event, home, knowledge) {
+                    } else if knowledge.member(home).may_request(member.name.as_str(), event)
+                        && is_free(event, home, knowledge)
+                    {
                         let what = format!("{event} of {bthread} is blocked by nobody, and yet does not occur");
                         findings.broken(Promise::GoesOn, node, what);
                     }
@@ -93,7 +95,8 @@ impl Oracle for GoesOn {
 /// Whether no b-thread of the story ever blocks `event`.
 fn is_free(event: &Event, home: usize, knowledge: &Knowledge) -> bool {
     knowledge.members.iter().enumerate().all(|(node, member)| {
-        let counts = node == home || knowledge.member(home).lets_block(event);
+        let joint = Roster::joint_events().contains(event);
+        let counts = node == home || joint || knowledge.member(home).lets_block(event);
         !counts || member.cast.roles.iter().all(|(_, role)| !role.ever_blocks(event))
     })
 }
