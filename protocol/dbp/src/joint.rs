@@ -117,9 +117,8 @@ impl Joint {
         };
         let others = self.roster.members.iter().filter(|member| **member != self.roster.coordinator);
         #[cfg(feature = "mutants")]
-        let others = others.filter(|member| {
-            self.mutant != Some(crate::Mutant::G8) || self.words.contains_key(*member)
-        });
+        let others = others
+            .filter(|member| self.mutant != Some(crate::Mutant::G8) || self.words.contains_key(*member));
         self.leads
             && self.decisions.latest_seq() < MOST_DECISIONS as u64
             && others.into_iter().all(|member| self.words.get(member).is_some_and(fresh))

@@ -22,3 +22,18 @@ pub enum Mutant {
     /// A local event is selected before what has occurred elsewhere is told.
     G9,
 }
+
+impl Mutant {
+    /// All of them, by the names of their promises.
+    pub const ALL: [(&'static str, Self); 9] = [
+        ("G1", Self::G1),
+        ("G2", Self::G2),
+        ("G3", Self::G3),
+        ("G4", Self::G4),
+        ("G5", Self::G5),
+        ("G6", Self::G6),
+        ("G7", Self::G7),
+        ("G8", Self::G8),
+        ("G9", Self::G9),
+    ];
+}

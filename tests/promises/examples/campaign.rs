@@ -12,14 +12,18 @@ fn main() {
     let (seeds, from) = (numbers.next().unwrap_or(100), numbers.next().unwrap_or(1));
     let shrunk = usize::try_from(numbers.next().unwrap_or(1)).expect("few");
     let began = Instant::now();
-    let report = campaign(&Campaign { from, seeds, jobs: 2, shrunk, settings: Settings::default() }, &|_, _| {});
+    let report =
+        campaign(&Campaign { from, seeds, jobs: 2, shrunk, settings: Settings::default() }, &|_, _| {});
     for failure in &report.failures {
         println!("seed {}: {}", failure.seed, failure.violation);
     }
     for shrunk in report.failures.iter().filter_map(|failure| failure.shrunk.as_ref()) {
         println!("{shrunk}");
     }
-    println!("{} steps, {} occurrences, at least {:?} in a seed", report.steps, report.occurrences, report.least);
+    println!(
+        "{} steps, {} occurrences, at least {:?} in a seed",
+        report.steps, report.occurrences, report.least
+    );
     println!("{:?}", report.faults);
     println!("{:.1} s for {} seeds on 2 threads", began.elapsed().as_secs_f64(), report.seeds);
 }

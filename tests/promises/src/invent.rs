@@ -150,7 +150,10 @@ impl Author {
         let mut some = |of: &[&'static str]| -> Vec<&'static str> {
             of.iter().copied().filter(|_| self.random.random::<f64>() < 0.6).collect()
         };
-        Grants { requests: some(&["do", "turn", "order", "left", "right"]), blocks: some(&["step", "do", "left"]) }
+        Grants {
+            requests: some(&["do", "turn", "order", "left", "right"]),
+            blocks: some(&["step", "do", "left"]),
+        }
     }
 
     /// What an operator orders; gives the nodes reason to heed it.
@@ -182,8 +185,9 @@ impl Author {
             let mut terms = 2..;
             for (at, term) in times.into_iter().zip(&mut terms) {
                 let coordinator = self.random.random_range(0..size);
-                let members: Vec<usize> =
-                    (0..size).filter(|node| *node == coordinator || self.random.random::<f64>() < 0.8).collect();
+                let members: Vec<usize> = (0..size)
+                    .filter(|node| *node == coordinator || self.random.random::<f64>() < 0.8)
+                    .collect();
                 let what = Ordered::Roster { term, coordinator, members };
                 orders.push(Order { at, spread: self.between(0, 300), what });
             }

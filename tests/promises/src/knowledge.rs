@@ -100,7 +100,8 @@ pub(crate) struct Heard {
 
 impl Knowledge {
     pub(crate) fn new(story: &Story) -> Self {
-        let members: Vec<Member> = story.casts.iter().map(|cast| Member::new(cast, story.first_roster())).collect();
+        let members: Vec<Member> =
+            story.casts.iter().map(|cast| Member::new(cast, story.first_roster())).collect();
         let numbers = members.iter().enumerate().map(|(at, member)| (member.name.clone(), at)).collect();
         Self { members, numbers, longest_lease: story.longest_lease(), stated: BTreeMap::new() }
     }
@@ -182,8 +183,7 @@ impl Knowledge {
                     let means_nothing_elsewhere = bid.blocks().is_none()
                         && bid.requests().iter().all(|event| member.home.contains(event));
                     if !means_nothing_elsewhere {
-                        self.stated
-                            .insert((step.node, incarnation, bthread.to_owned(), sync), bid.clone());
+                        self.stated.insert((step.node, incarnation, bthread.to_owned(), sync), bid.clone());
                     }
                     (bthread.to_owned(), Stated { sync, bid: bid.clone(), since: step.at })
                 }
@@ -276,6 +276,11 @@ impl Member {
         }
     }
 
+    /// Whether an authority has lifted this block here.
+    pub(crate) fn has_lifted(&self, holder: usize, bthread: &str, stay: (u64, u64)) -> bool {
+        self.lifted.get(&(holder, bthread.to_owned())).is_some_and(|lifted| *lifted >= stay)
+    }
+
     /// Whether this home lets `node` request `event`, safety aside.
     pub(crate) fn may_request(&self, node: &str, event: &Event) -> bool {
         let granted = |grants: &Grants| grants.requests.contains(&event.kind());
@@ -286,7 +291,9 @@ impl Member {
 
     /// Whether this home lets `node` block a set.
     pub(crate) fn may_block(&self, node: &str, set: &EventSet) -> bool {
-        let Some(grants) = self.cast.grants.as_ref().filter(|_| node.starts_with("uav/")) else { return true };
+        let Some(grants) = self.cast.grants.as_ref().filter(|_| node.starts_with("uav/")) else {
+            return true;
+        };
         match set {
             EventSet::None => true,
             EventSet::Named(pattern) => {

@@ -62,9 +62,8 @@ impl Role {
     pub fn load(&self, name: &str, me: &NodeName, program: &mut Program) {
         let told = Told { me: me.clone(), bthread: name.into() };
         match self.clone() {
-            Self::Asks { event, every, patience } => {
-                program.add(name, Asker { event, every, patience, next: 1, phase: Phase::Resting(every), told })
-            }
+            Self::Asks { event, every, patience } => program
+                .add(name, Asker { event, every, patience, next: 1, phase: Phase::Resting(every), told }),
             Self::Blocks { set, on, off, hold } => {
                 program.add(name, Blocker { set, on, off, hold, blocking: false, until: off })
             }
@@ -72,9 +71,8 @@ impl Role {
                 let told = Told { me: me.clone(), bthread: holder };
                 program.add(name, Actor { told, event, next: 1, acting: false })
             }
-            Self::Echoes { of, event, rest } => {
-                program.add(name, Echo { of, event, rest, next: 1, phase: Phase::Asking(rest), told, heard: false })
-            }
+            Self::Echoes { of, event, rest } => program
+                .add(name, Echo { of, event, rest, next: 1, phase: Phase::Asking(rest), told, heard: false }),
             Self::Alternates { events, every } => {
                 program.add(name, Alternator { events, every, turn: 0, phase: Phase::Resting(every), told })
             }

@@ -62,6 +62,13 @@ pub struct Violation {
 
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} broken at {:.3} s, at {}: {}", self.promise, self.at.as_secs_f64(), self.node, self.what)
+        write!(
+            f,
+            "{} broken at {:.3} s, at {}: {}",
+            self.promise,
+            self.at.as_secs_f64(),
+            self.node,
+            self.what
+        )
     }
 }

@@ -158,7 +158,11 @@ impl<'a> Stage<'a> {
         }
         loop {
             let turn = self.turns.last().map(|(at, _)| *at);
-            let next = self.players.iter().enumerate().filter_map(|(node, player)| Some((player.wakes(self.now)?, node)));
+            let next = self
+                .players
+                .iter()
+                .enumerate()
+                .filter_map(|(node, player)| Some((player.wakes(self.now)?, node)));
             let next = next.min();
             let at = [turn, next.map(|(at, _)| at)].into_iter().flatten().min()?;
             if at > self.story.end && self.has_seen_enough() {
@@ -222,7 +226,9 @@ impl<'a> Stage<'a> {
         for (node, name) in self.roster.iter().enumerate() {
             let faults = self.story.faults.iter().zip(&self.cuts);
             let sides: Vec<bool> = faults
-                .map(|(fault, cut)| *cut && matches!(fault, Fault::Partition { apart, .. } if apart.contains(&node)))
+                .map(|(fault, cut)| {
+                    *cut && matches!(fault, Fault::Partition { apart, .. } if apart.contains(&node))
+                })
                 .collect();
             match groups.iter_mut().find(|(of, _)| *of == sides) {
                 Some((_, group)) => group.push(name.clone()),
@@ -364,7 +370,8 @@ impl<'a> Player<'a> {
     /// When it steps next, true time and not before `now`, if nothing changes.
     fn wakes(&self, now: Duration) -> Option<Duration> {
         let (_, link) = self.alive.as_ref().filter(|_| self.still == 0)?;
-        let due = [link.link.next_arrival(), self.senses_next].into_iter().flatten().fold(self.due, Duration::min);
+        let due =
+            [link.link.next_arrival(), self.senses_next].into_iter().flatten().fold(self.due, Duration::min);
         let due = self.stepped.map_or(due, |at| due.max(at + SHORTEST_STEP)).max(now);
         Some(round_up(due, self.cast.tick))
     }
@@ -392,7 +399,9 @@ fn turns(story: &Story) -> Vec<(Duration, Turn)> {
         turns.extend([(fault.at(), turn(true)), (fault.ends(), turn(false))]);
     }
     for order in &story.orders {
-        for (node, at) in (0..story.casts.len()).zip(std::iter::successors(Some(order.at), |at| Some(*at + order.spread))) {
+        for (node, at) in
+            (0..story.casts.len()).zip(std::iter::successors(Some(order.at), |at| Some(*at + order.spread)))
+        {
             turns.extend(story.event_of(order, node).map(|event| (at, Turn::Order(node, event))));
         }
     }
@@ -411,7 +420,8 @@ fn tell(told: &mut VecDeque<String>, most: usize, at: Duration, node: &NodeName,
     }
     for Happened { event, home, seq, origin, requested_by, .. } in happened {
         let whence = if home == node { String::new() } else { format!(", number {seq} of {home}") };
-        let by = if requested_by.is_empty() { String::new() } else { format!(", by {}", requested_by.join(", ")) };
+        let by =
+            if requested_by.is_empty() { String::new() } else { format!(", by {}", requested_by.join(", ")) };
         told.push_back(format!("{:9.4} s {node}: {event} ({origin}{by}{whence})", at.as_secs_f64()));
     }
     while told.len() > most {

@@ -274,10 +274,19 @@ impl fmt::Display for Story {
                 Ordered::Roster { term, coordinator, members } => {
                     let members: Vec<&str> = members.iter().map(|node| self.name(*node)).collect();
                     let (at, coordinator) = (Seconds(*at), self.name(*coordinator));
-                    writeln!(f, "  at {at}: term {term} is ordered, of {} under {coordinator}", members.join(", "))?;
+                    writeln!(
+                        f,
+                        "  at {at}: term {term} is ordered, of {} under {coordinator}",
+                        members.join(", ")
+                    )?;
                 }
                 Ordered::Lift { holder, bthread } => {
-                    writeln!(f, "  at {}: the block of {bthread} at {} is lifted", Seconds(*at), self.name(*holder))?;
+                    writeln!(
+                        f,
+                        "  at {}: the block of {bthread} at {} is lifted",
+                        Seconds(*at),
+                        self.name(*holder)
+                    )?;
                 }
             }
         }
@@ -289,7 +298,13 @@ impl fmt::Display for Story {
                     writeln!(f, "  at {}: {names} cut off for {lasts}", Seconds(*at))?;
                 }
                 Fault::Pause { at, lasts, node } => {
-                    writeln!(f, "  at {}: {} stands still for {}", Seconds(*at), self.name(*node), Seconds(*lasts))?;
+                    writeln!(
+                        f,
+                        "  at {}: {} stands still for {}",
+                        Seconds(*at),
+                        self.name(*node),
+                        Seconds(*lasts)
+                    )?;
                 }
                 Fault::Restart { at, lasts, node } => writeln!(
                     f,

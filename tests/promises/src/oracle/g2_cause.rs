@@ -28,7 +28,8 @@ impl Oracle for Cause {
                 let heard = home.table.get(&bidder);
                 let bid = heard.and_then(|heard| heard.record.bids.iter().find(|bid| bid.bthread == bthread));
                 let (Some(heard), Some(bid)) = (heard, bid.filter(|bid| bid.requests.contains(event))) else {
-                    let what = format!("{event} occurred for {requester}, whose newest record does not request it");
+                    let what =
+                        format!("{event} occurred for {requester}, whose newest record does not request it");
                     findings.broken(Promise::G2, step.node, what);
                     continue;
                 };
@@ -39,7 +40,9 @@ impl Oracle for Cause {
                 let stated = knowledge.stated(bidder, heard.record.incarnation, bthread, bid.sync);
                 if !stated.is_some_and(|stated| stated.requests().contains(event)) {
                     let sync = bid.sync;
-                    let what = format!("{event} occurred for {requester}, which never stated that at its point {sync}");
+                    let what = format!(
+                        "{event} occurred for {requester}, which never stated that at its point {sync}"
+                    );
                     findings.broken(Promise::G2, step.node, what);
                 }
             }

@@ -42,7 +42,9 @@ impl Oracle for ConfirmedBlock {
             let event = &happened.event;
             if me.is_fact(happened) {
                 match (event.kind(), event.text("bthread")) {
-                    (facts::CONFIRMED, Some(bthread)) => self.confirm(step, event, bthread, knowledge, findings),
+                    (facts::CONFIRMED, Some(bthread)) => {
+                        self.confirm(step, event, bthread, knowledge, findings)
+                    }
                     (facts::BLOCK_LAPSED, Some(bthread)) => {
                         self.sure.remove(&(step.node, bthread.to_owned()));
                     }
@@ -107,7 +109,11 @@ impl ConfirmedBlock {
         for home in &homes {
             if !knowledge.member(*home).may_block(knowledge.member(step.node).name.as_str(), bid.blocks()) {
                 let name = &knowledge.member(*home).name;
-                findings.broken(Promise::G7, step.node, format!("{fact}, which {name} does not let it block"));
+                findings.broken(
+                    Promise::G7,
+                    step.node,
+                    format!("{fact}, which {name} does not let it block"),
+                );
             }
             let key = (*home, step.node, incarnation, bthread.to_owned(), sync);
             // One that is kept without renewal may have been heard of long ago.
@@ -136,7 +142,9 @@ impl ConfirmedBlock {
                 continue;
             }
             let concerned = sure.homes.contains(&step.node) && who.concerns(&sure.set, &home.name);
-            if !concerned || !sure.set.contains(event) || !home.lets_block(event) {
+            // Its holder is told of that with the next acknowledgement.
+            let lifted = home.has_lifted(*holder, bthread, (who.incarnation(), sure.sync));
+            if !concerned || lifted || !sure.set.contains(event) || !home.lets_block(event) {
                 continue;
             }
             // Unless guarded, a home that has restarted knows of no block before its holder has told it again.
@@ -156,7 +164,11 @@ impl ConfirmedBlock {
 }
 
 /// The other homes that a block concerns, and that let its holder have it.
-fn concerned<'a>(knowledge: &'a Knowledge, holder: usize, set: &'a EventSet) -> impl Iterator<Item = usize> + 'a {
+fn concerned<'a>(
+    knowledge: &'a Knowledge,
+    holder: usize,
+    set: &'a EventSet,
+) -> impl Iterator<Item = usize> + 'a {
     let who = knowledge.member(holder);
     let homes = knowledge.members.iter().enumerate();
     homes.filter(move |(_, home)| who.concerns(set, &home.name)).map(|(node, _)| node)

@@ -81,7 +81,8 @@ impl Once {
             // What has occurred since the record was sent resumes the b-thread: it asks no more.
             let since = usize::try_from(record.applied).unwrap_or(usize::MAX);
             let until = usize::try_from(happened.seq.saturating_sub(1)).unwrap_or(usize::MAX);
-            let occurred = home.present().and_then(|life| life.occurred.get(since..until)).unwrap_or_default();
+            let occurred =
+                home.present().and_then(|life| life.occurred.get(since..until)).unwrap_or_default();
             if happened.term == 0 && occurred.iter().any(|occurred| bid.requests.contains(occurred)) {
                 broken("which an earlier occurrence had satisfied".to_owned());
             }
@@ -117,7 +118,8 @@ impl Once {
             });
             if open && stays && !told {
                 let home = &knowledge.member(home).name;
-                let what = format!("{home} has restarted, and what {bthread} asks of it was not told as unknown");
+                let what =
+                    format!("{home} has restarted, and what {bthread} asks of it was not told as unknown");
                 findings.broken(Promise::G4, step.node, what);
             }
         }

@@ -34,7 +34,8 @@ impl Oracle for Hold {
                 let stay = (*holder, kept.incarnation, bthread.clone(), kept.sync);
                 if self.confirmed.contains(&stay) {
                     let holder = &knowledge.member(*holder).name;
-                    let what = format!("{event} occurred, which {bthread} of {holder} blocks even when it is lost");
+                    let what =
+                        format!("{event} occurred, which {bthread} of {holder} blocks even when it is lost");
                     findings.broken(Promise::G5, step.node, what);
                 }
             }

@@ -27,7 +27,9 @@ pub(super) fn waiting(step: &Step<'_>, knowledge: &Knowledge) -> Vec<Event> {
     let home = &knowledge.member(step.node).home;
     let requests = step.program.bids().flat_map(|(_, bid, _)| bid.requests());
     let here = requests.filter(|event| home.contains(event));
-    here.filter(|event| step.program.bids().all(|(_, bid, _)| !bid.blocks().contains(event))).cloned().collect()
+    here.filter(|event| step.program.bids().all(|(_, bid, _)| !bid.blocks().contains(event)))
+        .cloned()
+        .collect()
 }
 
 fn has_reason_to_wait(step: &Step<'_>, event: &Event, knowledge: &Knowledge) -> bool {
@@ -40,7 +42,11 @@ fn has_reason_to_wait(step: &Step<'_>, event: &Event, knowledge: &Knowledge) -> 
         && home.table.values().any(|heard| {
             let who = heard.record.node.as_str();
             !heard.has_lapsed(step.clock)
-                && heard.record.bids.iter().any(|bid| bid.block.contains(event) && home.may_block(who, &bid.block))
+                && heard
+                    .record
+                    .bids
+                    .iter()
+                    .any(|bid| bid.block.contains(event) && home.may_block(who, &bid.block))
         });
     let kept = home.lets_block(event) && home.kept.values().any(|kept| kept.set.contains(event));
     safe || guarded || blocked || kept

@@ -54,8 +54,12 @@ impl Oracle for Rights {
                     let blocks = stated.bid.blocks();
                     let holds = member.concerns(blocks, &at_home.name) && !at_home.may_block(name, blocks);
                     let key = (node, bthread.clone(), home);
-                    if home != node && (asks || holds) && !(self.told.contains(&key) && self.noted.contains(&key)) {
-                        let what = format!("what {bthread} may not bid at {} was not told to both", at_home.name);
+                    if home != node
+                        && (asks || holds)
+                        && !(self.told.contains(&key) && self.noted.contains(&key))
+                    {
+                        let what =
+                            format!("what {bthread} may not bid at {} was not told to both", at_home.name);
                         findings.broken(Promise::G7, node, what);
                     }
                 }

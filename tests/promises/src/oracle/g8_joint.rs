@@ -70,7 +70,10 @@ impl Joint {
         let rosters = [&me.former_roster, &me.roster];
         let roster = rosters.into_iter().flatten().find(|roster| roster.term == *term);
         let Some(roster) = roster.filter(|roster| roster.coordinator == happened.home) else {
-            return Err(format!("{event} of {}, term {term}, counts here, where that is not the term", happened.home));
+            return Err(format!(
+                "{event} of {}, term {term}, counts here, where that is not the term",
+                happened.home
+            ));
         };
         let learned = self.learned.entry((step.node, *term)).or_default();
         if *seq != *learned + 1 {
@@ -108,10 +111,14 @@ impl Joint {
         for member in others.filter(|member| *member != step.node) {
             let name = &knowledge.member(member).name;
             if self.ever.get(&(member, *term)).copied().unwrap_or(0) + 1 < *seq {
-                return Err(format!("{event} is decided before {name} has learned what was decided before it"));
+                return Err(format!(
+                    "{event} is decided before {name} has learned what was decided before it"
+                ));
             }
             if self.last_step[member] < oldest {
-                return Err(format!("{event} is decided, and {name} cannot have been heard within the lease"));
+                return Err(format!(
+                    "{event} is decided, and {name} cannot have been heard within the lease"
+                ));
             }
         }
         Ok(())

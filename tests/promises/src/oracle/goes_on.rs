@@ -51,9 +51,7 @@ impl Oracle for GoesOn {
             }
         }
         if step.at >= self.calm && self.marks.is_none() {
-            let latest = |member: &Member| {
-                member.present().map_or(0, |life| life.occurred.len() as u64)
-            };
+            let latest = |member: &Member| member.present().map_or(0, |life| life.occurred.len() as u64);
             self.marks = Some(knowledge.members.iter().map(latest).collect());
         }
     }
@@ -74,7 +72,9 @@ impl Oracle for GoesOn {
         for (node, member) in knowledge.members.iter().enumerate() {
             for (bthread, stated) in member.bids.iter().filter(|(_, stated)| stated.since < settled) {
                 for event in stated.bid.requests() {
-                    let Some(home) = knowledge.home_of(event, node).filter(|home| *home != node) else { continue };
+                    let Some(home) = knowledge.home_of(event, node).filter(|home| *home != node) else {
+                        continue;
+                    };
                     if knowledge.member(home).safety.contains(event) {
                         if !self.refused.contains(&(node, bthread.clone())) {
                             let what = format!("{bthread} was not told that {event} is refused");
@@ -83,7 +83,8 @@ impl Oracle for GoesOn {
                     } else if knowledge.member(home).may_request(member.name.as_str(), event)
                         && is_free(event, home, knowledge)
                     {
-                        let what = format!("{event} of {bthread} is blocked by nobody, and yet does not occur");
+                        let what =
+                            format!("{event} of {bthread} is blocked by nobody, and yet does not occur");
                         findings.broken(Promise::GoesOn, node, what);
                     }
                 }
