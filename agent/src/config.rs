@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
 
 use crate::bthreads::LinkLossPolicy;
@@ -95,6 +96,10 @@ pub struct AgentConfig {
     pub controller: Controller,
     /// Lease of the bids this node sends.
     pub lease: Duration,
+    /// Who of the others may request and block what here.
+    pub authority: Authority,
+    /// What a former life of this node has promised to keep; see [`AgentCore::durable`](crate::AgentCore::durable).
+    pub kept: Kept,
     /// Seed of the program's tie-breaks.
     pub seed: u64,
 }

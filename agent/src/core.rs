@@ -10,7 +10,7 @@ use skein_planning::map::MapError;
 use skein_wire::vocabulary::{
     ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, HOMEWARD, LAND, LANDED, ORDER, PLAN, RETURN,
 };
-use skein_wire::{Fleet, Link, MissionState, NodeLink, State, vocabulary};
+use skein_wire::{Fleet, Link, MissionState, NodeLink, State, Store, joint_roster, vocabulary};
 
 use crate::{
     bthreads,
@@ -138,6 +138,18 @@ impl AgentCore {
     /// # Errors
     /// [`AgentError`] names the field of the configuration at fault.
     pub fn new(config: AgentConfig) -> Result<Self, AgentError> {
+        Self::with_store(config, None)
+    }
+
+    /// An agent that keeps what it promises in `store`, so that blocks on its events can outlive whoever stated them.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn durable(config: AgentConfig, store: Box<dyn Store>) -> Result<Self, AgentError> {
+        Self::with_store(config, Some(store))
+    }
+
+    fn with_store(config: AgentConfig, store: Option<Box<dyn Store>>) -> Result<Self, AgentError> {
         let name = |field, value: &str| {
             NodeName::new(value).map_err(|source| AgentError::Name { field, value: value.to_owned(), source })
         };
@@ -149,13 +161,18 @@ impl AgentCore {
         if config.controller == Controller::Bp {
             bthreads::load(&mut program, &config);
         }
-        let roster = config.roster.iter().map(|node| name("roster", node)).collect::<Result<_, _>>()?;
+        let roster: Vec<_> =
+            config.roster.iter().map(|node| name("roster", node)).collect::<Result<_, _>>()?;
         let own_name = name("node", &config.node)?;
         let node_config = NodeConfig {
             lease: config.lease,
             safety: safety_events(&me),
             // What comes from afar never outranks a vehicle's own b-threads for its safety.
             remote_priority: precedence::MISSION..=precedence::LINK,
+            authority: config.authority.clone(),
+            joint: Some(joint_roster(name("ground", &config.ground)?, &roster)),
+            durable: store.is_some(),
+            kept: config.kept.clone(),
             ..NodeConfig::new(own_name.clone(), config.incarnation, roster)
         };
         let fleet = Fleet::new(&config.fleet)
@@ -167,7 +184,10 @@ impl AgentCore {
                 component_id: 191,
                 datum: config.datum,
             }),
-            node: NodeLink::new(Node::new(node_config, program), fleet),
+            node: match store {
+                Some(store) => NodeLink::durable(Node::new(node_config, program), fleet, store),
+                None => NodeLink::new(Node::new(node_config, program), fleet),
+            },
             name: own_name,
             neighbours: Neighbours::default(),
             perception: Perception::new(&config.fence, home, heights(&config))?,
@@ -246,6 +266,7 @@ impl AgentCore {
         self.decide(now, &neighbours);
         self.steer(now, &neighbours);
         self.node.send(link);
+        self.node.put_board(now, link);
     }
 
     /// Between two ticks: answers at once what other nodes say, without a set-point. Makes the swarm quick to hold.

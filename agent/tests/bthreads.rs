@@ -42,6 +42,8 @@ fn config() -> AgentConfig {
         link_loss: LinkLossPolicy::Continue,
         controller: Controller::Bp,
         lease: SECOND,
+        authority: skein_wire::standard_authority(),
+        kept: skein_dbp::Kept::default(),
         seed: 1,
     }
 }

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use skein_bp::{Program, ProgramConfig};
-use skein_dbp::{Happened, Node, NodeConfig, NodeError, NodeName};
-use skein_wire::{Fleet, Link, NodeLink, State};
+use skein_dbp::{Authority, Board, Happened, Kept, Node, NodeConfig, NodeError, NodeName};
+use skein_wire::{Fleet, Link, NodeLink, State, Store, joint_roster, standard_authority};
 
 use crate::bthreads::{self, MissionOutcome, Watch, heard};
+use crate::explain::{Evidence, Explanation, explain};
 use crate::order_log::OrderLog;
 use crate::{Order, OrderRecord, Who};
 
@@ -20,6 +21,8 @@ pub struct GroundConfig {
     pub name: NodeName,
     /// The vehicles, in the order in which they take off.
     pub vehicles: Vec<NodeName>,
+    /// Operators' scripts that may speak to the station too; nobody misses one that is not there.
+    pub operators: Vec<NodeName>,
     /// A number that grows with every start of this node.
     pub incarnation: u64,
     /// Orders known in advance, each with its time.
@@ -32,6 +35,10 @@ pub struct GroundConfig {
     pub muster: bool,
     /// Lease of the station's bids.
     pub lease: Duration,
+    /// Who of the others may request and block what here.
+    pub authority: Authority,
+    /// What a former life of this station has kept: joint decisions, and a roster that an operator has given.
+    pub kept: Kept,
     /// Seed of the program's tie-breaks.
     pub seed: u64,
 }
@@ -45,12 +52,15 @@ impl GroundConfig {
             fleet,
             name,
             vehicles,
+            operators: Vec::new(),
             incarnation: 1,
             orders: Vec::new(),
             loaded: true,
             launch_on_order: false,
             muster: false,
             lease,
+            authority: standard_authority(),
+            kept: Kept::default(),
             seed: 0,
         }
     }
@@ -73,31 +83,55 @@ pub struct GroundCore {
     now: Duration,
     roster: BTreeMap<NodeName, State>,
     order_log: OrderLog,
+    evidence: Evidence,
     selections: Vec<Happened>,
 }
 
 impl GroundCore {
     /// A station that has heard of nobody yet.
     #[must_use]
-    pub fn new(mut config: GroundConfig) -> Self {
+    pub fn new(config: GroundConfig) -> Self {
+        Self::with_store(config, None)
+    }
+
+    /// A station that keeps in `store` what it must not forget, and takes up what its former life has kept.
+    #[must_use]
+    pub fn durable(config: GroundConfig, store: Box<dyn Store>) -> Self {
+        Self::with_store(config, Some(store))
+    }
+
+    fn with_store(mut config: GroundConfig, store: Option<Box<dyn Store>>) -> Self {
         let mut program = Program::new(ProgramConfig::vehicle(config.seed));
         if config.loaded {
             bthreads::load(&mut program, &config);
         }
-        let roster = config.vehicles.iter().chain([&config.name]).cloned().collect();
+        let roster: Vec<_> =
+            config.vehicles.iter().chain([&config.name]).chain(&config.operators).cloned().collect();
         let node_config = NodeConfig {
             lease: config.lease,
+            authority: config.authority,
+            joint: Some(joint_roster(config.name.clone(), &roster)),
+            durable: store.is_some(),
+            kept: config.kept,
             ..NodeConfig::new(config.name.clone(), config.incarnation, roster)
         };
         config.orders.sort_by_key(|(at, _)| *at);
+        let node = Node::new(node_config, program);
+        let mut evidence = Evidence::default();
+        config.vehicles.iter().for_each(|vehicle| evidence.note_vehicle(vehicle));
+        let node = match store {
+            Some(store) => NodeLink::durable(node, config.fleet, store),
+            None => NodeLink::new(node, config.fleet),
+        };
         Self {
-            node: NodeLink::new(Node::new(node_config, program), config.fleet),
+            node: node.reading_boards(),
             name: config.name,
             orders: config.orders,
             vehicles: config.vehicles,
             now: Duration::ZERO,
             roster: BTreeMap::new(),
             order_log: OrderLog::default(),
+            evidence,
             selections: Vec::new(),
         }
     }
@@ -140,7 +174,9 @@ impl GroundCore {
         for state in self.node.take_states() {
             self.note(state);
         }
+        self.note_boards(link);
         let happened = self.node.node_mut().take_selections();
+        happened.iter().for_each(|happened| self.evidence.note_event(happened.into()));
         self.order_log.update(now, self.node.node(), &happened);
         self.selections.extend(happened);
         outcome
@@ -155,7 +191,20 @@ impl GroundCore {
         if first_word {
             self.node.node_mut().enqueue(heard::event(&self.name, &state));
         }
+        self.evidence.note_state(self.now, &state);
         self.roster.insert(state.node.clone(), state);
+    }
+
+    /// Takes in what the vehicles have on their boards, and tells what this station has.
+    fn note_boards(&mut self, link: &mut dyn Link) {
+        for board in self.node.take_boards() {
+            if self.vehicles.contains(&board.node) {
+                self.evidence.note_board(self.now, board);
+            }
+        }
+        if let Some(board) = self.node.put_board(self.now, link) {
+            self.evidence.note_board(self.now, board.clone());
+        }
     }
 
     /// How the mission went, once every vehicle is on the ground and knows.
@@ -184,6 +233,17 @@ impl GroundCore {
     /// Every vehicle in the order of take-off, with its last word if it has been heard.
     pub fn roster(&self) -> impl Iterator<Item = (&NodeName, Option<&State>)> {
         self.vehicles.iter().map(|vehicle| (vehicle, self.roster.get(vehicle)))
+    }
+
+    /// The newest board of this station and of each vehicle.
+    pub fn boards(&self) -> impl Iterator<Item = &Board> {
+        self.evidence.boards()
+    }
+
+    /// Why a vehicle of this station does what it does now, or does not move.
+    #[must_use]
+    pub fn explain(&self, vehicle: &NodeName) -> Option<Explanation> {
+        explain(&self.evidence, self.now, vehicle)
     }
 
     /// The latest orders and their answers, oldest first.

@@ -3,7 +3,8 @@
 //! [`GroundCore`] is the station without I/O: a behavioural program ([`bthreads`]) joined to those of the vehicles. An
 //! [`Order`] becomes an event of the station; the b-threads do the rest, by blocking (`hold`) and by requesting at each
 //! vehicle's gateway (`land`, `return`). The [`recorder`] writes a mission as an MCAP file; the
-//! `console` (a feature) shows the swarm in a browser and takes the operator's orders from it.
+//! `console` (a feature) shows the swarm in a browser and takes the operator's orders from it. [`explain`] says why a
+//! vehicle stands still, live and of a recording.
 //!
 //! ```
 //! use std::time::Duration;
@@ -25,6 +26,7 @@ pub mod bthreads;
 #[cfg(feature = "console")]
 pub mod console;
 mod core;
+pub mod explain;
 mod order;
 mod order_log;
 pub mod recorder;

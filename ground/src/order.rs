@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::Vector3;
 use skein_bp::{Event, EventSet};
 use skein_dbp::NodeName;
+use skein_wire::vocabulary;
 
 /// Whom an order is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,6 +21,10 @@ pub enum Who {
 pub enum Order {
     /// Take off, one after another, those that stand ready.
     Launch,
+    /// Take off together, once every vehicle of the roster is there and ready.
+    LaunchTogether,
+    /// Land together, wherever you are: every vehicle of the roster learns of it before anything else is decided.
+    Abort,
     /// Stay where you are until resumed.
     Hold(Who),
     /// Go on.
@@ -51,11 +56,13 @@ const SPREAD_M: f64 = 3.0;
 const LEAST_HEIGHT_M: f64 = 1.0;
 
 impl Order {
-    /// The order as one word: `launch`, `hold`, `resume`, `land`, `return`, `goto` or `hand_back`.
+    /// The order as one word: `launch`, `launch_together`, `abort`, `hold`, `resume`, `land`, `return`, `goto` or `hand_back`.
     #[must_use]
     pub fn what(&self) -> &'static str {
         match self {
             Self::Launch => "launch",
+            Self::LaunchTogether => "launch_together",
+            Self::Abort => "abort",
             Self::Hold(_) => "hold",
             Self::Resume(_) => "resume",
             Self::Land(_) => "land",
@@ -69,7 +76,7 @@ impl Order {
     #[must_use]
     pub fn who(&self) -> &Who {
         match self {
-            Self::Launch => &Who::All,
+            Self::Launch | Self::LaunchTogether | Self::Abort => &Who::All,
             Self::Hold(who)
             | Self::Resume(who)
             | Self::Land(who)
@@ -86,8 +93,7 @@ impl Order {
         ground: &NodeName,
         positions: &[(NodeName, Option<Vector3<f64>>)],
     ) -> Vec<Event> {
-        let event =
-            |who: &str| Event::new(ground.event_name(ORDERED)).with("what", self.what()).with("who", who);
+        let event = |who: &str| ordered_event(ground, self.what(), who);
         match (self, self.who()) {
             (Self::GoTo(_, destination), _) => places(*destination, positions)
                 .into_iter()
@@ -127,7 +133,12 @@ fn places(
 }
 
 /// What the operator has ordered becomes an event of this name.
-const ORDERED: &str = "ordered";
+pub(crate) const ORDERED: &str = "ordered";
+
+/// The event of the ground station by which `what` is ordered, for a vehicle or for [`ALL`].
+pub(crate) fn ordered_event(ground: impl fmt::Display, what: &str, who: &str) -> Event {
+    vocabulary::event(ground, ORDERED).with("what", what).with("who", who)
+}
 
 /// The events of the ground station by which `what` is ordered, for anyone.
 #[must_use]
@@ -155,7 +166,7 @@ pub fn is_for(event: &Event, vehicle: &NodeName) -> bool {
 }
 
 /// How an event names all vehicles.
-const ALL: &str = "all";
+pub(crate) const ALL: &str = "all";
 
 impl Who {
     /// One vehicle.

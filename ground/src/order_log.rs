@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use skein_dbp::{Happened, Node, NodeName};
-use skein_wire::vocabulary::{DECLINED, ORDER, TAKEOFF};
+use skein_wire::vocabulary::{DECLINED, HEEDED, ORDER, TAKEOFF};
 
-use crate::bthreads::{GOING, GOING_LASTS, Hold};
+use crate::bthreads::{GOING, GOING_LASTS, Hold, LAUNCH_LASTS};
 use crate::{Order, Who};
 
 /// How many orders are remembered.
@@ -100,8 +100,12 @@ impl OrderLog {
         }
         self.look_at_holds(now, node);
         for record in &mut self.records {
-            let going = GOING.contains(&record.order.what());
-            let late = going && now > record.at + GOING_LASTS;
+            let lasts = match &record.order {
+                Order::LaunchTogether => Some(LAUNCH_LASTS),
+                order if GOING.contains(&order.what()) => Some(GOING_LASTS),
+                _ => None,
+            };
+            let late = lasts.is_some_and(|lasts| now > record.at + lasts);
             for (vehicle, answer) in record.answers.iter_mut().filter(|(_, answer)| answer.is_open()) {
                 let alive = node.peers().any(|(peer, state)| peer == vehicle && state.alive);
                 let now_it_is = match (late, alive) {
@@ -124,7 +128,7 @@ impl OrderLog {
                 .records
                 .iter_mut()
                 .rev()
-                .find(|record| record.order != Order::Launch && record.answers.contains_key(vehicle));
+                .find(|record| !is_launch(&record.order) && record.answers.contains_key(vehicle));
             let Some(record) = newest.filter(|record| matches!(record.order, Order::Hold(_))) else {
                 continue;
             };
@@ -148,13 +152,17 @@ impl OrderLog {
     }
 }
 
+fn is_launch(order: &Order) -> bool {
+    matches!(order, Order::Launch | Order::LaunchTogether)
+}
+
 /// Whether whoever has not taken in the `old` order need not any more. A launch is about those on the ground: it takes the
 /// place of no order, and only who calls all down calls it off.
 fn supersedes(new: &Order, old: &Order) -> bool {
     match (new, old) {
-        (Order::Launch, _) => false,
-        (Order::Land(Who::All) | Order::Return(Who::All), _) => true,
-        (_, Order::Launch) => false,
+        (new, _) if is_launch(new) => false,
+        (Order::Abort | Order::Land(Who::All) | Order::Return(Who::All), _) => true,
+        (_, old) if is_launch(old) => false,
         _ => true,
     }
 }
@@ -164,8 +172,8 @@ fn answer_in(order: &Order, happened: &Happened, after: Duration) -> Option<Answ
     let event = &happened.event;
     let about_it = event.text("what") == Some(order.what());
     match event.kind() {
-        TAKEOFF if *order == Order::Launch => Some(Answer::Acknowledged(after)),
-        ORDER if about_it => Some(Answer::Acknowledged(after)),
+        TAKEOFF if is_launch(order) => Some(Answer::Acknowledged(after)),
+        ORDER | HEEDED if about_it => Some(Answer::Acknowledged(after)),
         DECLINED if about_it => {
             Some(Answer::Refused(event.text("why").unwrap_or("it says no more").to_owned()))
         }

@@ -6,6 +6,7 @@
   skein_operator.py hold                   nobody moves on, until Ctrl-C
   skein_operator.py hold --seconds 5 uav/1 uav/2
   skein_operator.py return uav/3           also: land, resume; `all` for every vehicle
+  skein_operator.py roster --term 2 --coordinator ground/main uav/1 uav/2    who decides together from now on
 
 It speaks as the node `script/operator`, which must be in the vehicles' rosters. Only one such script has a say at a
 time: `hold`, `land`, `return` and `resume` end what an earlier one still holds at the vehicles that they speak to.
@@ -362,11 +363,14 @@ def hold(options, output, interrupted):
 
 def order(options, output, interrupted):
     """`land`, `return`, `resume`: requests `uav/N/order`, which the vehicle's operator b-thread turns into its own event.
+    `roster`: requests `<node>/roster` of every member, which begins a new term of joint events there.
 
     A request counts only for the present life of its home, and together with how far this script has heard the home's
     occurrences. Both are learnt from the answer to an empty record.
     """
     what, wanted = options.command, named(options)
+    if what == "roster" and options.coordinator not in wanted:
+        wanted.append(options.coordinator)
     outboxes, taken = {}, set()
 
     with Swarm(options.fleet, options.connect, ["state/*/*", "occ/*/*", f"occ/*/*/{NODE}", f"ack/*/*/{NODE}"]) as swarm:
@@ -400,7 +404,14 @@ def order(options, output, interrupted):
                 output.tell(f"{node} takes the order: {what}", vehicle=node, order=what, taken=True)
 
         def event(node):
-            return wire.Event(name=f"{node}/order", data={"what": wire.Value(text=what)})
+            if what != "roster":
+                return wire.Event(name=f"{node}/order", data={"what": wire.Value(text=what)})
+            data = {
+                "term": wire.Value(integer=options.term),
+                "coordinator": wire.Value(text=options.coordinator),
+                "members": wire.Value(text=" ".join(ordered(wanted))),
+            }
+            return wire.Event(name=f"{node}/roster", data=data)
 
         def is_complete():
             # Not named, the vehicles are those that are heard within a second.
@@ -477,6 +488,19 @@ def vehicle(text):
     return text
 
 
+def node(text):
+    if not re.fullmatch(f"{CHUNK}/{CHUNK}", text) or len(text) > 64:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a node such as uav/3 or ground/main")
+    return text
+
+
+def term(text):
+    number = int(text) if text.isdecimal() else 0
+    if not 0 < number < 2**62:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number above that of the present term")
+    return number
+
+
 def read_arguments(arguments):
     # They may stand before the command or after it. Defaults are those of the first place, or the second would undo it.
     def common(**defaults):
@@ -520,6 +544,10 @@ def read_arguments(arguments):
     ):
         added = command(what, order, about)
         added.add_argument("vehicles", type=vehicle, nargs="+", metavar="uav/N", help="these, or `all`")
+    electing = command("roster", order, "who decides on joint events from now on, and who coordinates them")
+    electing.add_argument("--term", type=term, required=True, help="the new term: above the present one, which is 1 at first")
+    electing.add_argument("--coordinator", type=node, required=True, metavar="NODE", help="where joint events are decided")
+    electing.add_argument("vehicles", type=node, nargs="+", metavar="NODE", help="without whom nothing is decided")
     return parser.parse_args(arguments)
 
 

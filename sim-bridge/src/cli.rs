@@ -114,7 +114,7 @@ pub struct Fly {
     #[arg(long, value_enum, default_value_t = Clock::Real)]
     pub clock: Clock,
     /// How many times faster than the clock on the wall; `--clock real` only.
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
     pub speed: f64,
     /// What decides on board: behavioural programs, or nothing (the vehicles stay where they are).
     #[arg(long, value_enum, default_value_t = Controller::Bp)]
@@ -173,7 +173,65 @@ pub enum Network {
 /// What can be measured.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum Bench {
+    /// Behavioural programs on one processor, beside the same on BPpy where Python has it.
+    Bp {
+        /// How many times each program is run; the median counts.
+        #[arg(long, value_name = "N", default_value_t = 5)]
+        repetitions: usize,
+        /// CPU time of each run.
+        #[arg(long, value_name = "S", default_value_t = 0.5, value_parser = positive)]
+        seconds: f64,
+    },
+    /// Memory and messages per node as a fleet grows, over the network in memory.
+    Fleet {
+        /// Sizes of the fleet, the ground station included.
+        #[arg(long, value_name = "N", value_delimiter = ',', default_values_t = [2, 10, 50, 100])]
+        nodes: Vec<usize>,
+        /// Simulated time of each run.
+        #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = positive)]
+        seconds: f64,
+    },
+    /// One size of fleet, in this process.
+    #[command(hide = true)]
+    FleetOf {
+        /// Size of the fleet.
+        nodes: usize,
+        /// Simulated time.
+        #[arg(long, value_name = "S", value_parser = positive)]
+        seconds: f64,
+    },
+    /// Round trips between processes over Zenoh: plain, through the link's queues, and as events.
+    #[cfg(feature = "zenoh")]
+    Link {
+        /// How many of each kind.
+        #[arg(long, value_name = "N", default_value_t = 4000)]
+        round_trips: usize,
+        /// How many homes confirm a block, each in a process of its own.
+        #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(2..).map(usize::from))]
+        homes: usize,
+        /// How many blocks are confirmed.
+        #[arg(long, value_name = "N", default_value_t = 500)]
+        confirmations: usize,
+        /// For how long one process is stopped.
+        #[arg(long, value_name = "S", default_value_t = 5.0, value_parser = positive)]
+        stopped_s: f64,
+    },
+    /// A process that `link` talks to.
+    #[cfg(feature = "zenoh")]
+    #[command(hide = true)]
+    LinkPeer {
+        /// What it does.
+        #[arg(value_enum)]
+        role: crate::bench::link_peer::Role,
+        /// Where the one who measures listens.
+        connect: String,
+        /// Its number among the homes, from 1.
+        number: usize,
+        /// How many homes there are.
+        homes: usize,
+    },
     /// From an operator's Hold to the last vehicle's acknowledgement, each in a process of its own.
+    #[cfg(feature = "zenoh")]
     Hold {
         /// Size of the swarm.
         #[arg(long, value_name = "N", default_value_t = 8)]
@@ -194,7 +252,7 @@ pub struct Serve {
     #[command(flatten)]
     pub world: WorldArgs,
     /// How many times faster than the clock on the wall.
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
     pub speed: f64,
     /// How the world is joined to the other nodes (see sim-bridge/world.toml).
     #[arg(long, value_name = "FILE")]
@@ -259,9 +317,9 @@ pub enum Controller {
     None,
 }
 
-fn speed(text: &str) -> Result<f64, String> {
+fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(speed) if speed.is_finite() && speed > 0.0 => Ok(speed),
+        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
         _ => Err("expected a number above 0".to_owned()),
     }
 }

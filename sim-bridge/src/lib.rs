@@ -3,7 +3,6 @@
 //! [`fly`] hosts a whole swarm in one process, or starts one process for each of its nodes; `serve` hosts the world alone,
 //! for agents and MAVLink clients in other processes. All take a [`scenario`].
 
-#[cfg(feature = "zenoh")]
 pub mod bench;
 #[cfg(feature = "zenoh")]
 pub mod campaign;

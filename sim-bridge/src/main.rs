@@ -52,10 +52,9 @@ fn run(cli: &Cli) -> anyhow::Result<Exit> {
             let sound = skein_sim::campaign::run(what, cli.json)?;
             Ok(if sound { Exit::Done } else { Exit::Failed })
         }
-        #[cfg(feature = "zenoh")]
         Command::Bench { what } => skein_sim::bench::run(what, cli.json).map(|()| Exit::Done),
         #[cfg(not(feature = "zenoh"))]
-        Command::Serve(_) | Command::Configure(_) | Command::Campaign { .. } | Command::Bench { .. } => {
+        Command::Serve(_) | Command::Configure(_) | Command::Campaign { .. } => {
             anyhow::bail!("built without the cargo feature `zenoh`, which this needs")
         }
         Command::List => {

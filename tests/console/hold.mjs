@@ -30,8 +30,25 @@ await drive({}, async (console) => {
     assert.match(waiting_for, /hold/, name);
   }
 
+  // Who holds it is told beside the vehicle that is asked about, and what would free it.
+  await console.select(NAMES[2]);
+  const why = console.page.locator('#why');
+  const reason = await console.until('the reason', async () => {
+    const text = (await why.isVisible()) && (await why.textContent());
+    return text && /stands still/.test(text) && text;
+  });
+  assert.match(reason, /`uav\/3\/advance` is requested by navigation and blocked by ground\/main#hold/);
+  assert.match(reason, /It moves on when the operator orders Resume, Return, Land or Go to/);
+  assert.match(reason, /blocked by ground\/main: hold, renewed \d+ ms ago/);
+  await console.page.keyboard.press('w');
+  assert.ok(await why.locator('.reasons').evaluate((region) => region === document.activeElement), 'the keyboard reaches the reason');
+  await console.selectNone();
+  assert.ok(await why.isHidden());
+
   await console.press('Resume');
   await console.acknowledged('resume', NAMES);
   await console.until('everyone flies on', () => all((vehicle) => speed(vehicle) > 1), 5);
+  await console.select(NAMES[2]);
+  await console.until('it is not held any more', async () => /does what it does/.test(await why.textContent()) && !/blocked by/.test(await why.textContent()));
   await console.stay();
 });

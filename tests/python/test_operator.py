@@ -93,6 +93,14 @@ def check_list(connect):
     expect(table.returncode == 0 and all(node in table.stdout for node in VEHICLES), f"the table is {table.stdout}")
 
 
+def check_roster(connect):
+    """Joint events get a new roster: everybody takes it, the station too."""
+    ordered = script("roster", "--term", 2, "--coordinator", "ground/main", "--json", *VEHICLES, *connect)
+    expect(ordered.returncode == 0, f"the roster ended with {ordered.returncode}: {ordered.stderr}")
+    taken = {line["vehicle"] for line in map(json.loads, ordered.stdout.splitlines()) if line["taken"]}
+    expect(taken == {"ground/main", *VEHICLES}, f"the roster was taken by {taken}")
+
+
 def check_takeoffs(watch):
     """Every take-off was watched, and the ground station requested it."""
     takeoffs = {line["event"]: line for line in watch.json_lines() if line["event"].endswith("/takeoff")}
@@ -143,6 +151,7 @@ def check_flight(folder, operator):
     connect = ["--connect", f"tcp/127.0.0.1:{7447 + offset}"]
     with flight(folder, offset) as fly, running_script(folder, "watch", "watch", "--json", *connect) as watch:
         check_list(connect)
+        check_roster(connect)
         with operator.Swarm("sim", connect[1], ["state/*/*"]) as swarm:
             watcher = Watcher(swarm)
             check_hold(folder, connect, watcher)

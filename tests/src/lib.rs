@@ -67,7 +67,21 @@ impl Lockstep {
     #[allow(clippy::expect_used)]
     #[must_use]
     pub fn new(scenario: &str, vehicles: Option<usize>, seed: u64) -> Self {
-        let scenario = Scenario::built_in(scenario, vehicles, seed).expect("a built-in scenario");
+        Self::of(Scenario::built_in(scenario, vehicles, seed).expect("a built-in scenario"), seed)
+    }
+
+    /// The swarm of a scenario file with this text, on the ground.
+    ///
+    /// # Panics
+    /// When the scenario is not sound.
+    #[allow(clippy::expect_used)]
+    #[must_use]
+    pub fn from_text(text: &str) -> Self {
+        Self::of(Scenario::from_toml(text, "scenario.toml", None, 1).expect("a sound scenario"), 1)
+    }
+
+    #[allow(clippy::expect_used)]
+    fn of(scenario: Scenario, seed: u64) -> Self {
         let network = Network::new(NetworkConfig::default(), seed);
         let vehicles: Vec<NodeName> = (0..scenario.vehicles.len()).map(fly::vehicle_name).collect();
         let link = |node: &NodeName| Box::new(network.join(node)) as Box<dyn Link>;

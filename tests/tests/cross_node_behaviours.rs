@@ -43,6 +43,75 @@ fn vehicles_take_off_one_after_another_at_the_grounds_request() {
     assert_eq!(launched, ["uav/1", "uav/2", "uav/3", "uav/4"]);
 }
 
+/// A scenario in which the operator says these things, on lines of their own.
+fn with_orders(orders: &str) -> Lockstep {
+    let vehicle =
+        |n: i32| format!("[[vehicle]]\nstart_m = [0.0, {0}.0]\nwaypoints_m = [[40.0, {0}.0, 3.0]]\n", 4 * n);
+    let text = format!(
+        "name = \"row\"\ntime_limit_s = 200.0\n[bounds]\nmin_m = [-10.0, -10.0, -1.0]\nmax_m = [60.0, 30.0, 15.0]\n{}{orders}",
+        (0..4).map(vehicle).collect::<String>()
+    );
+    Lockstep::from_text(&text)
+}
+
+const LAUNCH: &str = "[[order]]\nat_s = 12.0\norder = \"launch_together\"\n";
+
+#[test]
+fn a_joint_launch_takes_everyone_off_at_once_and_not_before_all_are_ready() {
+    let mut lockstep = with_orders(LAUNCH);
+    let (mut decided, mut taken_off) = (None, BTreeMap::new());
+    while taken_off.len() < 4 && lockstep.swarm.now() < seconds(60.0) {
+        for selection in lockstep.step().selections {
+            match selection.event.name() {
+                "swarm/launch" => decided = Some(selection.at),
+                name if name.ends_with(TAKEOFF) => {
+                    taken_off.insert(selection.home.to_string(), lockstep.swarm.now());
+                }
+                _ => {}
+            }
+        }
+    }
+    let decided = decided.unwrap();
+    assert!(decided >= seconds(12.0) && taken_off.len() == 4, "{taken_off:?}");
+    assert!(taken_off.values().all(|at| *at >= decided && *at < decided + seconds(0.5)), "{taken_off:?}");
+    lockstep.run_until(seconds(120.0));
+    assert!(lockstep.swarm.outcomes().all(|outcome| outcome == Some(&Outcome::Complete)));
+    assert_eq!(lockstep.swarm.truth().collisions_vehicle, 0);
+}
+
+#[test]
+fn a_joint_launch_waits_for_a_vehicle_that_is_out_of_reach() {
+    let mut lockstep = with_orders(LAUNCH);
+    lockstep.run_until(seconds(11.0));
+    let away = lockstep.nodes[2].clone();
+    lockstep.network.partition(&[&[away]]);
+    lockstep.run_until(seconds(20.0));
+    assert!((0..4).all(|index| !lockstep.swarm.simulation().vehicle(index).unwrap().airborne));
+    lockstep.network.heal();
+    lockstep.run_until(seconds(25.0));
+    assert!((0..4).all(|index| lockstep.swarm.simulation().vehicle(index).unwrap().airborne));
+}
+
+#[test]
+fn a_joint_abort_lands_everyone_and_who_was_away_when_he_is_back() {
+    let mut lockstep = with_orders(&format!("{LAUNCH}[[order]]\nat_s = 24.0\norder = \"abort\"\n"));
+    // The last word of a vehicle counts for a while, so that this is decided just after it was cut off.
+    lockstep.run_until(seconds(23.9));
+    let away = lockstep.nodes[2].clone();
+    lockstep.network.partition(&[&[away]]);
+    lockstep.run_until(seconds(27.0));
+    let landing = |lockstep: &Lockstep, index: usize| {
+        lockstep.swarm.simulation().vehicle(index).unwrap().motion.velocity.xy().norm() < 0.5
+    };
+    assert!([0, 1, 3].into_iter().all(|index| landing(&lockstep, index)));
+    assert!(!landing(&lockstep, 2), "it has not heard of it");
+    lockstep.network.heal();
+    lockstep.run_until(seconds(45.0));
+    assert!(lockstep.swarm.is_grounded());
+    let short = lockstep.swarm.simulation().vehicle(2).unwrap().motion.position.x;
+    assert!(short < 38.0, "it flew to its goal");
+}
+
 #[test]
 fn a_hold_stops_everyone_and_a_resume_lets_them_arrive() {
     let mut lockstep = Lockstep::new("open", None, 1);

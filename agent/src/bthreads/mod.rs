@@ -19,6 +19,7 @@ mod reposition;
 mod return_home;
 mod right_of_way;
 mod separation;
+mod together;
 
 use skein_bp::Program;
 
@@ -39,6 +40,7 @@ pub use reposition::{OPERATOR_LEG, Reposition};
 pub use return_home::{HOME_LEG, ReturnHome};
 pub use right_of_way::RightOfWay;
 pub use separation::Separation;
+pub use together::Together;
 
 use crate::{config::AgentConfig, me::Me};
 
@@ -59,6 +61,7 @@ pub fn load(program: &mut Program, config: &AgentConfig) {
     program.add("geofence", Geofence::new(me.clone(), config.fence.min, config.fence.max));
     program.add("link_loss", LinkLoss::new(me.clone(), &config.ground, config.link_loss));
     program.add("operator", Operator::new(me.clone()));
+    program.add("together", Together::new(me.clone()));
     program.add("reposition", Reposition::new(me.clone()));
     program.add("return_home", ReturnHome::new(me.clone(), [x, y, config.return_altitude_m]));
     program.add("escape", Escape::new(me.clone()));

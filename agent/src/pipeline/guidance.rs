@@ -65,6 +65,8 @@ const ALL_HEIGHTS: f64 = -1.0;
 const SENSED_AHEAD_M: f64 = 9.0;
 /// Standard deviation of the vehicle's own position, m.
 const POSITION_SIGMA_M: f64 = 0.05;
+/// How far outside the ghost of a silent neighbour a path leads, m.
+const GHOST_SLACK_M: f64 = 0.3;
 /// A hovering vehicle that others have pushed this far does not come back, m.
 const GIVES_WAY_M: f64 = 1.0;
 /// Speed at which a hovering vehicle goes back to its place, at most, m/s.
@@ -246,7 +248,8 @@ impl Guidance {
         })
     }
 
-    /// Plans a path to the waypoint. `why` is `stuck` when the vehicle made no way: neighbours that stand around are then obstacles too.
+    /// Plans a path to the waypoint. `why` is `stuck` when the vehicle made no way: neighbours that stand around are then
+    /// obstacles too. One that has fallen silent always is, as large as its ghost will be.
     pub fn plan(
         &mut self,
         why: &str,
@@ -263,7 +266,8 @@ impl Guidance {
         let start = if is_inside { motion.position } else { map.voxels().clamp(&motion.position) };
         let standing: Vec<Vector3<f64>> = neighbours
             .iter()
-            .filter(|neighbour| neighbour.armed && neighbour.track.velocity.norm() < 0.5)
+            .filter(|neighbour| neighbour.armed && neighbour.track.cooperative)
+            .filter(|neighbour| neighbour.track.velocity.norm() < 0.5)
             .map(Neighbour::position)
             .filter(|position| (position - motion.position).norm() < AROUND_NEIGHBOURS_M)
             .collect();
@@ -279,8 +283,18 @@ impl Guidance {
                 && (*disc - target).xy().norm() > radius_m
                 && (*disc - motion.position).xy().norm() > radius_m
         };
-        let discs: Vec<Disc> =
-            standing.iter().filter(in_the_way).map(|&centre| Disc { centre, radius_m }).collect();
+        let standing = standing.iter().filter(in_the_way).map(|&centre| Disc { centre, radius_m });
+        let silent = neighbours.iter().filter(|neighbour| neighbour.armed && !neighbour.track.cooperative);
+        let ghosts = silent.filter_map(|neighbour| {
+            let grown = separation::Neighbour { age_s: f64::INFINITY, ..neighbour.track };
+            let centre = neighbour.position();
+            // The ends of the path are outside in any case: the filter leads out of a ghost.
+            let ends = [start, target].map(|end| (end - centre).xy().norm() - GHOST_SLACK_M);
+            let kept_m = separation::distance_kept_m(POSITION_SIGMA_M, &grown, &self.filter) + GHOST_SLACK_M;
+            let radius_m = ends.into_iter().fold(kept_m, f64::min);
+            (radius_m > 0.0).then_some(Disc { centre, radius_m })
+        });
+        let discs: Vec<Disc> = standing.chain(ghosts).collect();
         let request = Request { start, goal: target, potential: &potential, discs: &discs };
         let mut found = self.search(map, &request);
         if found.is_err() && !discs.is_empty() {

@@ -2,7 +2,7 @@
  * The connection to the ground station: one WebSocket, opened again with growing patience whenever it is lost.
  */
 
-import { readMessage, type OrderRequest, type ServerMessage } from './protocol';
+import { readMessage, type OrderRequest, type Question, type ServerMessage } from './protocol';
 
 const FIRST_RETRY_MS = 500;
 const LAST_RETRY_MS = 5000;
@@ -41,10 +41,10 @@ export class Connection {
     return this.socket?.readyState === WebSocket.OPEN;
   }
 
-  /** Sends an order; `false` if there is no connection to send it on. */
-  send(order: OrderRequest): boolean {
+  /** Sends an order or a question; `false` if there is no connection to send it on. */
+  send(request: OrderRequest | Question): boolean {
     if (!this.socket || !this.live) return false;
-    this.socket.send(JSON.stringify(order));
+    this.socket.send(JSON.stringify(request));
     return true;
   }
 

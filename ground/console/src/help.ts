@@ -14,6 +14,7 @@ const KEYS: [keys: string[], does: string][] = [
   [['0', 'A'], 'select all'],
   [['Esc'], 'leave a mode, then deselect'],
   [['F'], 'fit everything in'],
+  [['W'], 'read why the selected vehicle does what it does'],
   [['T'], 'dark or light'],
   [['?'], 'this card'],
 ];

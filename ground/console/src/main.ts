@@ -13,11 +13,12 @@ import { listenToKeys } from './keys';
 import { Banner, Notices } from './notices';
 import { OrdersPanel } from './orders-panel';
 import { Placing } from './placing';
-import type { Command, Fleet, OrderRequest, Point, Scene, ServerMessage } from './protocol';
+import type { Command, Fleet, OrderRequest, Point, Question, Scene, ServerMessage } from './protocol';
 import { addresseeWords, Selection } from './selection';
 import { Theme } from './theme';
 import { VehiclesPanel } from './vehicles-panel';
 import { View } from './view/view';
+import { WhyPanel } from './why-panel';
 import { clockWords, durationWords, orderName, outcomeWords } from './words';
 
 /** The station speaks ten times a second; after this long what is shown is no longer live. */
@@ -42,6 +43,7 @@ const view = new View(part('view'), {
 const theme = new Theme(() => view.repaint());
 const vehicles = new VehiclesPanel(part('vehicles'), part('vehicles-note'), selection);
 const events = new EventsPanel(part('events-head'), part('events'), selection);
+const why = new WhyPanel(part('why'), part('why-title'), part('why-note'), part('why-body'));
 const orders = new OrdersPanel(part('answers'));
 const notices = new Notices(part('notices'));
 const connectionBanner = new Banner(part('banners'), 'alert');
@@ -83,6 +85,7 @@ listenToKeys(
     a: () => selection.set(names()),
     f: () => view.fit(),
     t: () => theme.toggle(),
+    w: () => why.focus(),
     '?': () => help.open(),
     Escape: () => (placing.active ? placing.set(false) : selection.set([])),
   },
@@ -109,6 +112,9 @@ function receive(message: ServerMessage): void {
       break;
     case 'events':
       events.add(message.events);
+      break;
+    case 'why':
+      why.show(message);
       break;
     case 'ordered': {
       const sent = settle(message.tag);
@@ -149,10 +155,19 @@ function names(): string[] {
 }
 
 function selectionChanged(): void {
+  askWhy();
   vehicles.showSelection();
   events.showSelection();
   view.setSelection(selection.names);
   showAddressees();
+}
+
+/** Asks the station about the selected vehicle: of several, the first. */
+function askWhy(): void {
+  const vehicle = names().find((name) => selection.has(name)) ?? null;
+  why.ask(vehicle, selection.names.size);
+  const question: Question = { type: 'why', vehicle };
+  connection.send(question);
 }
 
 function showAddressees(): void {
@@ -204,6 +219,7 @@ function connectionChanged(live: boolean, retryMs: number): void {
   everLive ||= live;
   retryAt = performance.now() + retryMs;
   commands.setEnabled(live);
+  if (live) askWhy();
   if (!live) {
     placing.set(false);
     const lost = [...unanswered.keys()].map(settle);

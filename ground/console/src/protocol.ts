@@ -97,6 +97,51 @@ export interface Events {
   events: SwarmEvent[];
 }
 
+export interface Blocker {
+  node: string;
+  bthread: string;
+  /** Whether it runs on the vehicle itself. */
+  local: boolean;
+  leaseAge: number | null;
+  lease: number | null;
+}
+
+/** Something that is requested of a vehicle. */
+export interface Requested {
+  event: string;
+  by: string;
+  priority: number | null;
+  blockedBy: Blocker[];
+}
+
+/** A reason for which a vehicle stands still, and what would end it: any of `needed`. */
+export interface Change {
+  because: string[];
+  needed: string[];
+  cycle: string[];
+}
+
+export interface PastEvent {
+  time: number;
+  event: string;
+  requestedBy: string[];
+  choice: string;
+}
+
+/** Why a vehicle does what it does. Times are in seconds. */
+export interface Why {
+  type: 'why';
+  vehicle: string;
+  time: number;
+  headline: string;
+  speed: number | null;
+  stillSince: number | null;
+  requests: Requested[];
+  changes: Change[];
+  events: PastEvent[];
+  doubts: string[];
+}
+
 export interface Ordered {
   type: 'ordered';
   tag: string;
@@ -109,7 +154,7 @@ export interface Refusal {
   message: string;
 }
 
-export type ServerMessage = Scene | Fleet | Orders | Events | Ordered | Refusal;
+export type ServerMessage = Scene | Fleet | Orders | Events | Why | Ordered | Refusal;
 
 export const COMMANDS = ['hold', 'resume', 'return', 'land', 'goto', 'launch'] as const;
 export type Command = (typeof COMMANDS)[number];
@@ -123,6 +168,12 @@ export interface OrderRequest {
   what: Command;
   to: 'all' | string[];
   point?: Point;
+}
+
+/** Asks to be told why a vehicle does what it does, again and again; `null` ends that. */
+export interface Question {
+  type: 'why';
+  vehicle: string | null;
 }
 
 /** Reads a message of the station; `null` if it is none that this console knows. */
@@ -148,6 +199,8 @@ export function readMessage(text: string): ServerMessage | null {
       return { type: 'orders', orders: list(json.orders, readOrder) };
     case 'events':
       return { type: 'events', events: list(json.events, readEvent) };
+    case 'why':
+      return readWhy(json);
     case 'ordered':
       return { type: 'ordered', tag: string(json.tag), id: number(json.id) };
     case 'error':
@@ -267,6 +320,49 @@ function readEvent(json: Json): SwarmEvent | null {
     blockedBy: strings(json.blocked_by),
     leaseAgeMs: number(json.lease_age_ms),
   };
+}
+
+function readWhy(json: Json): Why {
+  const situation = isRecord(json.situation) ? json.situation : {};
+  return {
+    type: 'why',
+    vehicle: string(json.vehicle),
+    time: number(json.time_s) ?? 0,
+    headline: string(json.headline),
+    speed: number(situation.speed_m_s),
+    stillSince: number(situation.still_since_s),
+    requests: list(json.requests, readRequested),
+    changes: list(json.changes, ({ because, needed, cycle }) => ({
+      because: strings(because),
+      needed: strings(needed),
+      cycle: strings(cycle),
+    })),
+    events: list(json.events, readPastEvent),
+    doubts: strings(json.doubts),
+  };
+}
+
+function readRequested(json: Json): Requested | null {
+  const event = string(json.event);
+  if (!event) return null;
+  return {
+    event,
+    by: string(json.by),
+    priority: number(json.priority),
+    blockedBy: list(json.blocked_by, (blocker) => ({
+      node: string(blocker.node),
+      bthread: string(blocker.bthread),
+      local: blocker.local === true,
+      leaseAge: number(blocker.lease_age_s),
+      lease: number(blocker.lease_s),
+    })),
+  };
+}
+
+function readPastEvent(json: Json): PastEvent | null {
+  const event = string(json.event);
+  if (!event) return null;
+  return { time: number(json.time_s) ?? 0, event, requestedBy: strings(json.requested_by), choice: string(json.choice) };
 }
 
 function isRecord(json: unknown): json is Json {

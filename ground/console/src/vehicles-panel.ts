@@ -66,6 +66,8 @@ export class VehiclesPanel {
     // One row is reached by Tab, the others from there by arrows.
     const reached = rows.find(([, { element }]) => element === document.activeElement) ?? rows.find(([name]) => this.selection.has(name)) ?? rows[0];
     rows.forEach((row) => (row[1].element.tabIndex = row === reached ? 0 : -1));
+    // There is less room for the list while the reasons of a vehicle are shown.
+    if (reached && this.selection.has(reached[0])) reached[1].element.scrollIntoView({ block: 'nearest' });
   }
 
   private key(event: KeyboardEvent): void {

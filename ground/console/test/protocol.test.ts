@@ -67,3 +67,20 @@ test('a refusal without words still says something', () => {
   assert.equal(refusal.tag, null);
   assert.match(refusal.message, /refused/);
 });
+
+test('an explanation keeps what it can read, and one of a vehicle never heard has neither place nor speed', () => {
+  const why = read({
+    type: 'why',
+    vehicle: 'uav/3',
+    situation: null,
+    requests: [{ event: 'uav/3/advance', by: 'navigation', priority: 10, blocked_by: [{ node: 'ground/main', bthread: 'hold', local: false, lease_age_s: 0.2 }, 3] }, { by: 'nobody' }],
+    changes: [{ because: ['so', 7], needed: null }],
+    events: [{ time_s: 2, event: 'uav/3/takeoff', requested_by: ['ground/main#launch'], choice: null }],
+  });
+  assert.ok(why?.type === 'why');
+  assert.deepEqual([why.speed, why.stillSince], [null, null]);
+  const blockedBy = [{ node: 'ground/main', bthread: 'hold', local: false, leaseAge: 0.2, lease: null }];
+  assert.deepEqual(why.requests, [{ event: 'uav/3/advance', by: 'navigation', priority: 10, blockedBy }]);
+  assert.deepEqual(why.changes, [{ because: ['so'], needed: [], cycle: [] }]);
+  assert.deepEqual(why.events, [{ time: 2, event: 'uav/3/takeoff', requestedBy: ['ground/main#launch'], choice: '' }]);
+});

@@ -14,6 +14,9 @@ pub const GOING_LASTS: Duration = Duration::from_secs(10);
 /// The orders that set a vehicle going.
 pub const GOING: [&str; 3] = ["resume", "goto", "hand_back"];
 
+/// The orders that the station carries out itself.
+const OWN: [&str; 4] = ["hold", "launch", "launch_together", "abort"];
+
 /// Waits until something is ordered for a vehicle, and requests it at the vehicle's gateway until it is taken, or until
 /// something else is ordered.
 ///
@@ -42,7 +45,7 @@ impl Delivery {
 
     /// What is to be brought, if the order is not carried out by the station itself.
     fn to_bring(&self, ordered: &Event) -> Option<Event> {
-        let what = ordered.text("what").filter(|what| !matches!(*what, "hold" | "launch"))?;
+        let what = ordered.text("what").filter(|what| !OWN.contains(what))?;
         let order = vocabulary::order(&self.vehicle, what);
         let place = ["x", "y", "z"].into_iter().filter_map(|axis| Some((axis, ordered.real(axis)?)));
         Some(place.fold(order, |order, (axis, coordinate)| order.with(axis, coordinate)))
@@ -68,7 +71,7 @@ impl BThread for Delivery {
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         if event.kind() == "ordered" {
             // A launch is about others too and says nothing against what is on its way to this one.
-            if event.text("what") != Some("launch") {
+            if !matches!(event.text("what"), Some("launch" | "launch_together")) {
                 self.order = self.to_bring(event);
                 let going = event.text("what").is_some_and(|what| GOING.contains(&what));
                 self.until = going.then(|| cx.now() + GOING_LASTS);

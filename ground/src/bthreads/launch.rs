@@ -14,7 +14,7 @@ use crate::order::{ordered, ordered_for_all};
 /// How long a vehicle may block its own take-off before the next one gets its turn.
 const PATIENCE: Duration = Duration::from_secs(15);
 /// Who orders the swarm down does not want the rest of it up.
-const CALLING_OFF: [&str; 2] = ["land", "return"];
+const CALLING_OFF: [&str; 3] = ["land", "return", "abort"];
 
 /// Requests `uav/N/takeoff` for each vehicle whose turn it is. Each vehicle's own preflight b-thread may block its
 /// take-off; one that does so for long, or falls silent, has another turn after the others.
@@ -42,6 +42,9 @@ enum Phase {
 }
 
 impl Launch {
+    /// The name that this b-thread runs under: whoever explains why nobody takes off looks for it.
+    pub const NAME: &'static str = "launch";
+
     /// Launches from the ground station `ground`: at once, or `on_order`.
     #[must_use]
     pub fn new(ground: NodeName, on_order: bool) -> Self {

@@ -8,6 +8,7 @@ mod hold;
 mod launch;
 mod muster;
 pub mod roll_call;
+mod together;
 mod watch;
 
 use skein_bp::Program;
@@ -17,6 +18,7 @@ pub use hold::Hold;
 pub use launch::Launch;
 pub use muster::Muster;
 pub use roll_call::RollCall;
+pub use together::{LAUNCH_LASTS, Together};
 pub use watch::{MissionOutcome, Watch};
 
 use crate::GroundConfig;
@@ -25,7 +27,8 @@ use crate::GroundConfig;
 pub fn load(program: &mut Program, config: &GroundConfig) {
     let (ground, vehicles) = (&config.name, &config.vehicles);
     program.add("roll_call", RollCall::new(ground.clone(), vehicles.clone()));
-    program.add("launch", Launch::new(ground.clone(), config.launch_on_order));
+    program.add(Launch::NAME, Launch::new(ground.clone(), config.launch_on_order));
+    program.add("together", Together::new(ground.clone()));
     if config.muster {
         program.add("muster", Muster::new(ground.clone(), vehicles.iter().cloned()));
     }

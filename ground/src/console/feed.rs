@@ -1,4 +1,5 @@
-//! What browsers are told: `scene`, `fleet`, `orders` as they are now, and `events` as they happen.
+//! What browsers are told: `scene`, `fleet`, `orders` as they are now, `events` as they happen, and `why` a vehicle does what
+//! it does, to whoever asks about it.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -12,10 +13,13 @@ use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
 use skein_wire::{Form, MissionState, Scene, State};
 use tokio::sync::{broadcast, watch};
 
+use crate::explain::Explanation;
 use crate::{Answer, GroundCore, OrderRecord};
 
 /// The swarm is shown this often.
 const FLEET_PERIOD: Duration = Duration::from_millis(100);
+/// Vehicles that somebody asks about are explained this often.
+const WHY_PERIOD: Duration = Duration::from_millis(400);
 /// Events that a browser gets when it connects.
 const EVENTS_KEPT: usize = 300;
 /// How far a browser may lag behind the events before it misses some.
@@ -24,14 +28,23 @@ const EVENTS_UNREAD: usize = 256;
 /// A message for browsers, as text.
 pub(super) type Text = Arc<str>;
 
+/// Explanations by vehicle.
+pub(super) type Reasons = Arc<BTreeMap<NodeName, Text>>;
+
+/// Which vehicles browsers ask about, and how many of them each.
+type Questions = Arc<Mutex<BTreeMap<NodeName, usize>>>;
+
 /// The station's end.
 pub(super) struct Feed {
     scene: watch::Sender<Option<Text>>,
     fleet: watch::Sender<Option<Text>>,
     orders: watch::Sender<Option<Text>>,
     events: broadcast::Sender<Text>,
+    reasons: watch::Sender<Reasons>,
     history: Arc<Mutex<VecDeque<EventView>>>,
+    questions: Questions,
     fleet_due: Duration,
+    reasons_due: Duration,
     orders_shown: Option<u64>,
 }
 
@@ -41,7 +54,27 @@ pub(super) struct Subscription {
     pub(super) fleet: watch::Receiver<Option<Text>>,
     pub(super) orders: watch::Receiver<Option<Text>>,
     pub(super) events: broadcast::Receiver<Text>,
+    pub(super) reasons: watch::Receiver<Reasons>,
     history: Arc<Mutex<VecDeque<EventView>>>,
+    questions: Questions,
+}
+
+/// A browser's question about a vehicle, for as long as it is asked.
+pub(super) struct Question {
+    pub(super) vehicle: NodeName,
+    questions: Questions,
+}
+
+impl Drop for Question {
+    fn drop(&mut self) {
+        let mut questions = self.questions.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(asking) = questions.get_mut(&self.vehicle) {
+            *asking -= 1;
+            if *asking == 0 {
+                questions.remove(&self.vehicle);
+            }
+        }
+    }
 }
 
 impl Clone for Subscription {
@@ -52,7 +85,9 @@ impl Clone for Subscription {
             fleet: self.fleet.clone(),
             orders: self.orders.clone(),
             events: self.events.resubscribe(),
+            reasons: self.reasons.clone(),
             history: self.history.clone(),
+            questions: self.questions.clone(),
         };
         clone.scene.mark_changed();
         clone.fleet.mark_changed();
@@ -62,6 +97,13 @@ impl Clone for Subscription {
 }
 
 impl Subscription {
+    /// Asks why a vehicle does what it does, until the question is dropped.
+    pub(super) fn ask_about(&self, vehicle: NodeName) -> Question {
+        let mut questions = self.questions.lock().unwrap_or_else(PoisonError::into_inner);
+        *questions.entry(vehicle.clone()).or_default() += 1;
+        Question { vehicle, questions: self.questions.clone() }
+    }
+
     /// The latest events, as one message.
     pub(super) fn history(&self) -> Text {
         let history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
@@ -89,6 +131,11 @@ enum Message<'a> {
     },
     Events {
         events: Vec<EventView>,
+    },
+    Why {
+        headline: String,
+        #[serde(flatten)]
+        explanation: Explanation,
     },
 }
 
@@ -195,16 +242,30 @@ impl Feed {
         let (fleet, fleet_read) = watch::channel(None);
         let (orders, orders_read) = watch::channel(None);
         let (events, events_read) = broadcast::channel(EVENTS_UNREAD);
-        let history = Arc::new(Mutex::new(VecDeque::new()));
+        let (reasons, reasons_read) = watch::channel(Reasons::default());
+        let (history, questions) = (Arc::new(Mutex::new(VecDeque::new())), Questions::default());
         let subscription = Subscription {
             scene: scene_read,
             fleet: fleet_read,
             orders: orders_read,
             events: events_read,
+            reasons: reasons_read,
             history: history.clone(),
+            questions: questions.clone(),
         };
-        let fleet_due = Duration::ZERO;
-        (Self { scene, fleet, orders, events, history, fleet_due, orders_shown: None }, subscription)
+        let feed = Self {
+            scene,
+            fleet,
+            orders,
+            events,
+            reasons,
+            history,
+            questions,
+            fleet_due: Duration::ZERO,
+            reasons_due: Duration::ZERO,
+            orders_shown: None,
+        };
+        (feed, subscription)
     }
 
     pub(super) fn show_scene(&mut self, station: &GroundCore, scene: Option<&Scene>) {
@@ -239,6 +300,23 @@ impl Feed {
             self.fleet_due = now + FLEET_PERIOD;
             self.fleet.send_replace(Some(text(&fleet(now, station))));
         }
+        if now >= self.reasons_due {
+            self.reasons_due = now + WHY_PERIOD;
+            self.publish_reasons(station);
+        }
+    }
+
+    fn publish_reasons(&self, station: &GroundCore) {
+        let asked: Vec<NodeName> =
+            self.questions.lock().unwrap_or_else(PoisonError::into_inner).keys().cloned().collect();
+        if asked.is_empty() {
+            return;
+        }
+        let why = |vehicle: NodeName| {
+            let explanation = station.explain(&vehicle)?;
+            Some((vehicle, text(&Message::Why { headline: explanation.headline(), explanation })))
+        };
+        self.reasons.send_replace(Arc::new(asked.into_iter().filter_map(why).collect()));
     }
 
     fn publish_events(&mut self, station: &NodeName, happened: &[Happened]) {

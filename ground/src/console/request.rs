@@ -1,4 +1,4 @@
-//! What browsers ask for: orders.
+//! What browsers ask for: that something is done, or why a vehicle does what it does.
 
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
@@ -48,11 +48,25 @@ impl Mailbox {
     }
 }
 
+/// What a browser wants.
+#[derive(Debug, PartialEq)]
+pub(super) enum Request {
+    /// That something is done.
+    Order(Order),
+    /// To be told why this vehicle does what it does, from now on; none: nothing more.
+    Why(Option<NodeName>),
+}
+
 /// A message of a browser.
 #[derive(Deserialize)]
-struct Message {
-    #[serde(rename = "type")]
-    kind: Kind,
+#[serde(tag = "type", rename_all = "snake_case")]
+enum Message {
+    Order(OrderMessage),
+    Why { vehicle: Option<NodeName> },
+}
+
+#[derive(Deserialize)]
+struct OrderMessage {
     #[serde(default)]
     tag: Option<String>,
     what: What,
@@ -63,14 +77,10 @@ struct Message {
 
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum Kind {
-    Order,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "snake_case")]
 enum What {
     Launch,
+    LaunchTogether,
+    Abort,
     Hold,
     Resume,
     Return,
@@ -87,15 +97,16 @@ enum To {
     Names(Vec<String>),
 }
 
-/// Reads a message: its tag, and the order or what is wrong with it.
-pub(super) fn read(text: &str) -> (Option<String>, Result<Order, String>) {
+/// Reads a message: its tag, and what is asked for or what is wrong with it.
+pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
     match serde_json::from_str::<Message>(text) {
-        Ok(message) => (message.tag.clone(), order(message)),
-        Err(error) => (None, Err(format!("not an order: {error}"))),
+        Ok(Message::Order(message)) => (message.tag.clone(), order(message).map(Request::Order)),
+        Ok(Message::Why { vehicle }) => (None, Ok(Request::Why(vehicle))),
+        Err(error) => (None, Err(format!("not an order or a question: {error}"))),
     }
 }
 
-fn order(Message { kind: Kind::Order, what, to, point, .. }: Message) -> Result<Order, String> {
+fn order(OrderMessage { what, to, point, .. }: OrderMessage) -> Result<Order, String> {
     let who = match to {
         To::Word(word) if word == "all" => Who::All,
         To::Word(word) => return Err(format!("`to` is {word:?}: expected \"all\" or a list of vehicles")),
@@ -108,6 +119,9 @@ fn order(Message { kind: Kind::Order, what, to, point, .. }: Message) -> Result<
     Ok(match what {
         What::Launch if who == Who::All => Order::Launch,
         What::Launch => return Err("a launch is for all: vehicles take off in turn".into()),
+        What::LaunchTogether if who == Who::All => Order::LaunchTogether,
+        What::Abort if who == Who::All => Order::Abort,
+        What::LaunchTogether | What::Abort => return Err("what is decided together is for all".into()),
         What::Hold => Order::Hold(who),
         What::Resume => Order::Resume(who),
         What::Return => Order::Return(who),
@@ -131,10 +145,17 @@ mod tests {
     #[test]
     fn orders_are_read_for_one_for_some_and_for_all() {
         let (tag, hold) = read(r#"{"type":"order","tag":"7","what":"hold","to":"all"}"#);
-        assert_eq!((tag.as_deref(), hold), (Some("7"), Ok(Order::Hold(Who::All))));
+        assert_eq!((tag.as_deref(), hold), (Some("7"), Ok(Request::Order(Order::Hold(Who::All)))));
         let (_, goto) = read(r#"{"type":"order","what":"goto","to":["uav/3"],"point":[1,-2.5,null]}"#);
         let who = Who::only(NodeName::new("uav/3").unwrap());
-        assert_eq!(goto, Ok(Order::GoTo(who, Destination { x: 1.0, y: -2.5, z: None })));
+        assert_eq!(goto, Ok(Request::Order(Order::GoTo(who, Destination { x: 1.0, y: -2.5, z: None }))));
+    }
+
+    #[test]
+    fn a_question_is_about_one_vehicle_or_none() {
+        let vehicle = NodeName::new("uav/3").unwrap();
+        assert_eq!(read(r#"{"type":"why","vehicle":"uav/3"}"#).1, Ok(Request::Why(Some(vehicle))));
+        assert_eq!(read(r#"{"type":"why","vehicle":null}"#).1, Ok(Request::Why(None)));
     }
 
     #[test]
@@ -149,6 +170,8 @@ mod tests {
             (r#"{"type":"order","what":"goto","to":"all"}"#, "`point`"),
             (r#"{"type":"order","what":"goto","to":"all","point":[1e999,0,0]}"#, "number out of range"),
             (r#"{"type":"order","what":"launch","to":["uav/1"]}"#, "for all"),
+            (r#"{"type":"order","what":"abort","to":["uav/1"]}"#, "for all"),
+            (r#"{"type":"why","vehicle":"uav"}"#, "`uav` is not a node name"),
         ] {
             let error = read(text).1.expect_err(text);
             assert!(error.contains(fault), "{text}: {error}");

@@ -9,6 +9,8 @@
 //! | `/uav/N/scan` | `foxglove.LaserScan` | what its lidar sees |
 //! | `/log` | `foxglove.Log` | messages for people |
 //! | `/skein/trace` | `skein.TraceEvent` | every event selected, in Skein's own schema |
+//! | `/uav/N/state` | `skein.State` | what the vehicle tells of itself |
+//! | `/uav/N/board`, `/ground/main/board` | `skein.Board` | what each b-thread requests, waits for and blocks there, and who blocks that |
 //!
 //! Times are the run's, from 0, so that equal runs make equal files. Each second of it is a chunk of its own: a process
 //! that is killed leaves all but its last second.
@@ -29,8 +31,9 @@ use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 use nalgebra::{Isometry3, Vector3};
 use prost::Message;
-use skein_wire::Solid;
-use skein_wire::proto::TraceEvent;
+use skein_dbp::{Board, NodeName};
+use skein_wire::proto::{self, TraceEvent};
+use skein_wire::{Solid, State};
 use thiserror::Error;
 
 pub use foxglove::messages::log::Level;
@@ -41,6 +44,8 @@ const CHUNK: Duration = Duration::from_secs(1);
 const POSE_PERIOD: Duration = Duration::from_millis(40);
 /// Scans of a vehicle are at least this far apart; those between are left out.
 const SCAN_PERIOD: Duration = Duration::from_millis(200);
+/// States of a vehicle are at least this far apart; those between are left out.
+const STATE_PERIOD: Duration = Duration::from_millis(400);
 /// The fixed frame: ENU, metres.
 const WORLD: &str = "world";
 
@@ -103,9 +108,16 @@ pub struct Recorder {
     chunk_ends: Duration,
     poses_due: Duration,
     scans_due: BTreeMap<String, Duration>,
+    /// Which state of each vehicle was written last, and when the next may be.
+    states: BTreeMap<NodeName, (Made, Duration)>,
+    /// Which board of each node was written last.
+    boards: BTreeMap<NodeName, Made>,
     /// Kept between messages to save allocations.
     buffer: Vec<u8>,
 }
+
+/// In which life of its node something was made, and when.
+type Made = (u64, Duration);
 
 #[derive(Clone, Copy)]
 struct Channel {
@@ -137,6 +149,8 @@ impl Recorder {
             chunk_ends: CHUNK,
             poses_due: Duration::ZERO,
             scans_due: BTreeMap::new(),
+            states: BTreeMap::new(),
+            boards: BTreeMap::new(),
             buffer: Vec::new(),
         })
     }
@@ -252,9 +266,36 @@ impl Recorder {
     /// # Errors
     /// [`RecorderError::Write`].
     pub fn trace(&mut self, event: &TraceEvent) -> Result<(), RecorderError> {
-        let schema = ("skein.TraceEvent", skein_wire::FILE_DESCRIPTOR_SET);
-        let channel = self.channel("/skein/trace", || schema)?;
-        self.put(channel, Duration::from_nanos(event.time_ns), |buffer| event.encode_raw(buffer))
+        let at = Duration::from_nanos(event.time_ns);
+        self.write_own("/skein/trace", "skein.TraceEvent", at, event)
+    }
+
+    /// What a vehicle tells of itself, for `/uav/N/state`, unless it has been written already; its path has a topic of its
+    /// own.
+    ///
+    /// # Errors
+    /// [`RecorderError::Write`].
+    pub fn state(&mut self, now: Duration, state: &State) -> Result<(), RecorderError> {
+        let made = (state.incarnation, state.time);
+        if self.states.get(&state.node).is_some_and(|(last, due)| now < *due || *last == made) {
+            return Ok(());
+        }
+        self.states.insert(state.node.clone(), (made, now + STATE_PERIOD));
+        let message = proto::State { path: Vec::new(), ..state.into() };
+        self.write_own(&format!("/{}/state", state.node), "skein.State", now, &message)
+    }
+
+    /// What a node has on its board, for `/uav/N/board`, unless it has been written already.
+    ///
+    /// # Errors
+    /// [`RecorderError::Write`].
+    pub fn board(&mut self, now: Duration, board: &Board) -> Result<(), RecorderError> {
+        let made = (board.incarnation, board.at);
+        if self.boards.insert(board.node.clone(), made) == Some(made) {
+            return Ok(());
+        }
+        let message = proto::Board::from(board);
+        self.write_own(&format!("/{}/board", board.node), "skein.Board", now, &message)
     }
 
     /// Completes the file; a recording that is dropped before is completed too, but cannot tell of errors.
@@ -266,6 +307,18 @@ impl Recorder {
             Ok(_) => Ok(()),
             Err(source) => Err(self.failed(source)),
         }
+    }
+
+    /// A message in one of Skein's own schemas.
+    fn write_own(
+        &mut self,
+        topic: &str,
+        schema: &str,
+        now: Duration,
+        message: &impl Message,
+    ) -> Result<(), RecorderError> {
+        let channel = self.channel(topic, || (schema, skein_wire::FILE_DESCRIPTOR_SET))?;
+        self.put(channel, now, |buffer| message.encode_raw(buffer))
     }
 
     fn write<M: Encode + Message>(

@@ -1,6 +1,7 @@
 //! Bids: what a b-thread says at a synchronisation point.
 
 use std::fmt;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde::{Deserialize, Deserializer, Serialize};
@@ -21,7 +22,7 @@ use crate::notation::Many;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Bid(Box<Statement>); // Boxed, since a bid is moved more often than made.
+pub struct Bid(Arc<Statement>); // Shared, since b-threads that loop state the same bid again and again.
 
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -54,39 +55,40 @@ impl Bid {
     /// [`Strategy::Ordered`](crate::Strategy::Ordered).
     #[must_use]
     pub fn request(mut self, event: impl Into<Event>) -> Self {
-        if self.0.requests.is_empty() {
+        let requests = &mut self.statement().requests;
+        if requests.is_empty() {
             // Most bids request one event and need room for no more.
-            self.0.requests.reserve_exact(1);
+            requests.reserve_exact(1);
         }
-        self.0.requests.push(event.into());
+        requests.push(event.into());
         self
     }
 
     /// Resumes the b-thread when an event of `set` happens at someone else's request.
     #[must_use]
     pub fn wait_for(mut self, set: impl Into<EventSet>) -> Self {
-        add(&mut self.0.waits, set);
+        add(&mut self.statement().waits, set);
         self
     }
 
     /// Forbids the events of `set`, the b-thread's own requests included.
     #[must_use]
     pub fn block(mut self, set: impl Into<EventSet>) -> Self {
-        add(&mut self.0.blocks, set);
+        add(&mut self.statement().blocks, set);
         self
     }
 
     /// Ends the b-thread when an event of `set` happens.
     #[must_use]
     pub fn interrupt(mut self, set: impl Into<EventSet>) -> Self {
-        add(&mut self.0.interrupts, set);
+        add(&mut self.statement().interrupts, set);
         self
     }
 
     /// Says that the b-thread must not stay here for ever: a liveness requirement for the verifier.
     #[must_use]
     pub fn hot(mut self) -> Self {
-        self.0.hot = true;
+        self.statement().hot = true;
         self
     }
 
@@ -94,7 +96,7 @@ impl Bid {
     /// the program is lost. Means nothing in one program.
     #[must_use]
     pub fn hold_when_lost(mut self) -> Self {
-        self.0.hold_when_lost = true;
+        self.statement().hold_when_lost = true;
         self
     }
 
@@ -102,7 +104,7 @@ impl Bid {
     /// lowest.
     #[must_use]
     pub fn priority(mut self, priority: i32) -> Self {
-        self.0.priority = Some(priority);
+        self.statement().priority = Some(priority);
         self
     }
 
@@ -110,7 +112,8 @@ impl Bid {
     /// several counts.
     #[must_use]
     pub fn deadline(mut self, at: Duration) -> Self {
-        self.0.deadline = Some(self.0.deadline.map_or(at, |earlier| earlier.min(at)));
+        let deadline = &mut self.statement().deadline;
+        *deadline = Some(deadline.map_or(at, |earlier| earlier.min(at)));
         self
     }
 
@@ -158,7 +161,22 @@ impl Bid {
     pub(crate) fn for_proxy(&self) -> Self {
         let Statement { requests, blocks, priority, .. } = &*self.0;
         let (requests, blocks) = (requests.clone(), blocks.clone());
-        Self(Box::new(Statement { requests, blocks, priority: *priority, ..Statement::default() }))
+        Self(Arc::new(Statement { requests, blocks, priority: *priority, ..Statement::default() }))
+    }
+
+    /// Whether the two bids ask for and block the same events, so that the same questions concern them.
+    pub(crate) fn concerns_as(&self, other: &Self) -> bool {
+        let (a, b) = (&*self.0, &*other.0);
+        Arc::ptr_eq(&self.0, &other.0)
+            || (a.requests == b.requests
+                && a.waits == b.waits
+                && a.blocks == b.blocks
+                && a.interrupts == b.interrupts)
+    }
+
+    /// The statement, to be changed: a copy if clones share it.
+    fn statement(&mut self) -> &mut Statement {
+        Arc::make_mut(&mut self.0)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The board: every bid on the table, and the questions a program asks of them.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,6 +10,9 @@ use crate::event::Event;
 use crate::event_set::EventSet;
 use crate::index::{Index, Place};
 use crate::strategy::Strategy;
+
+/// How many bids may stay in the indexes after they were replaced; an event has at most as many candidates too many.
+const BIDS_LEFT_FILED: usize = 16;
 
 /// Who states a bid.
 #[derive(Clone, Debug)]
@@ -78,7 +81,7 @@ impl Board {
 
     pub(crate) fn remove(&mut self, place: Place) -> Option<Entry> {
         let entry = self.entries.get_mut(place as usize)?.take()?;
-        self.indexes.refile(place, &entry.bid, &Bid::new());
+        self.indexes.remove(place, &entry.bid);
         let names = if entry.is_proxy() { &mut self.proxies } else { &mut self.bthreads };
         names.remove(&entry.name);
         self.vacant += 1;
@@ -90,9 +93,8 @@ impl Board {
         let entry = self.entries.get_mut(place as usize)?.as_mut()?;
         entry.rank = rank(self.strategy, &entry.owner, &bid);
         entry.sync += 1;
-        let old = std::mem::replace(&mut entry.bid, bid);
-        self.indexes.refile(place, &old, &entry.bid);
-        Some(old)
+        self.indexes.replace(place, &entry.bid, &bid);
+        Some(std::mem::replace(&mut entry.bid, bid))
     }
 
     pub(crate) fn get(&self, place: Place) -> Option<&Entry> {
@@ -168,7 +170,7 @@ impl Board {
 
     fn any_candidate(&self, index: &Index, event: &Event, is_it: impl Fn(&Entry) -> bool) -> bool {
         let is_it = |place: &Place| self.get(*place).is_some_and(&is_it);
-        index.candidates(event).any(|places| places.iter().any(is_it))
+        index.candidates(event).iter().any(|places| places.iter().any(is_it))
     }
 
     /// Whether this bid counts as a block of `event`.
@@ -207,7 +209,7 @@ impl Board {
     /// Fills `places` with those whom `event` may concern, in the order they came.
     pub(crate) fn listeners(&self, event: &Event, places: &mut Vec<Place>) {
         places.clear();
-        self.indexes.wakes.candidates(event).for_each(|list| places.extend_from_slice(list));
+        self.indexes.wakes.candidates(event).iter().for_each(|list| places.extend_from_slice(list));
         if places.len() > 1 {
             places.sort_unstable();
             places.dedup();
@@ -234,7 +236,7 @@ impl Board {
         for entry in entries.into_iter().flatten() {
             let Entry { name, owner, bid, sync, rank } = entry;
             let place = fresh.add(name, owner, sync);
-            fresh.indexes.refile(place, &Bid::new(), &bid);
+            fresh.indexes.add(place, &bid);
             if let Some(entry) = fresh.get_mut(place) {
                 entry.bid = bid;
                 entry.rank = rank;
@@ -245,53 +247,102 @@ impl Board {
 }
 
 /// Where to find the bids that a question is about.
+///
+/// A b-thread that goes round a loop states the same few bids again and again. So a replaced bid stays filed until others
+/// have been replaced after it, and is found there when it comes back. Who asks looks at the present bid itself.
 #[derive(Clone, Debug, Default)]
 struct Indexes {
     /// Who requests, waits for or is interrupted by an event.
     wakes: Index,
     /// Who blocks an event.
     blockers: Index,
+    /// Replaced bids that are still filed, the one replaced first in front.
+    left_filed: VecDeque<(Place, Bid)>,
     /// Places of bids with requests, sorted.
     requesters: Vec<Place>,
     deadlines: BTreeSet<(Duration, Place)>,
 }
 
 impl Indexes {
-    /// Moves `place` from where `old` put it to where `new` does.
-    fn refile(&mut self, place: Place, old: &Bid, new: &Bid) {
-        if old.requests() != new.requests() {
-            old.requests().iter().for_each(|event| self.wakes.unfile_event(event, place));
-            new.requests().iter().for_each(|event| self.wakes.file_event(event, place));
-            self.refile_requester(place, !old.requests().is_empty(), !new.requests().is_empty());
+    fn add(&mut self, place: Place, bid: &Bid) {
+        self.file(place, bid);
+        self.restate_requests(place, false, !bid.requests().is_empty());
+        self.restate_deadline(place, None, bid.given_deadline());
+    }
+
+    fn remove(&mut self, place: Place, bid: &Bid) {
+        self.unfile(place, bid);
+        while let Some(at) = self.left_filed.iter().position(|(of, _)| *of == place) {
+            self.unfile_left(at);
         }
-        swap(&mut self.wakes, place, old.waits(), new.waits());
-        swap(&mut self.wakes, place, old.interrupts(), new.interrupts());
-        swap(&mut self.blockers, place, old.blocks(), new.blocks());
-        if old.given_deadline() != new.given_deadline() {
-            old.given_deadline().map(|at| self.deadlines.remove(&(at, place)));
-            new.given_deadline().map(|at| self.deadlines.insert((at, place)));
+        self.restate_requests(place, !bid.requests().is_empty(), false);
+        self.restate_deadline(place, bid.given_deadline(), None);
+    }
+
+    fn replace(&mut self, place: Place, old: &Bid, new: &Bid) {
+        if !old.concerns_as(new) {
+            let filed = self.left_filed.iter_mut().find(|(of, bid)| *of == place && bid.concerns_as(new));
+            match filed {
+                Some((_, bid)) => *bid = old.clone(),
+                None => {
+                    self.file(place, new);
+                    self.left_filed.push_back((place, old.clone()));
+                    if self.left_filed.len() > BIDS_LEFT_FILED {
+                        self.unfile_left(0);
+                    }
+                }
+            }
+            self.restate_requests(place, !old.requests().is_empty(), !new.requests().is_empty());
+        }
+        self.restate_deadline(place, old.given_deadline(), new.given_deadline());
+    }
+
+    fn file(&mut self, place: Place, bid: &Bid) {
+        bid.requests().iter().for_each(|event| self.wakes.file_event(event, place));
+        self.wakes.file(bid.waits(), place);
+        self.wakes.file(bid.interrupts(), place);
+        self.blockers.file(bid.blocks(), place);
+    }
+
+    fn unfile(&mut self, place: Place, bid: &Bid) {
+        bid.requests().iter().for_each(|event| self.wakes.unfile_event(event, place));
+        self.wakes.unfile(bid.waits(), place);
+        self.wakes.unfile(bid.interrupts(), place);
+        self.blockers.unfile(bid.blocks(), place);
+    }
+
+    fn unfile_left(&mut self, at: usize) {
+        if let Some((place, bid)) = self.left_filed.remove(at) {
+            self.unfile(place, &bid);
         }
     }
 
-    fn refile_requester(&mut self, place: Place, before: bool, after: bool) {
-        match (before, after, self.requesters.binary_search(&place)) {
-            (false, true, Err(at)) => self.requesters.insert(at, place),
-            (true, false, Ok(at)) => {
-                self.requesters.remove(at);
+    fn restate_requests(&mut self, place: Place, before: bool, after: bool) {
+        match (before, after) {
+            (false, true) => {
+                if let Err(at) = self.requesters.binary_search(&place) {
+                    self.requesters.insert(at, place);
+                }
+            }
+            (true, false) => {
+                if let Ok(at) = self.requesters.binary_search(&place) {
+                    self.requesters.remove(at);
+                }
             }
             _ => {}
         }
     }
-}
 
-fn swap(index: &mut Index, place: Place, old: &EventSet, new: &EventSet) {
-    if old != new {
-        index.unfile(old, place);
-        index.file(new, place);
+    fn restate_deadline(&mut self, place: Place, before: Option<Duration>, after: Option<Duration>) {
+        if before != after {
+            before.map(|at| self.deadlines.remove(&(at, place)));
+            after.map(|at| self.deadlines.insert((at, place)));
+        }
     }
 }
 
-fn rank(strategy: Strategy, owner: &Owner, bid: &Bid) -> Option<i32> {
+/// Priority of a bid's requests under a strategy; none is lowest.
+pub(crate) fn rank(strategy: Strategy, owner: &Owner, bid: &Bid) -> Option<i32> {
     match (strategy, owner) {
         (Strategy::Simple | Strategy::Ordered, _) => None,
         (Strategy::SyncPriority, _) => bid.given_priority(),

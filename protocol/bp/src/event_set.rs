@@ -133,7 +133,18 @@ impl EventSet {
     }
 
     /// Whether `event` is in the set.
+    #[inline]
     pub fn contains(&self, event: &Event) -> bool {
+        // Most sets that are asked are one of these.
+        match self {
+            Self::None => false,
+            Self::All => true,
+            Self::Named(pattern) => pattern.matches_event(event),
+            set => set.holds(event),
+        }
+    }
+
+    fn holds(&self, event: &Event) -> bool {
         match self {
             Self::None => false,
             Self::All => true,
@@ -193,6 +204,16 @@ impl EventSet {
         }
     }
 
+    /// The set without those alternatives that surely hold nothing of `other`, judged by names alone.
+    #[must_use]
+    pub fn about(&self, other: &EventSet) -> EventSet {
+        match self {
+            Self::Or(sets) => Self::any_of(sets.iter().map(|set| set.about(other))),
+            set if set.may_overlap(other) => set.clone(),
+            _ => Self::None,
+        }
+    }
+
     /// Whether the two sets surely share no event.
     fn is_apart_from(&self, other: &EventSet) -> bool {
         match (self, other) {
@@ -214,7 +235,7 @@ impl EventSet {
     }
 
     /// Calls `visit` with scopes that together hold every event of the set.
-    pub(crate) fn visit_scopes<'a>(&'a self, visit: &mut dyn FnMut(Scope<'a>)) {
+    pub(crate) fn visit_scopes<'a>(&'a self, visit: &mut impl FnMut(Scope<'a>)) {
         match self {
             Self::None => {}
             Self::Exactly(event) => visit(Scope::name(event.name(), event.keys())),

@@ -46,27 +46,31 @@ impl Index {
     }
 
     /// The candidates for `event`, in lists; a place may come more than once.
-    pub(crate) fn candidates(&self, event: &Event) -> impl Iterator<Item = &[Place]> {
+    pub(crate) fn candidates(&self, event: &Event) -> [&[Place]; 4] {
         let keys = event.keys();
-        let under = |key: u64, in_use: bool| if in_use { self.filed.get(&key) } else { None };
-        let lists = [
-            Some(&self.any),
-            under(keys.root, self.roots > 0),
-            under(keys.home, self.homes > 0),
-            under(keys.name, !self.filed.is_empty()),
-        ];
-        lists.into_iter().flatten().map(Vec::as_slice)
+        // Most programs use no scope between a whole name and none.
+        let under = |key: u64, filed: usize| -> &[Place] {
+            if filed == 0 { &[] } else { self.filed.get(&key).map_or(&[], Vec::as_slice) }
+        };
+        [
+            &self.any,
+            under(keys.root, self.roots),
+            under(keys.home, self.homes),
+            under(keys.name, self.filed.len()),
+        ]
     }
 
     fn file_scope(&mut self, scope: Scope<'_>, place: Place) {
-        let list = match (scope.level, self.filed.entry(scope.key)) {
-            (Level::Any, _) => &mut self.any,
-            (_, Entry::Vacant(vacant)) => vacant.insert(Vec::new()),
-            (_, Entry::Occupied(occupied)) => {
-                let list = occupied.into_mut();
-                self.empty -= usize::from(list.is_empty());
-                list
-            }
+        let list = match scope.level {
+            Level::Any => &mut self.any,
+            _ => match self.filed.entry(scope.key) {
+                Entry::Vacant(vacant) => vacant.insert(Vec::new()),
+                Entry::Occupied(occupied) => {
+                    let list = occupied.into_mut();
+                    self.empty -= usize::from(list.is_empty());
+                    list
+                }
+            },
         };
         let at = list.partition_point(|filed| *filed <= place);
         list.insert(at, place);

@@ -47,6 +47,7 @@ mod selection;
 mod strategy;
 mod tie;
 mod value;
+pub mod verify;
 
 pub use bid::Bid;
 pub use bthread::{BThread, Context, DEFAULT_BTHREAD_PRIORITY};
@@ -55,6 +56,6 @@ pub use event_set::EventSet;
 pub use explain::Explanation;
 pub use pattern::Pattern;
 pub use program::{PASSED_OVER_LIMIT, Program, ProgramConfig, ProgramError};
-pub use selection::{Origin, Selection};
+pub use selection::{Origin, Rival, Selection};
 pub use strategy::Strategy;
 pub use value::{Real, Value};

@@ -5,7 +5,7 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use crate::event::Event;
-use crate::scope::{Level, NameKeys, Scope};
+use crate::scope::{Level, NameKeys, Scope, leading_chunks};
 
 /// A pattern over the chunks of a name: `*` stands for one chunk, `**` for any number of them, none included.
 ///
@@ -21,14 +21,18 @@ pub struct Pattern(Arc<Parsed>);
 struct Parsed {
     text: Arc<str>,
     wild: bool,
-    keys: NameKeys,
+    /// What the names that fit begin with, before the first star; all of a literal name.
+    level: Level,
+    fixed: usize,
+    /// The hash of that.
+    key: u64,
 }
 
 impl Pattern {
     /// Reads a pattern; every text is one.
     pub fn new(text: impl Into<Arc<str>>) -> Self {
         let text = text.into();
-        let wild = text.split('/').any(|chunk| chunk == "*" || chunk == "**");
+        let wild = text.split('/').any(is_star);
         Self::parsed(text, wild)
     }
 
@@ -38,8 +42,10 @@ impl Pattern {
     }
 
     fn parsed(text: Arc<str>, wild: bool) -> Self {
-        let keys = NameKeys::of(&text);
-        Self(Arc::new(Parsed { text, wild, keys }))
+        let scope = if wild { fixed_part(&text) } else { Scope::name(&text, &NameKeys::of(&text)) };
+        let Scope { level, text: fixed, key } = scope;
+        let fixed = fixed.len();
+        Self(Arc::new(Parsed { text, wild, level, fixed, key }))
     }
 
     /// The pattern as written.
@@ -97,21 +103,27 @@ impl Pattern {
         if self.0.wild {
             self.matches(event.name())
         } else {
-            self.0.keys.name == event.keys().name && self.matches(event.name())
+            self.0.key == event.keys().name && *self.0.text == *event.name()
         }
     }
 
     /// The narrowest scope that holds every name that fits.
     pub(crate) fn scope(&self) -> Scope<'_> {
-        if !self.0.wild {
-            return Scope::name(&self.0.text, &self.0.keys);
-        }
-        let fixed = self.0.text.split('/').take_while(|chunk| *chunk != "*" && *chunk != "**").count();
-        match fixed {
-            0 => Scope::ANY,
-            1 => Scope::new(Level::Root, crate::scope::leading_chunks(&self.0.text, 1)),
-            _ => Scope::new(Level::Home, crate::scope::leading_chunks(&self.0.text, 2)),
-        }
+        let Parsed { text, level, fixed, key, .. } = &*self.0;
+        Scope { level: *level, text: text.get(..*fixed).unwrap_or(text), key: *key }
+    }
+}
+
+fn is_star(chunk: &str) -> bool {
+    chunk == "*" || chunk == "**"
+}
+
+/// The scope that the chunks before the first star fix.
+fn fixed_part(pattern: &str) -> Scope<'_> {
+    match pattern.split('/').take_while(|chunk| !is_star(chunk)).count() {
+        0 => Scope::ANY,
+        1 => Scope::new(Level::Root, leading_chunks(pattern, 1)),
+        _ => Scope::new(Level::Home, leading_chunks(pattern, 2)),
     }
 }
 

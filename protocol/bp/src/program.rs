@@ -14,7 +14,7 @@ use crate::event::Event;
 use crate::event_set::EventSet;
 use crate::explain::Explanation;
 use crate::index::Place;
-use crate::selection::{Origin, Selection};
+use crate::selection::{Origin, Rival, Selection};
 use crate::strategy::Strategy;
 use crate::tie::TieBreak;
 
@@ -41,6 +41,8 @@ pub struct ProgramConfig {
     pub passed_over_limit: Option<u32>,
     /// Events that proxies cannot block.
     pub protected: EventSet,
+    /// How many requests that lost are noted with each selection, for people.
+    pub rivals: usize,
 }
 
 impl Default for ProgramConfig {
@@ -52,19 +54,21 @@ impl Default for ProgramConfig {
             settle_limit: None,
             passed_over_limit: Some(PASSED_OVER_LIMIT),
             protected: EventSet::None,
+            rivals: 0,
         }
     }
 }
 
 impl ProgramConfig {
     /// What vehicles fly: priorities of bids, external events after at most 16 internal ones, at most 1000 selections in a
-    /// superstep.
+    /// superstep; four rivals are noted with each.
     pub fn vehicle(seed: u64) -> Self {
         Self {
             strategy: Strategy::SyncPriority,
             seed,
             externals_after: Some(16),
             settle_limit: Some(1000),
+            rivals: 4,
             ..Self::default()
         }
     }
@@ -127,6 +131,15 @@ pub struct Program {
     /// Kept between steps to save allocations.
     offers: Vec<Event>,
     listeners: Vec<Place>,
+}
+
+/// What a program holds beside its b-threads and proxies.
+#[derive(Clone, Debug)]
+pub(crate) struct Rest {
+    pub(crate) externals: VecDeque<Event>,
+    pub(crate) occurrences: VecDeque<Event>,
+    pub(crate) failure: Option<(Arc<str>, String)>,
+    pub(crate) daemon: bool,
 }
 
 /// Building and feeding a program.
@@ -307,25 +320,27 @@ impl Program {
     /// The internal event to select, and how many others tied with it.
     fn draw_internal(&mut self) -> Option<(Event, usize)> {
         self.board.offers(&mut self.offers);
+        let others = self.offers.len().checked_sub(1)?;
         let winner = self.ties.choose(&self.offers);
-        let event = self.offers.get(winner)?.clone();
         if !self.externals.is_empty() {
             self.internal_in_a_row += 1;
         }
-        Some((event, self.offers.len() - 1))
+        Some((self.offers.swap_remove(winner), others))
     }
 
     /// Ends those whom `event` interrupts, then resumes those who requested it or wait for it.
     fn deliver(&mut self, event: Event, origin: Origin, tied_with: usize, now: Duration) -> Selection {
         let mut resuming = std::mem::take(&mut self.listeners);
         self.board.listeners(&event, &mut resuming);
+        let rivals = if origin == Origin::Internal { self.rivals(&event) } else { Vec::new() };
         let mut requested_by = Vec::with_capacity(resuming.len());
-        let mut ending = Vec::new();
+        let (mut ending, mut priority) = (Vec::new(), None);
         resuming.retain(|place| {
             let Some(Entry { name, bid, .. }) = self.board.get(*place) else { return false };
             let requested = bid.requests().contains(&event);
             if requested {
                 requested_by.push(name.clone());
+                priority = priority.max(bid.given_priority());
             }
             let interrupted = bid.interrupts().contains(&event);
             if interrupted {
@@ -345,7 +360,19 @@ impl Program {
         self.listeners = resuming;
         self.start_added(now);
         self.compact();
-        Selection { event, origin, requested_by, resumed, interrupted, tied_with }
+        Selection { event, origin, requested_by, resumed, interrupted, tied_with, priority, rivals }
+    }
+
+    /// What else is requested while `event` is selected.
+    fn rivals(&self, event: &Event) -> Vec<Rival> {
+        let others = self.board.requests().filter(|(_, requested)| *requested != event);
+        let rival = |(entry, requested): (&Entry, &Event)| Rival {
+            bthread: entry.name.clone(),
+            event: requested.clone(),
+            priority: entry.bid.given_priority(),
+            blocked: self.board.is_blocked(requested),
+        };
+        others.take(self.config.rivals).map(rival).collect()
     }
 
     fn interrupt(&mut self, place: Place, event: &Event, now: Duration) -> Option<Arc<str>> {
@@ -490,6 +517,63 @@ impl Program {
     }
 }
 
+/// Taking a program apart, and putting another of the same settings together: what a verifier does.
+impl Program {
+    pub(crate) fn config(&self) -> &ProgramConfig {
+        &self.config
+    }
+
+    pub(crate) fn home(&self) -> &EventSet {
+        &self.board.home
+    }
+
+    /// B-threads and proxies in the order they came.
+    pub(crate) fn entries(&self) -> impl Iterator<Item = &Entry> {
+        self.board.entries()
+    }
+
+    pub(crate) fn rest(&self) -> Rest {
+        Rest {
+            externals: self.externals.clone(),
+            occurrences: self.occurrences.clone(),
+            failure: self.failure.clone(),
+            daemon: self.daemon,
+        }
+    }
+
+    /// A program whose b-threads and proxies are at these synchronisation points.
+    pub(crate) fn assemble(&self, seats: impl Iterator<Item = (Arc<str>, Owner, Bid)>, rest: Rest) -> Self {
+        let mut program = Self::new(self.config.clone());
+        program.set_home(&self.board.home);
+        for (name, owner, bid) in seats {
+            let place = program.board.add(name, owner, 0);
+            program.board.restate(place, bid);
+        }
+        let Rest { externals, occurrences, failure, daemon } = rest;
+        Self { externals, occurrences, failure, daemon, ..program }
+    }
+
+    /// Lets an event happen that may be selected: an internal one, or the external one at a position in the queue.
+    pub(crate) fn select(&mut self, event: Event, external: Option<usize>) {
+        let origin = match external {
+            Some(at) => {
+                self.externals.remove(at);
+                Origin::External
+            }
+            None => Origin::Internal,
+        };
+        self.deliver(event, origin, 0, Duration::ZERO);
+    }
+
+    /// Resumes a b-thread as if its deadline had passed.
+    pub(crate) fn fire_deadline(&mut self, bthread: &str) {
+        let Some(place) = self.board.bthread(bthread) else { return };
+        self.resume(place, &Event::timeout(), Duration::ZERO);
+        self.start_added(Duration::ZERO);
+        self.compact();
+    }
+}
+
 /// Asking a program.
 impl Program {
     /// The b-threads that run, by name, with their bids and how many synchronisation points each has reached, the present
@@ -565,6 +649,11 @@ impl Program {
     /// Who requests, blocks and waits for the events of a set: `program.explain("uav/3/takeoff")`.
     pub fn explain(&self, question: impl Into<EventSet>) -> Explanation {
         Explanation::of(question.into(), &self.board, self.externals.iter(), self.selectable())
+    }
+
+    /// Who blocks `event` now, b-threads and proxies, in the order they came.
+    pub fn blockers(&self, event: &Event) -> impl Iterator<Item = &str> {
+        self.board.entries().filter(move |entry| self.board.blocks(entry, event)).map(|entry| &*entry.name)
     }
 
     /// The state of one b-thread, if it runs and is a `T`.

@@ -44,4 +44,33 @@ pub struct Selection {
     pub interrupted: Vec<Arc<str>>,
     /// How many other events could have been selected in its place.
     pub tied_with: usize,
+    /// The highest priority at which it was requested.
+    pub priority: Option<i32>,
+    /// What else was requested, as far as [`ProgramConfig::rivals`](crate::ProgramConfig::rivals) allows; of an internal
+    /// event only.
+    pub rivals: Vec<Rival>,
+}
+
+/// A request that another one went before.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rival {
+    /// Who requested.
+    pub bthread: Arc<str>,
+    /// What.
+    pub event: Event,
+    /// At which priority.
+    pub priority: Option<i32>,
+    /// Whether somebody blocked it; if not, its priority was lower, or it lost the tie.
+    pub blocked: bool,
+}
+
+impl fmt::Display for Rival {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} by {}", self.event.name(), self.bthread)?;
+        match (self.blocked, self.priority) {
+            (true, _) => f.write_str(" (blocked)"),
+            (false, Some(priority)) => write!(f, " (priority {priority})"),
+            (false, None) => Ok(()),
+        }
+    }
 }

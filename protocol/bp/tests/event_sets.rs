@@ -186,6 +186,7 @@ proptest! {
         prop_assert!(!(a.is_none() && in_a));
         prop_assert!(!(in_a && in_b) || a.may_overlap(&b), "they share {}", e);
         prop_assert!(!in_a || a.could_match_home(e.home()));
+        prop_assert_eq!(a.about(&b).contains(&e) && in_b, in_a && in_b);
         prop_assert!(!a.is_within(&b) || !in_a || in_b, "{} is not in {}", e, b);
     }
 

@@ -5,8 +5,8 @@
 mod support;
 
 use serde_json::json;
-use skein_bp::{Event, Program, ProgramConfig, Strategy};
-use support::{START, names, plain, program, superstep};
+use skein_bp::{Bid, Event, Program, ProgramConfig, Strategy};
+use support::{START, names, plain, program, script, superstep};
 
 fn with(strategy: Strategy) -> ProgramConfig {
     ProgramConfig { strategy, ..ProgramConfig::default() }
@@ -33,6 +33,46 @@ fn a_requested_event_resumes_all_who_requested_or_wait_for_it() {
     assert_eq!(selections[0].requested_by, ["asks".into(), "asks too".into()]);
     assert_eq!(selections[0].resumed, ["asks".into(), "asks too".into(), "waits".into()]);
     assert_eq!(program.bids().map(|(name, ..)| name).collect::<Vec<_>>(), ["elsewhere"]);
+}
+
+#[test]
+fn bthreads_that_go_round_are_found_by_their_present_bid_only() {
+    // More loops than the index remembers replaced bids.
+    let round = |n: usize| {
+        let syncs = (n..n + 3)
+            .map(|k| json!({"sync": {"wait": format!("e{}", k % 5), "block": format!("b{}", k % 7)}}));
+        json!([{"repeat": "forever", "do": syncs.collect::<Vec<_>>()}])
+    };
+    let mut program = plain([]);
+    for n in 0..30 {
+        program.add(format!("round {n}"), script(round(n)));
+    }
+    program.add(
+        "asks",
+        script(json!([{"repeat": "forever", "do": [{"sync": {"request": ["b0", "b3"], "wait": "e0"}}]}])),
+    );
+    let mut happened = 0;
+    for step in 0..500 {
+        program.enqueue(format!("e{}", (step * 3 + step / 7) % 5));
+        program.synchronise(START).unwrap();
+        let bids: Vec<_> = program.bids().map(|(name, bid, _)| (name.to_owned(), bid.clone())).collect();
+        let blocked = |event: &str| bids.iter().any(|(_, bid)| bid.blocks().contains(&event.into()));
+        let free: Vec<&str> = ["b0", "b3"].into_iter().filter(|event| !blocked(event)).collect();
+        let Some(selection) = program.step(START).unwrap() else {
+            panic!("an external event is always there")
+        };
+        if !free.is_empty() {
+            assert!(free.contains(&selection.event.name()), "{step}: {}", selection.event);
+        }
+        let concerns =
+            |bid: &Bid| bid.waits().contains(&selection.event) || bid.requests().contains(&selection.event);
+        let mut resumed: Vec<String> = selection.resumed.iter().map(|name| name.to_string()).collect();
+        resumed.sort();
+        let concerned = bids.iter().filter(|(_, bid)| concerns(bid)).map(|(name, _)| name.clone());
+        assert_eq!(resumed, concerned.collect::<Vec<_>>(), "{step}: {}", selection.event);
+        happened += usize::from(!resumed.is_empty());
+    }
+    assert!(happened > 300, "hardly anybody was woken: {happened}");
 }
 
 #[test]
@@ -225,4 +265,26 @@ fn the_revision_changes_when_a_bid_does() {
     assert_eq!(revisions.len(), 3);
     assert!(revisions.is_sorted_by(|a, b| a < b), "{revisions:?}");
     assert_eq!(program.revision(), revisions[2], "nothing happened");
+}
+
+#[test]
+fn a_selection_says_at_which_priority_it_went_before_what() {
+    let body = |request: &str, priority: i32| json!([{"sync": {"request": [request], "prio": priority}}]);
+    let config = ProgramConfig { rivals: 2, ..with(Strategy::SyncPriority) };
+    let mut program = program(
+        config,
+        [
+            ("battery", body("land", 50)),
+            ("mission", body("go", 10)),
+            ("navigation", body("advance", 60)),
+            ("hold", json!([{"sync": {"block": "advance", "wait": "land"}}])),
+            ("one too many", body("z", 1)),
+        ],
+    );
+    let selections = program.superstep(START).unwrap();
+    let first = &selections[0];
+    assert_eq!((first.event.name(), first.priority), ("land", Some(50)));
+    let rivals: Vec<String> = first.rivals.iter().map(ToString::to_string).collect();
+    assert_eq!(rivals, ["go by mission (priority 10)", "advance by navigation (blocked)"]);
+    assert_eq!(selections.last().map(|last| last.rivals.len()), Some(0));
 }

@@ -1,5 +1,6 @@
 //! Who may request and block what at a home (G7).
 
+use serde::Deserialize;
 use skein_bp::{Event, EventSet, Pattern};
 
 use crate::NodeName;
@@ -47,7 +48,8 @@ pub struct Role {
 /// assert!(!authority.may_block(&ground, "hold all", &EventSet::from("uav/1/**")));
 /// # Ok::<(), skein_dbp::NodeNameError>(())
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(from = "Vec<RoleTable>")]
 pub struct Authority {
     roles: Vec<Role>,
     /// What scripts may do at most; none: what their node may.
@@ -101,6 +103,35 @@ impl Authority {
 
     fn limit(&self, bthread: &str) -> Option<&Grant> {
         self.scripts.as_ref().filter(|_| bthread.starts_with(SCRIPT))
+    }
+}
+
+/// A role as it is written in a file. One without `nodes` limits scripts.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RoleTable {
+    role: String,
+    #[serde(default)]
+    nodes: Vec<String>,
+    #[serde(default)]
+    request: Vec<String>,
+    #[serde(default)]
+    block: Vec<String>,
+}
+
+impl From<Vec<RoleTable>> for Authority {
+    fn from(tables: Vec<RoleTable>) -> Self {
+        let (mut roles, mut scripts) = (Vec::new(), None);
+        for RoleTable { role: name, nodes, request, block } in tables {
+            let grant = Grant { request: EventSet::any_of(request), block: EventSet::any_of(block) };
+            if nodes.is_empty() {
+                let Grant { request, block } = scripts.take().unwrap_or_default();
+                scripts = Some(Grant { request: request.or(grant.request), block: block.or(grant.block) });
+            } else {
+                roles.push(Role { name, nodes: nodes.into_iter().map(Pattern::new).collect(), grant });
+            }
+        }
+        Self::new(roles, scripts)
     }
 }
 

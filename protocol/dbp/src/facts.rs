@@ -29,8 +29,8 @@ pub const PEER_JOINED: &str = "peer_joined";
 /// `node` has not been heard for its lease, or has restarted (G5). `released` names, with blanks between, those of its
 /// b-threads whose blocks ended here with that, and `held` those whose blocks stay.
 pub const PEER_LOST: &str = "peer_lost";
-/// This node has heard all `decided` decisions of its `term` (G8): told after they were, at the start and after each
-/// loss of the coordinator.
+/// This node has heard all `decided` decisions of its `term` from the `coordinator` (G8): told after they were, at the
+/// start and after each loss of the coordinator.
 pub const IN_STEP: &str = "in_step";
 /// `node`, a member of the roster, is in another `term`: nothing can be decided until an operator brings both to one.
 pub const OUT_OF_STEP: &str = "out_of_step";

@@ -45,6 +45,7 @@
 //! ```
 
 mod authority;
+mod board;
 mod config;
 mod explain;
 pub mod facts;
@@ -65,6 +66,7 @@ mod stream;
 mod table;
 
 pub use authority::{Authority, Grant, Role, SCRIPT};
+pub use board::{Board, BoardLease, BoardRequest, BoardRow};
 pub use config::NodeConfig;
 pub use explain::NodeExplanation;
 pub use kept::{Kept, KeptBlock};

@@ -224,6 +224,8 @@ pub struct Occurrence {
     pub requests_served: Vec<ServedRequest>,
     /// The b-threads that requested it, as the home names them: remote ones as `node#bthread`. For people.
     pub requested_by: Vec<Arc<str>>,
+    /// Why this event and no other: its priority, and the requests that it went before. For people.
+    pub choice: Option<Arc<str>>,
     /// When, on the home's clock; for display only.
     pub at: Duration,
 }

@@ -22,7 +22,10 @@ use crate::peers::{Peer, Peers};
 use crate::stalls::Stalls;
 use crate::stream::Stream;
 use crate::table::{BidTable, Rights};
-use crate::{Kept, Message, NodeConfig, NodeName, Occurrence, Recipient, Roster, SWARM, first_two_chunks};
+use crate::{
+    Board, BoardLease, BoardRow, Kept, Message, NodeConfig, NodeName, Occurrence, Recipient, Roster, SWARM,
+    first_two_chunks,
+};
 
 pub use deciding::LIFT;
 
@@ -52,6 +55,8 @@ pub struct Happened {
     pub origin: Origin,
     /// The b-threads that requested it, remote ones as `node#bthread`.
     pub requested_by: Vec<Arc<str>>,
+    /// Why this event and no other, as its home tells it.
+    pub choice: Option<Arc<str>>,
     /// When, on this node's clock.
     pub at: Duration,
 }
@@ -431,6 +436,26 @@ impl Node {
         let names: BTreeSet<&Arc<str>> = requesters.chain(others).collect();
         let remote = names.into_iter().filter_map(|name| self.table.party(name, self.now)).collect();
         NodeExplanation { local, remote }
+    }
+
+    /// Every bid on this node's table now.
+    #[must_use]
+    pub fn board(&self) -> Board {
+        let blockers = |event: &Event| match self.home_of(event) {
+            Home::Here | Home::Local => self.program.blockers(event).map(Into::into).collect(),
+            Home::Elsewhere(_) | Home::Unroutable => Vec::new(),
+        };
+        let own = self.program.bids().map(|(bthread, bid, _)| BoardRow::new(bthread, bid, blockers));
+        let remote = self.program.proxies().map(|(name, bid)| {
+            let mut row = BoardRow::new(name, bid, blockers);
+            if let Some(party) = self.table.party(name, self.now) {
+                row.blocks = self.table.asked_block(name).cloned().unwrap_or_default();
+                row.lease = Some(BoardLease { age: party.lease_age, length: party.lease });
+            }
+            row
+        });
+        let rows = own.chain(remote.filter(|row| !(row.requests.is_empty() && row.blocks.is_none())));
+        Board::new(self.config.name.clone(), self.config.incarnation, self.now, rows.collect())
     }
 
     fn home_of(&self, event: &Event) -> Home {

@@ -190,6 +190,7 @@ mod tests {
             event: Event::new("uav/1/x"),
             requests_served: vec![],
             requested_by: vec![],
+            choice: None,
             at: Duration::ZERO,
         }
     }

@@ -117,6 +117,8 @@ struct TakenBid {
     sync: u64,
     requests: Vec<Event>,
     block: EventSet,
+    /// The block as it was asked for, of which this home honours its own part.
+    asked_block: EventSet,
     priority: Option<i32>,
     /// Whether the requests may still be served.
     open: bool,
@@ -146,7 +148,8 @@ impl BidTable {
         for KeptBlock { node, incarnation, bthread, sync, block } in kept {
             let bidder = bidders.entry(node).or_default();
             bidder.incarnation = incarnation;
-            bidder.bids.insert(bthread, TakenBid { sync, block, ..TakenBid::kept() });
+            let asked_block = block.clone();
+            bidder.bids.insert(bthread, TakenBid { sync, block, asked_block, ..TakenBid::kept() });
         }
         let nothing = BTreeMap::new();
         let proxies =
@@ -359,6 +362,13 @@ impl BidTable {
         })
     }
 
+    /// What the b-thread behind a proxy asked to block, if it blocks anything here.
+    pub(crate) fn asked_block(&self, proxy: &str) -> Option<&EventSet> {
+        let (node, bthread) = proxy.split_once('#')?;
+        let bid = self.bidders.get(node)?.bids.get(bthread)?;
+        (!bid.block.is_none()).then_some(&bid.asked_block)
+    }
+
     /// Who stands behind a proxy.
     pub(crate) fn party(&self, proxy: &str, now: Duration) -> Option<RemoteParty> {
         let (node, bthread) = proxy.split_once('#')?;
@@ -452,7 +462,8 @@ impl Rights {
                 .filter(|why| self.mutant != Some(Mutant::G7) || *why != RefusalReason::MayNotRequest)
         };
         let mut reasons: Vec<_> = bid.requests.iter().filter_map(denial).collect();
-        let block = match self.authority.may_block(node, &bid.bthread, &bid.block) {
+        // A b-thread blocks with one set what it wants to block at all homes together.
+        let block = match self.authority.may_block(node, &bid.bthread, &bid.block.about(&self.home)) {
             true => self.honoured_block(bid),
             false => {
                 reasons.push(RefusalReason::MayNotBlock);
@@ -470,7 +481,10 @@ impl Rights {
         let priority =
             bid.priority.map(|priority| priority.max(*self.priority.start()).min(*self.priority.end()));
         let keep = bid.on_loss == OnLoss::Hold && !block.is_none();
-        (Some(TakenBid { sync: bid.sync, requests, block, priority, open, keep, orphaned: false }), reasons)
+        let asked_block = bid.block.clone();
+        let taken =
+            TakenBid { sync: bid.sync, requests, block, asked_block, priority, open, keep, orphaned: false };
+        (Some(taken), reasons)
     }
 
     /// Why `bthread` of `node` may not request `event` from afar, if so.
@@ -504,6 +518,7 @@ impl TakenBid {
             sync: 0,
             requests: Vec::new(),
             block: EventSet::None,
+            asked_block: EventSet::None,
             priority: None,
             open: false,
             keep: true,
@@ -513,7 +528,8 @@ impl TakenBid {
 
     /// What stays of a bid whose holder is lost.
     fn left_over(&self) -> Self {
-        Self { sync: self.sync, block: self.block.clone(), orphaned: self.orphaned, ..Self::kept() }
+        let (block, asked_block) = (self.block.clone(), self.asked_block.clone());
+        Self { sync: self.sync, block, asked_block, orphaned: self.orphaned, ..Self::kept() }
     }
 
     /// The bid of the proxy.

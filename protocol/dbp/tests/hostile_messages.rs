@@ -50,6 +50,7 @@ fn occurrence(home: &str, seq: u64, event: &str) -> Message {
         event,
         requests_served: vec![],
         requested_by: Vec::new(),
+        choice: None,
         at: Duration::ZERO,
     })
 }
@@ -204,7 +205,7 @@ prop_compose! {
             1 => Message::Ack(BidAck {
                 home: a, home_incarnation: incarnation, node: b, incarnation: 3, epoch: n, sent_at: at, latest_seq: far, refused: vec![],
             }),
-            2 => Message::Occurrence(Occurrence { home: a, incarnation, seq: n.max(far / 2), term, event, requests_served: vec![served], requested_by: Vec::new(), at }),
+            2 => Message::Occurrence(Occurrence { home: a, incarnation, seq: n.max(far / 2), term, event, requests_served: vec![served], requested_by: Vec::new(), choice: None, at }),
             3 => Message::Repair(Repair { home: a, incarnation: 3, from_seq: m, to_seq: far, term, requester: b }),
             _ => Message::Presence(Presence { node: a, incarnation, up: at, latest_seq: far, oldest_seq: n, lease_ms,
                 joint: (term > 0).then_some(JointWord { term, decided: n, heard: known.map(Duration::from_secs), asks }),

@@ -85,6 +85,11 @@ pub enum Topic {
         /// Who hosts the world.
         node: NodeName,
     },
+    /// `board/<node>`: what all b-threads bid at a node.
+    Board {
+        /// The node.
+        node: NodeName,
+    },
 }
 
 /// A text that is not one of Skein's keys.
@@ -100,7 +105,7 @@ pub enum KeyError {
     },
     /// The key has another form.
     #[error(
-        "`{given}` is not a key: expected `{ROOT}/<fleet>/<what>/<node>`, `<what>` being bid, ack, occ, repair, presence, state, scan or scene, and a second node where it is for one"
+        "`{given}` is not a key: expected `{ROOT}/<fleet>/<what>/<node>`, `<what>` being bid, ack, occ, repair, presence, state, scan, scene or board, and a second node where it is for one"
     )]
     Form {
         /// The text at fault.
@@ -157,7 +162,8 @@ impl Key {
             | Topic::Presence { node }
             | Topic::State { node }
             | Topic::Scan { sensor: node, .. }
-            | Topic::Scene { node } => node,
+            | Topic::Scene { node }
+            | Topic::Board { node } => node,
         }
     }
 
@@ -170,7 +176,7 @@ impl Key {
             }
             Topic::Occurrence { to, .. } => to.as_ref(),
             Topic::Scan { vehicle, .. } => Some(vehicle),
-            Topic::Presence { .. } | Topic::State { .. } | Topic::Scene { .. } => None,
+            Topic::Presence { .. } | Topic::State { .. } | Topic::Scene { .. } | Topic::Board { .. } => None,
         }
     }
 
@@ -199,6 +205,13 @@ impl Key {
         let to_one = ["bid", "ack", "occ", "repair"].map(|what| format!("{ROOT}/{fleet}/{what}/*/*/{node}"));
         to_all.into_iter().chain(to_one).collect()
     }
+
+    /// The same for a node that also reads the boards of all.
+    #[must_use]
+    pub fn subscriptions_with_boards(fleet: &Fleet, node: &NodeName) -> Vec<String> {
+        let boards = format!("{ROOT}/{fleet}/board/*/*");
+        Self::subscriptions(fleet, node).into_iter().chain([boards]).collect()
+    }
 }
 
 impl fmt::Display for Key {
@@ -212,6 +225,7 @@ impl fmt::Display for Key {
             Topic::State { .. } => "state",
             Topic::Scan { .. } => "scan",
             Topic::Scene { .. } => "scene",
+            Topic::Board { .. } => "board",
         };
         write!(f, "{ROOT}/{}/{what}/{}", self.fleet, self.sender())?;
         self.recipient().map_or(Ok(()), |node| write!(f, "/{node}"))
@@ -241,6 +255,7 @@ impl FromStr for Key {
             ("state", None) => Topic::State { node: sender },
             ("scan", Some(vehicle)) => Topic::Scan { sensor: sender, vehicle },
             ("scene", None) => Topic::Scene { node: sender },
+            ("board", None) => Topic::Board { node: sender },
             _ => return Err(form()),
         };
         Ok(Self { fleet: Fleet::new(fleet)?, topic })
@@ -267,7 +282,8 @@ mod tests {
             Topic::Presence { node: a.clone() },
             Topic::State { node: a.clone() },
             Topic::Scan { sensor: b.clone(), vehicle: a.clone() },
-            Topic::Scene { node: a },
+            Topic::Scene { node: a.clone() },
+            Topic::Board { node: a },
         ];
         let fleet = Fleet::new("demo").unwrap();
         for topic in topics {

@@ -28,6 +28,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod authority;
 mod convert;
 mod decode_error;
 mod key;
@@ -46,6 +47,7 @@ pub mod vocabulary;
 /// The compiled `proto/skein.proto`, a `FileDescriptorSet`: the schema to put beside recorded messages.
 pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/skein.bin"));
 
+pub use authority::{joint_roster, standard_authority};
 pub use decode_error::DecodeError;
 pub use key::{Fleet, Key, KeyError, Topic};
 pub use link::Link;

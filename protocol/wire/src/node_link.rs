@@ -1,9 +1,9 @@
 //! A node coupled to its link.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use skein_dbp::{Kept, Message, Node, NodeError, NodeName, Recipient};
+use skein_dbp::{Board, Kept, Message, Node, NodeError, NodeName, Recipient};
 
 use crate::{DecodeError, Fleet, Key, Link, Payload, State, Store, Topic};
 
@@ -13,7 +13,16 @@ const MOST_PER_PUMP: usize = 4096;
 /// Of how many nodes it is remembered that they speak another version.
 const MOST_SKEWED: usize = 256;
 
-/// A node, its fleet, and what has come in beside the protocol: other vehicles' states.
+/// A node looks this often at its board.
+const BOARD_PERIOD: Duration = Duration::from_millis(200);
+/// A board that has changed is told of no more often than this, unless something is newly blocked or free.
+const BOARD_CHANGED: Duration = Duration::from_millis(600);
+/// A board that has not changed is told of this often, for those who have come since.
+const BOARD_UNCHANGED: Duration = Duration::from_secs(3);
+/// Boards that wait to be taken; of more, the oldest go.
+const MOST_BOARDS: usize = 1024;
+
+/// A node, its fleet, and what has come in beside the protocol: other vehicles' states, and other nodes' boards.
 ///
 /// [`pump`](Self::pump) is the whole loop of a node: take in what has arrived, go on, send what is to be sent. A
 /// message under a key that its sender may not use, or that is no message, is counted and dropped.
@@ -25,6 +34,10 @@ pub struct NodeLink {
     /// What the store has not taken yet.
     unsaved: Option<Kept>,
     states: Vec<State>,
+    /// Other nodes' boards, for who reads them.
+    boards: Option<VecDeque<Board>>,
+    board_due: Duration,
+    told_board: Option<Board>,
     stats: NodeLinkStats,
     skewed: BTreeMap<NodeName, u32>,
 }
@@ -48,14 +61,30 @@ impl NodeLink {
     /// Couples `node` to its fleet.
     #[must_use]
     pub fn new(node: Node, fleet: Fleet) -> Self {
-        let (states, skewed) = (Vec::new(), BTreeMap::new());
-        Self { node, fleet, store: None, unsaved: None, states, stats: NodeLinkStats::default(), skewed }
+        Self {
+            node,
+            fleet,
+            store: None,
+            unsaved: None,
+            states: Vec::new(),
+            boards: None,
+            board_due: Duration::ZERO,
+            told_board: None,
+            stats: NodeLinkStats::default(),
+            skewed: BTreeMap::new(),
+        }
     }
 
     /// Couples a node that is configured to be durable to its fleet and to where it keeps what it promises.
     #[must_use]
     pub fn durable(node: Node, fleet: Fleet, store: Box<dyn Store>) -> Self {
         Self { store: Some(store), ..Self::new(node, fleet) }
+    }
+
+    /// A node that also reads what other nodes have on their boards.
+    #[must_use]
+    pub fn reading_boards(self) -> Self {
+        Self { boards: Some(VecDeque::new()), ..self }
     }
 
     /// Takes in what has arrived, lets the node go on, and sends what it has to say.
@@ -74,6 +103,37 @@ impl NodeLink {
         let key = Key::new(&self.fleet, Topic::State { node: self.node.name().clone() });
         link.put(&key, Payload::State(state.clone()).encode());
         self.stats.sent += 1;
+    }
+
+    /// Tells all what is on this node's board, if that is due: when it has changed, but at most a few times a second, and
+    /// now and then when it has not. Returns the board if so.
+    pub fn put_board(&mut self, now: Duration, link: &mut dyn Link) -> Option<&Board> {
+        if now < self.board_due {
+            return None;
+        }
+        self.board_due = now + BOARD_PERIOD;
+        let board = self.node.board();
+        let due = self.told_board.as_ref().is_none_or(|told| {
+            let pause = match (board.stalls_as(told), board.repeats(told)) {
+                (false, _) => BOARD_PERIOD,
+                (true, false) => BOARD_CHANGED,
+                (true, true) => BOARD_UNCHANGED,
+            };
+            now >= told.at + pause
+        });
+        if !due {
+            return None;
+        }
+        let key = Key::new(&self.fleet, Topic::Board { node: self.node.name().clone() });
+        link.put(&key, Payload::Board(board.clone()).encode());
+        self.stats.sent += 1;
+        Some(self.told_board.insert(board))
+    }
+
+    /// The boards of other nodes that have arrived since the last call, in order; none unless this node
+    /// [reads them](Self::reading_boards).
+    pub fn take_boards(&mut self) -> Vec<Board> {
+        self.boards.as_mut().map(|boards| boards.drain(..).collect()).unwrap_or_default()
     }
 
     /// The states of other vehicles that have arrived since the last call, in order.
@@ -108,6 +168,9 @@ impl NodeLink {
     pub fn receive(&mut self, now: Duration, link: &mut dyn Link) {
         for (key, payload) in std::iter::from_fn(|| link.poll()).take(MOST_PER_PUMP) {
             self.stats.received += 1;
+            if self.boards.is_none() && matches!(key.topic(), Topic::Board { .. }) {
+                continue;
+            }
             let payload = Payload::decode(&payload);
             self.note_version(key.sender(), &payload);
             match payload {
@@ -115,6 +178,7 @@ impl NodeLink {
                 Ok(payload) if !speaks_for_itself(&key, &payload) => self.stats.forged += 1,
                 Ok(Payload::State(state)) if state.node == *self.node.name() => {}
                 Ok(Payload::State(state)) => self.states.push(state),
+                Ok(Payload::Board(board)) => self.note_board(board),
                 Ok(Payload::Message(message)) => self.node.handle(now, message),
                 // Not for a node: a sensor's and a world's words have listeners of their own.
                 Ok(Payload::Scan(_) | Payload::Scene(_)) => self.stats.forged += 1,
@@ -125,6 +189,14 @@ impl NodeLink {
     /// The nodes whose messages this build cannot read, each with the version it speaks.
     pub fn skewed(&self) -> impl Iterator<Item = (&NodeName, u32)> {
         self.skewed.iter().map(|(node, version)| (node, *version))
+    }
+
+    fn note_board(&mut self, board: Board) {
+        let Some(boards) = self.boards.as_mut().filter(|_| board.node != *self.node.name()) else { return };
+        if boards.len() == MOST_BOARDS {
+            boards.pop_front();
+        }
+        boards.push_back(board);
     }
 
     fn note_version(&mut self, sender: &NodeName, payload: &Result<Payload, DecodeError>) {
@@ -185,6 +257,7 @@ fn topic(node: &NodeName, recipient: Recipient, message: &Message) -> Topic {
 fn speaks_for_itself(key: &Key, payload: &Payload) -> bool {
     match (key.topic(), payload) {
         (Topic::State { node }, Payload::State(state)) => *node == state.node,
+        (Topic::Board { node }, Payload::Board(board)) => *node == board.node,
         (Topic::Bid { from, home }, Payload::Message(Message::Bid(bid))) => {
             *from == bid.node && *home == bid.home
         }

@@ -1,7 +1,7 @@
 //! Messages as bytes, and back.
 
 use prost::Message as _;
-use skein_dbp::Message;
+use skein_dbp::{Board, Message};
 
 use crate::{DecodeError, Scan, Scene, State, proto};
 
@@ -30,6 +30,8 @@ pub enum Payload {
     Scan(Scan),
     /// What stands in a world.
     Scene(Scene),
+    /// What all b-threads bid at a node.
+    Board(Board),
 }
 
 impl Payload {
@@ -46,6 +48,7 @@ impl Payload {
             Self::State(state) => Body::State(state.into()),
             Self::Scan(scan) => Body::Scan(scan.into()),
             Self::Scene(scene) => Body::Scene(scene.into()),
+            Self::Board(board) => Body::Board(board.into()),
         };
         proto::Packet { version: VERSION, body: Some(body) }.encode_to_vec()
     }
@@ -69,6 +72,7 @@ impl Payload {
             Body::State(state) => return Ok(Self::State(state.try_into()?)),
             Body::Scan(scan) => return Ok(Self::Scan(scan.try_into()?)),
             Body::Scene(scene) => return Ok(Self::Scene(scene.try_into()?)),
+            Body::Board(board) => return Ok(Self::Board(board.try_into()?)),
         };
         Ok(Self::Message(message))
     }

@@ -19,6 +19,7 @@ impl TraceEvent {
             requested_by: happened.requested_by.iter().map(|name| name.as_ref().into()).collect(),
             blocked_by: happened.event.text("by").map(Into::into).into_iter().collect(),
             lease_age_ms: None,
+            choice: happened.choice.as_deref().unwrap_or_default().into(),
         }
     }
 }

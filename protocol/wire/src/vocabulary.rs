@@ -31,6 +31,13 @@ pub fn order(node: impl std::fmt::Display, what: &str) -> Event {
     event(node, ORDER).with("what", what)
 }
 
+/// First chunk of the joint events `swarm/<verb>`, which the coordinator decides on for all.
+pub const SWARM: &str = "swarm";
+/// `swarm/launch`: every vehicle takes off now. Those that are not ready block it.
+pub const LAUNCH: &str = "launch";
+/// `swarm/abort`: every vehicle lands where it is.
+pub const ABORT: &str = "abort";
+
 /// Arm, then climb to the take-off height. Requested by the ground, one vehicle after another.
 pub const TAKEOFF: &str = "takeoff";
 /// Fly to a waypoint: data `leg` (int), `x`, `y`, `z`, and whether the vehicle `lands` there.
@@ -57,6 +64,8 @@ pub const ORDER: &str = "order";
 pub const HAND_BACK: &str = "hand_back";
 /// An order is not carried out: data `what`, `why` (texts).
 pub const DECLINED: &str = "declined";
+/// A joint decision is taken to heart: data `what` (text).
+pub const HEEDED: &str = "heeded";
 /// The mission is complete and the vehicle is on the ground.
 pub const COMPLETE: &str = "complete";
 /// The mission ended without reaching its goal: data `why` (text).
@@ -102,12 +111,13 @@ pub const FOUND_AIRBORNE: &str = "found_airborne";
 pub const COMMAND_FAILED: &str = "command_failed";
 
 /// What only the vehicle itself can say or decide: from afar these are neither blocked nor requested (G6).
-pub const OWN: [&str; 27] = [
+pub const OWN: [&str; 28] = [
     HOLD,
     RETURN,
     LAND,
     HAND_BACK,
     DECLINED,
+    HEEDED,
     SLEPT,
     HOMEWARD,
     PLAN,

@@ -75,7 +75,7 @@ prop_compose! {
                 home: a, home_incarnation: incarnation, node: b, incarnation, epoch: n, sent_at: at, latest_seq: m,
                 refused: vec![refusal],
             }),
-            2 => Message::Occurrence(Occurrence { home: a, incarnation, seq: n, term: m, event, requests_served: vec![request], requested_by: vec!["mission".into()], at }),
+            2 => Message::Occurrence(Occurrence { home: a, incarnation, seq: n, term: m, event, requests_served: vec![request], requested_by: vec!["mission".into()], choice: Some("priority 10".into()), at }),
             3 => Message::Repair(Repair { home: a, incarnation, from_seq: n, to_seq: m, term: n, requester: b }),
             _ => Message::Presence(Presence { node: a, incarnation, up: at, latest_seq: n, oldest_seq: m, lease_ms: 1000,
                 joint: known.map(|ns| JointWord { term: n, decided: m, heard: Some(Duration::from_nanos(ns)), asks: incarnation % 2 == 0 }),

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use serde_json::json;
 
+use super::quantile::quantile;
 use crate::cli::Network;
 use crate::operator::Operator;
 use crate::processes::{Processes, Setup};
@@ -34,11 +35,7 @@ pub(super) fn run(vehicles: usize, holds: usize, port_offset: u16, as_json: bool
     let _ = std::fs::remove_dir_all(&folder);
     let mut times_ms = measured?;
     times_ms.sort_by(f64::total_cmp);
-    let at = |share: f64| {
-        let rank = (times_ms.len() as f64 * share).ceil() as usize;
-        times_ms.get(rank.saturating_sub(1)).copied().unwrap_or_default()
-    };
-    let (p50, p99, max) = (at(0.5), at(0.99), at(1.0));
+    let [p50, p99, max] = [0.5, 0.99, 1.0].map(|share| quantile(&times_ms, share));
     if as_json {
         let ack_ms = json!({ "p50": p50, "p99": p99, "max": max });
         println!("{}", json!({ "vehicles": vehicles, "holds": times_ms.len(), "ack_ms": ack_ms }));

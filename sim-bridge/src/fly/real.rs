@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use skein_ground::console::Console;
-use skein_wire::{Fleet, Link};
+use skein_wire::{Fleet, Key, Link};
 use skein_world::STEP;
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohSession};
 
@@ -53,7 +53,8 @@ pub fn fly(
     let vehicle_links = (0..scenario.vehicles.len())
         .map(|index| Ok(Box::new(vehicles.link(&vehicle_name(index))?) as Box<dyn Link>))
         .collect::<anyhow::Result<_>>()?;
-    let links = Links { vehicles: vehicle_links, ground: Box::new(ground.link(&GROUND)?) };
+    let heard = Key::subscriptions_with_boards(&fleet, &GROUND);
+    let links = Links { vehicles: vehicle_links, ground: Box::new(ground.listen(heard)?) };
 
     let console = serve_console(args.console)?;
     table.note(&format!("console: {}", console.url()))?;

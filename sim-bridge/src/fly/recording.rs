@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
+use skein_ground::GroundCore;
 use skein_ground::recorder::{Level, Recorder, RecorderError, Scan};
 use skein_wire::proto::TraceEvent;
 use skein_wire::vocabulary::ADVANCE;
@@ -60,6 +61,7 @@ impl Recording {
         if happenings.ticked {
             self.poses(swarm)?;
             self.events(now, happenings)?;
+            self.told(now, swarm.ground())?;
         }
         if now >= self.paths_due {
             self.paths_due = now + PATH_PERIOD;
@@ -91,6 +93,14 @@ impl Recording {
             }
         }
         Ok(())
+    }
+
+    /// What the vehicles have told the ground station of themselves.
+    fn told(&mut self, now: Duration, station: &GroundCore) -> Result<(), RecorderError> {
+        for state in station.roster().filter_map(|(_, state)| state) {
+            self.recorder.state(now, state)?;
+        }
+        station.boards().try_for_each(|board| self.recorder.board(now, board))
     }
 
     /// Completes the file.

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{AgentConfig, Controller, Envelope, Fence};
-use skein_dbp::NodeName;
+use skein_dbp::{Kept, NodeName};
 use skein_ground::{GroundConfig, Order, Who};
-use skein_wire::Fleet;
+use skein_wire::{Fleet, standard_authority};
 use skein_world::{SimulationConfig, VehicleSetup};
 
 use crate::cli;
@@ -104,6 +104,8 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
                 cli::Controller::None => Controller::None,
             },
             lease: LEASE,
+            authority: standard_authority(),
+            kept: Kept::default(),
             seed: scenario.seed.wrapping_mul(1000).wrapping_add(index as u64),
         })
         .collect()
@@ -131,6 +133,8 @@ pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Control
             OrderKind::Resume => Order::Resume(who),
             OrderKind::Land => Order::Land(who),
             OrderKind::Return => Order::Return(who),
+            OrderKind::LaunchTogether => Order::LaunchTogether,
+            OrderKind::Abort => Order::Abort,
         };
         (Duration::from_secs_f64(said.at_s), order)
     });
@@ -138,7 +142,9 @@ pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Control
     GroundConfig {
         orders: orders.collect(),
         loaded: controller == cli::Controller::Bp,
+        launch_on_order: scenario.orders.iter().any(|said| said.order == OrderKind::LaunchTogether),
         muster: swaps_places(scenario),
+        operators: NodeName::new(SCRIPT).into_iter().collect(),
         lease: LEASE,
         seed: scenario.seed,
         ..GroundConfig::new(fleet, GROUND.clone(), vehicles)

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use skein_agent::{AgentConfig, AgentCore, AgentError, Outcome, Scan};
 use skein_dbp::{Happened, NodeName};
 use skein_ground::{GroundConfig, GroundCore, Order, UnknownVehicle};
-use skein_wire::Link;
+use skein_wire::{Link, MemoryStore};
 use skein_world::{LidarScan, Simulation, Truth};
 
 use super::{plan_times::PlanTimes, report::Account, trace_hash::TraceHash};
@@ -60,12 +60,14 @@ impl Swarm {
         let vehicles = agents
             .into_iter()
             .zip(links.vehicles)
-            .map(|(config, link)| Ok(Vehicle { agent: AgentCore::new(config)?, link }))
+            .map(|(config, link)| {
+                Ok(Vehicle { agent: AgentCore::durable(config, Box::new(MemoryStore::default()))?, link })
+            })
             .collect::<Result<_, AgentError>>()?;
         Ok(Self {
             simulation,
             vehicles,
-            ground: GroundCore::new(ground),
+            ground: GroundCore::durable(ground, Box::new(MemoryStore::default())),
             plan_times: PlanTimes::default(),
             ground_link: links.ground,
             steps: 0,

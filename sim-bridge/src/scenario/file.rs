@@ -415,6 +415,11 @@ impl ScenarioFile {
 
     fn orders(&self, vehicles: usize) -> Result<Vec<Order>, ScenarioError> {
         let order = |(i, table): (usize, &OrderTable)| {
+            let joint = matches!(table.order, OrderKind::LaunchTogether | OrderKind::Abort);
+            if joint && table.vehicle.is_some() {
+                let message = "expected none: what is decided together is for the whole swarm";
+                return Err(self.contradiction(format!("order[{i}].vehicle"), message));
+            }
             let who = match table.vehicle {
                 None => Who::All,
                 Some(number) if (1..=vehicles).contains(&number) => Who::Vehicle(number),

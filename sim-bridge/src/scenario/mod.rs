@@ -128,8 +128,12 @@ pub struct Order {
 
 /// What an operator can say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
 pub enum OrderKind {
+    /// Take off together, instead of one after another as soon as all are there.
+    LaunchTogether,
+    /// Land together.
+    Abort,
     /// Stop and hover.
     Hold,
     /// Go on after a hold.

@@ -198,6 +198,17 @@ fn led(bound: f64, speed: f64) -> f64 {
     if bound > 0.0 && speed > bound { (2.0 * bound - speed).max(0.0) } else { bound }
 }
 
+/// The distance that a vehicle whose position has the standard deviation `sigma_m` keeps from a neighbour, centre to
+/// centre, metres: it grows with both errors, with the size of the neighbour, and with its silence.
+#[must_use]
+pub fn distance_kept_m(sigma_m: f64, neighbour: &Neighbour, config: &FilterConfig) -> f64 {
+    let silent_s = (neighbour.age_s - config.fresh_s).max(0.0);
+    let ghost = (config.ghost_growth_m_s * silent_s).min(config.ghost_max_m);
+    let error = (sigma_m * sigma_m + neighbour.sigma_m * neighbour.sigma_m).sqrt();
+    let larger = (neighbour.radius_m - config.hull_radius_m).max(0.0);
+    config.separation_m + config.sigmas * error + ghost + larger
+}
+
 fn neighbour_limit(motion: &Motion, neighbour: &Neighbour, config: &FilterConfig) -> Limit {
     let offset = neighbour.predicted() - motion.position;
     let stretch = config.vertical_stretch.max(1.0);
@@ -211,10 +222,7 @@ fn neighbour_limit(motion: &Motion, neighbour: &Neighbour, config: &FilterConfig
     let steepness = gradient.norm();
 
     let silent_s = (neighbour.age_s - config.fresh_s).max(0.0);
-    let ghost = (config.ghost_growth_m_s * silent_s).min(config.ghost_max_m);
-    let error = (motion.sigma_m * motion.sigma_m + neighbour.sigma_m * neighbour.sigma_m).sqrt();
-    let larger = (neighbour.radius_m - config.hull_radius_m).max(0.0);
-    let gap = distance - (config.separation_m + config.sigmas * error + ghost + larger);
+    let gap = distance - distance_kept_m(motion.sigma_m, neighbour, config);
 
     let its_speed = gradient.dot(&neighbour.velocity);
     let bound = if neighbour.cooperative && silent_s == 0.0 {

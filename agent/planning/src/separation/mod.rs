@@ -5,6 +5,6 @@ mod halfspace;
 mod neighbour;
 mod repulsion;
 
-pub use filter::{Cause, FilterConfig, Filtered, Motion, Outcome, filter};
+pub use filter::{Cause, FilterConfig, Filtered, Motion, Outcome, distance_kept_m, filter};
 pub use neighbour::Neighbour;
 pub use repulsion::{RepulsionConfig, repulsion};

@@ -7,8 +7,9 @@ use anyhow::{Context as _, ensure};
 use serde::Deserialize;
 use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{AgentConfig, Controller, Envelope, Fence};
+use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
-use skein_wire::NodeName;
+use skein_wire::{NodeName, standard_authority};
 use skein_zenoh::NetworkSettings;
 
 use crate::autopilot_link::Address;
@@ -52,6 +53,7 @@ struct File {
     #[serde(default)]
     envelope: EnvelopeTable,
     network: NetworkSettings,
+    authority: Option<Authority>,
 }
 
 #[derive(Deserialize)]
@@ -191,6 +193,8 @@ impl File {
             },
             controller: Controller::Bp,
             lease: Duration::from_millis(self.lease_ms),
+            authority: self.authority.unwrap_or_else(standard_authority),
+            kept: Kept::default(),
             seed: self.seed,
         };
         let network = self.network.relative_to(folder);

@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use skein_agent::{AgentCore, Scan};
 use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
 use skein_wire::{Fleet, Key, Link as _, Payload, Topic};
-use skein_zenoh::{Bell, Complaints, ZenohConfig, ZenohLink, ZenohSession, next_incarnation};
+use skein_zenoh::{Bell, Complaints, FileStore, ZenohConfig, ZenohLink, ZenohSession, next_incarnation};
 
 use crate::autopilot_link::AutopilotLink;
 use crate::config::{Config, LidarSource};
@@ -65,6 +65,8 @@ struct Driver {
 impl Driver {
     fn open(mut config: Config) -> anyhow::Result<Self> {
         config.agent.incarnation = next_incarnation(&config.state, &config.name)?;
+        let (store, kept) = FileStore::open(&config.state, &config.name)?;
+        config.agent.kept = kept;
         let fleet = Fleet::new(&config.agent.fleet).context("`fleet`")?;
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
         let link = session.link(&config.name)?;
@@ -82,7 +84,7 @@ impl Driver {
             config.autopilot
         );
         Ok(Self {
-            core: AgentCore::new(config.agent)?,
+            core: AgentCore::durable(config.agent, Box::new(store))?,
             autopilot: AutopilotLink::new(config.autopilot),
             bell: link.bell(),
             link,

@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use serde::Deserialize;
-use skein_dbp::NodeName;
+use skein_dbp::{Authority, NodeName};
 use skein_ground::GroundConfig;
-use skein_wire::Fleet;
+use skein_wire::{Fleet, standard_authority};
 use skein_zenoh::NetworkSettings;
 
 /// Everything that the station must know, checked.
@@ -26,6 +26,8 @@ struct File {
     fleet: String,
     node: String,
     vehicles: Vec<String>,
+    #[serde(default = "operators")]
+    operators: Vec<String>,
     launch: Launch,
     #[serde(default)]
     muster: bool,
@@ -38,6 +40,7 @@ struct File {
     #[serde(default = "lease_ms")]
     lease_ms: u64,
     network: NetworkSettings,
+    authority: Option<Authority>,
 }
 
 #[derive(Deserialize, PartialEq)]
@@ -45,6 +48,10 @@ struct File {
 enum Launch {
     AtStart,
     OnOrder,
+}
+
+fn operators() -> Vec<String> {
+    vec!["script/operator".into()]
 }
 
 fn console() -> SocketAddr {
@@ -79,6 +86,8 @@ impl File {
         let vehicles =
             self.vehicles.iter().map(|vehicle| name("vehicles", vehicle)).collect::<Result<Vec<_>, _>>()?;
         anyhow::ensure!(!vehicles.is_empty(), "`vehicles` is empty: name at least one, such as \"uav/1\"");
+        let operators = self.operators.iter().map(|operator| name("operators", operator));
+        let operators = operators.collect::<Result<Vec<_>, _>>()?;
         let node = name("node", &self.node)?;
         anyhow::ensure!(!vehicles.contains(&node), "`vehicles` holds the station's own name, {node}");
         anyhow::ensure!(
@@ -90,7 +99,9 @@ impl File {
         let station = GroundConfig {
             launch_on_order: self.launch == Launch::OnOrder,
             muster: self.muster,
+            operators,
             lease: Duration::from_millis(self.lease_ms),
+            authority: self.authority.unwrap_or_else(standard_authority),
             ..GroundConfig::new(fleet, node, vehicles)
         };
         Ok(Config {
@@ -128,6 +139,8 @@ mod tests {
         assert_eq!(full.network.mode, config.network.mode);
         assert!(full.network.security.is_some());
         assert_eq!(full.station.lease, config.station.lease);
+        assert_eq!(full.station.operators, config.station.operators);
+        assert_eq!(full.station.authority, config.station.authority);
     }
 
     #[test]

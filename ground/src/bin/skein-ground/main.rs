@@ -1,10 +1,11 @@
 //! `skein-ground`: see `skein-ground --help`.
 
 mod config;
+mod explain;
 mod recording;
 mod serve;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -15,7 +16,7 @@ use serde_json::json;
 #[command(
     name = "skein-ground",
     version,
-    after_help = "Exit codes: 0 done, 1 the mission failed, 2 wrong usage or input."
+    after_help = "Exit codes: 0 done, 1 the mission failed or nothing can be explained, 2 wrong usage or input."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -36,6 +37,20 @@ enum Command {
         #[arg(long)]
         until_over: bool,
     },
+    /// Say why vehicles did what they did, or stood still, in a recorded mission: who requests, who blocks, and what would
+    /// have to change.
+    Explain {
+        /// The recording, such as mission.mcap.
+        file: PathBuf,
+        /// The moment, in seconds of the mission's time; counted back from the recording's end if negative. The end unless
+        /// given.
+        #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+        at: Option<f64>,
+        /// The vehicle: its number or its name, such as 3 or uav/3. Unless given, all: a line each, and more of those that
+        /// stand still.
+        #[arg(long, value_name = "VEHICLE")]
+        vehicle: Option<String>,
+    },
 }
 
 fn main() -> ExitCode {
@@ -49,18 +64,12 @@ fn main() -> ExitCode {
         )
         .init();
     let cli = Cli::parse();
-    let Command::Serve { config, until_over } = &cli.command;
-    match config::Config::read(config).and_then(|config| serve::run(config, *until_over)) {
-        Ok(outcome) => {
-            let failed = outcome.as_ref().map(|outcome| outcome.failed.clone()).unwrap_or_default();
-            if cli.json {
-                println!(
-                    "{}",
-                    json!({ "over": outcome.is_some(), "succeeded": outcome.is_some() && failed.is_empty(), "failed": failed })
-                );
-            }
-            ExitCode::from(u8::from(!failed.is_empty()))
-        }
+    let outcome = match &cli.command {
+        Command::Serve { config, until_over } => serve(config, *until_over, cli.json),
+        Command::Explain { file, at, vehicle } => explain::run(file, *at, vehicle.as_deref(), cli.json),
+    };
+    match outcome {
+        Ok(code) => code,
         Err(error) => {
             let message = format!("{error:#}");
             if cli.json {
@@ -70,4 +79,16 @@ fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+fn serve(config: &Path, until_over: bool, json: bool) -> anyhow::Result<ExitCode> {
+    let outcome = serve::run(config::Config::read(config)?, until_over)?;
+    let failed = outcome.as_ref().map(|outcome| outcome.failed.clone()).unwrap_or_default();
+    if json {
+        println!(
+            "{}",
+            json!({ "over": outcome.is_some(), "succeeded": outcome.is_some() && failed.is_empty(), "failed": failed })
+        );
+    }
+    Ok(ExitCode::from(u8::from(!failed.is_empty())))
 }

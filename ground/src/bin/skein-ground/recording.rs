@@ -60,6 +60,12 @@ impl Recording {
                 heard.iter().map(|state| (state.node.as_str(), state.radius_m)).collect();
             self.write(|recorder| recorder.vehicles(now, &hulls));
         }
+        for state in &heard {
+            self.write(|recorder| recorder.state(now, state));
+        }
+        for board in station.boards() {
+            self.write(|recorder| recorder.board(now, board));
+        }
         let poses: Vec<_> = heard.iter().map(|state| (state.node.as_str(), pose(state))).collect();
         self.write(|recorder| recorder.poses(now, &poses));
         if now >= self.paths_due {

@@ -9,7 +9,7 @@ use skein_ground::console::Console;
 use skein_ground::recorder::Level;
 use skein_ground::{GroundCore, MissionOutcome};
 use skein_wire::{Key, Payload, Scene};
-use skein_zenoh::{Complaints, ZenohConfig, ZenohLink, ZenohSession, next_incarnation};
+use skein_zenoh::{Complaints, FileStore, ZenohConfig, ZenohLink, ZenohSession, next_incarnation};
 
 use crate::config::Config;
 use crate::recording::Recording;
@@ -56,9 +56,11 @@ impl Station {
     fn open(mut config: Config, stopping: &Arc<AtomicBool>) -> anyhow::Result<Self> {
         let recording = Recording::create(&config.record)?;
         config.station.incarnation = next_incarnation(&config.state, &config.station.name)?;
+        let (store, kept) = FileStore::open(&config.state, &config.station.name)?;
+        config.station.kept = kept;
         let fleet = config.station.fleet.clone();
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
-        let link = session.link(&config.station.name)?;
+        let link = session.listen(Key::subscriptions_with_boards(&fleet, &config.station.name))?;
         let scenes = session.listen(vec![Key::scenes(&fleet)])?;
         let bell = link.bell();
         let mut console = Console::serve(config.console, {
@@ -81,7 +83,7 @@ impl Station {
             config.station.vehicles.len()
         );
         tracing::info!("console: {}", console.url());
-        let core = GroundCore::new(config.station);
+        let core = GroundCore::durable(config.station, Box::new(store));
         console.show_scene(&core, None);
         let complaints = Complaints::default();
         Ok(Self { core, link, scenes, scene: None, recording, console, complaints, began: Instant::now() })

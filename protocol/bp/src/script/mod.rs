@@ -119,9 +119,8 @@ impl Script {
 
     /// Runs to the next sync or the end. `last` is the event that ended the last sync.
     fn run(&mut self, last: Option<&Event>, cx: &mut Context) {
-        let code = self.code.clone();
         for _ in 0..OPS_BETWEEN_SYNCS {
-            let Some(step) = code.steps.get(self.at) else { return self.end() };
+            let Some(step) = self.code.steps.get(self.at) else { return self.end() };
             let here = self.at;
             self.at += 1;
             match step {

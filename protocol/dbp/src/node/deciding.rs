@@ -44,6 +44,7 @@ impl Node {
             event,
             requests_served: Vec::new(),
             requested_by: Vec::new(),
+            choice: None,
             at: self.now,
         }
     }
@@ -190,8 +191,13 @@ impl Node {
     pub(super) fn tell_step(&mut self) {
         let Some(joint) = &mut self.joint else { return };
         if joint.comes_into_step() {
-            let (term, decided) = (joint.term(), joint.decided());
-            self.fact(facts::IN_STEP, |fact| fact.with("term", count(term)).with("decided", count(decided)));
+            let (term, decided, coordinator) =
+                (joint.term(), joint.decided(), joint.roster.coordinator.clone());
+            self.fact(facts::IN_STEP, |fact| {
+                fact.with("term", count(term))
+                    .with("decided", count(decided))
+                    .with("coordinator", coordinator.as_str())
+            });
         }
     }
 }

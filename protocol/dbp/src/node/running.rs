@@ -1,10 +1,12 @@
 //! Going on: what has lapsed, what has happened elsewhere, and what the program selects.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Duration;
 
-use skein_bp::{Origin, Selection};
+use skein_bp::{Origin, Rival, Selection};
 
+use crate::board::shorten;
 use crate::facts::{self, tell};
 use crate::held_blocks::BlockNews;
 use crate::node::{Delivery, Happened, Home, MOST_ROUNDS, Node, NodeError, RESTART_GUARD, confirmation};
@@ -131,7 +133,7 @@ impl Node {
 
     /// Tells the program what it cannot change any more.
     fn learn(&mut self, occurrence: Occurrence) -> Result<(), NodeError> {
-        let Occurrence { home, seq, term, event, requested_by, .. } = occurrence;
+        let Occurrence { home, seq, term, event, requested_by, choice, .. } = occurrence;
         self.program.occurred(event.clone());
         self.program.step(self.now)?;
         self.stalls_due = true;
@@ -142,6 +144,7 @@ impl Node {
             term,
             origin: Origin::Occurred,
             requested_by,
+            choice,
             at: self.now,
         });
         Ok(())
@@ -149,6 +152,7 @@ impl Node {
 
     /// Numbers what was selected here and tells it to all.
     fn publish(&mut self, selection: Selection) {
+        let choice = choice(&selection);
         let Selection { event, origin, requested_by, .. } = selection;
         let (served, proxies) = self.table.serve(&requested_by);
         self.stalls_due = true;
@@ -169,6 +173,7 @@ impl Node {
                 event: event.clone(),
                 requests_served: served,
                 requested_by: requested_by.clone(),
+                choice: choice.clone(),
                 at: self.now,
             };
             history.push(occurrence.clone());
@@ -181,6 +186,7 @@ impl Node {
             term,
             origin,
             requested_by,
+            choice,
             at: self.now,
         });
         if term > 0 {
@@ -238,4 +244,14 @@ impl Node {
             }
         }
     }
+}
+
+/// Why this event and no other.
+fn choice(selection: &Selection) -> Option<Arc<str>> {
+    let priority = selection.priority.map(|priority| format!("priority {priority}"));
+    let rivals: Vec<String> = selection.rivals.iter().map(Rival::to_string).collect();
+    let over = (!rivals.is_empty()).then(|| format!("over {}", rivals.join(", ")));
+    let mut choice = priority.into_iter().chain(over).collect::<Vec<_>>().join(", ");
+    shorten(&mut choice);
+    (!choice.is_empty()).then(|| choice.into())
 }

@@ -1,0 +1,163 @@
+//! What is known of the swarm at a moment.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::Duration;
+
+use skein_bp::Event;
+use skein_dbp::{Board, Happened, NodeName};
+use skein_wire::proto::{self, TraceEvent};
+use skein_wire::vocabulary::{ADVANCE, ENTER, GOTO, HOMEWARD, PLAN, TAKEOFF};
+use skein_wire::{DecodeError, State};
+
+use super::party::Party;
+use super::stillness::Stillness;
+
+/// How many of a vehicle's latest events are remembered.
+const EVENTS_KEPT: usize = 4;
+/// Of how many b-threads of a node it is remembered that they ask for movement: quotas of the bids allow no more names.
+const MOST_MOVERS: usize = 64;
+/// What a vehicle's movement is made of, take-off apart.
+const MOVES: [&str; 5] = [GOTO, PLAN, ADVANCE, HOMEWARD, ENTER];
+
+/// What has been heard up to a moment: feed it in the order in which it was heard.
+#[derive(Clone, Debug, Default)]
+pub struct Evidence {
+    vehicles: BTreeMap<NodeName, Vehicle>,
+    boards: BTreeMap<NodeName, Noted<Board>>,
+    /// Who has requested a take-off, of any vehicle.
+    launchers: BTreeSet<Party>,
+}
+
+/// Something and when it was heard, on the listener's clock.
+#[derive(Clone, Debug)]
+pub(super) struct Noted<T> {
+    pub(super) at: Duration,
+    pub(super) what: T,
+}
+
+/// What is known of one vehicle.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Vehicle {
+    pub(super) state: Option<Noted<State>>,
+    pub(super) stillness: Stillness,
+    /// Oldest first, without leaves to move.
+    events: VecDeque<Occurred>,
+    /// The latest leave to move.
+    leave: Option<Occurred>,
+    /// Its b-threads that have asked for a move.
+    pub(super) movers: BTreeSet<String>,
+}
+
+/// An event that has happened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Occurred {
+    /// When, on the listener's clock.
+    pub at: Duration,
+    /// Where.
+    pub home: NodeName,
+    /// What.
+    pub event: Event,
+    /// Who requested it, as its home names them.
+    pub requested_by: Vec<String>,
+    /// Why this event and no other, as its home tells it.
+    pub choice: Option<String>,
+}
+
+impl From<&Happened> for Occurred {
+    fn from(happened: &Happened) -> Self {
+        Self {
+            at: happened.at,
+            home: happened.home.clone(),
+            event: happened.event.clone(),
+            requested_by: happened.requested_by.iter().map(|name| name.as_ref().into()).collect(),
+            choice: happened.choice.as_deref().map(Into::into),
+        }
+    }
+}
+
+impl TryFrom<TraceEvent> for Occurred {
+    type Error = DecodeError;
+
+    fn try_from(trace: TraceEvent) -> Result<Self, DecodeError> {
+        let home = NodeName::new(&trace.home)
+            .map_err(|source| DecodeError::Name { field: "TraceEvent.home", source })?;
+        Ok(Self {
+            at: Duration::from_nanos(trace.time_ns),
+            home,
+            event: proto::Event { name: trace.event, data: trace.data }.try_into()?,
+            requested_by: trace.requested_by,
+            choice: Some(trace.choice).filter(|choice| !choice.is_empty()),
+        })
+    }
+}
+
+impl Evidence {
+    /// There is a vehicle of this name, heard or not.
+    pub fn note_vehicle(&mut self, vehicle: &NodeName) {
+        self.vehicles.entry(vehicle.clone()).or_default();
+    }
+
+    /// A vehicle has told its state.
+    pub fn note_state(&mut self, now: Duration, state: &State) {
+        let vehicle = self.vehicles.entry(state.node.clone()).or_default();
+        vehicle.stillness.note(now, &state.position);
+        vehicle.state = Some(Noted { at: now, what: state.clone() });
+    }
+
+    /// A node has told what is on its board.
+    pub fn note_board(&mut self, now: Duration, board: Board) {
+        self.boards.insert(board.node.clone(), Noted { at: now, what: board });
+    }
+
+    /// Something has happened.
+    pub fn note_event(&mut self, occurred: Occurred) {
+        let requested_by = || occurred.requested_by.iter().map(|name| Party::read(&occurred.home, name));
+        if occurred.event.kind() == TAKEOFF && self.launchers.len() < MOST_MOVERS {
+            self.launchers.extend(requested_by());
+        }
+        let Some(vehicle) = self.vehicles.get_mut(&occurred.home) else { return };
+        if MOVES.contains(&occurred.event.kind()) && vehicle.movers.len() < MOST_MOVERS {
+            let own = requested_by().filter(|party| party.node == occurred.home);
+            vehicle.movers.extend(own.map(|party| party.bthread));
+        }
+        if matches!(occurred.event.kind(), ADVANCE | HOMEWARD) {
+            vehicle.leave = Some(occurred);
+            return;
+        }
+        if vehicle.events.len() == EVENTS_KEPT {
+            vehicle.events.pop_front();
+        }
+        vehicle.events.push_back(occurred);
+    }
+
+    /// All vehicles.
+    pub fn vehicles(&self) -> impl Iterator<Item = &NodeName> {
+        self.vehicles.keys()
+    }
+
+    /// The newest board of each node.
+    pub fn boards(&self) -> impl Iterator<Item = &Board> {
+        self.boards.values().map(|noted| &noted.what)
+    }
+
+    pub(super) fn vehicle(&self, name: &NodeName) -> Option<&Vehicle> {
+        self.vehicles.get(name)
+    }
+
+    pub(super) fn board(&self, node: &NodeName) -> Option<&Noted<Board>> {
+        self.boards.get(node)
+    }
+
+    pub(super) fn launchers(&self) -> impl Iterator<Item = &Party> {
+        self.launchers.iter()
+    }
+}
+
+impl Vehicle {
+    /// Newest first; of the leaves to move the latest only.
+    pub(super) fn latest_events(&self) -> impl Iterator<Item = &Occurred> {
+        let mut events: Vec<&Occurred> = self.events.iter().chain(&self.leave).collect();
+        events.sort_by_key(|occurred| occurred.at);
+        events.into_iter().rev().take(EVENTS_KEPT)
+    }
+}

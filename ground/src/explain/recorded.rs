@@ -1,0 +1,149 @@
+//! A recording, read for what it can explain.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use mcap::McapError;
+use prost::Message as _;
+use skein_dbp::Board;
+use skein_wire::proto::{self, TraceEvent};
+use skein_wire::{DecodeError, State};
+
+use super::{Evidence, Occurred};
+
+/// Why a recording cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordedError {
+    /// The file cannot be opened.
+    #[error("{}: {source}", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is no MCAP file, or nothing of it can be read.
+    #[error("{} is no recording that can be read: {source}; expected an MCAP file such as mission.mcap", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: McapError,
+    },
+    /// A message of Skein's is none.
+    #[error("{}: a message on {topic} at {at_s:.3} s cannot be read: {source}", path.display())]
+    Message {
+        /// The file.
+        path: PathBuf,
+        /// Its topic.
+        topic: String,
+        /// When it was recorded, seconds since the run began.
+        at_s: f64,
+        /// Why.
+        source: DecodeError,
+    },
+}
+
+/// What a recording holds about who requests, blocks and waits, and about the vehicles. Times are the run's, from 0.
+pub struct Recorded {
+    notes: Vec<(Duration, Note)>,
+    span: (Duration, Duration),
+    complete: bool,
+}
+
+enum Note {
+    State(State),
+    Board(Board),
+    Event(Occurred),
+}
+
+impl Recorded {
+    /// Reads a recording. One that was cut short counts as far as it goes.
+    ///
+    /// # Errors
+    /// [`RecordedError`] names the file and what is wrong with it.
+    pub fn open(path: &Path) -> Result<Self, RecordedError> {
+        let file =
+            std::fs::read(path).map_err(|source| RecordedError::Open { path: path.to_owned(), source })?;
+        let unreadable = |source| RecordedError::Unreadable { path: path.to_owned(), source };
+        let options = mcap::read::Options::IgnoreEndMagic.into();
+        let stream = mcap::MessageStream::new_with_options(&file, options).map_err(unreadable)?;
+        let mut recorded = Self {
+            notes: Vec::new(),
+            span: (Duration::MAX, Duration::ZERO),
+            complete: file.ends_with(mcap::MAGIC),
+        };
+        for message in stream {
+            let message = match message {
+                Ok(message) => message,
+                // What follows was not written any more.
+                Err(_) if recorded.is_begun() => {
+                    recorded.complete = false;
+                    break;
+                }
+                Err(source) => return Err(unreadable(source)),
+            };
+            let at = Duration::from_nanos(message.log_time);
+            recorded.span = (recorded.span.0.min(at), recorded.span.1.max(at));
+            let note = note(&message).map_err(|source| RecordedError::Message {
+                path: path.to_owned(),
+                topic: message.channel.topic.clone(),
+                at_s: at.as_secs_f64(),
+                source,
+            })?;
+            recorded.notes.extend(note.map(|note| (at, note)));
+        }
+        Ok(recorded)
+    }
+
+    fn is_begun(&self) -> bool {
+        self.span.0 <= self.span.1
+    }
+
+    /// The times of its first and last message; none if it holds none.
+    #[must_use]
+    pub fn span(&self) -> Option<(Duration, Duration)> {
+        self.is_begun().then_some(self.span)
+    }
+
+    /// Whether it was brought to its end, and not cut short.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.complete
+    }
+
+    /// Whether it tells what b-threads bid; recordings of earlier versions do not.
+    #[must_use]
+    pub fn has_boards(&self) -> bool {
+        self.notes.iter().any(|(_, note)| matches!(note, Note::Board(_)))
+    }
+
+    /// What was known at a time.
+    #[must_use]
+    pub fn evidence_at(&self, at: Duration) -> Evidence {
+        let mut evidence = Evidence::default();
+        for (_, note) in &self.notes {
+            if let Note::State(state) = note {
+                evidence.note_vehicle(&state.node);
+            }
+        }
+        for (when, note) in self.notes.iter().take_while(|(when, _)| *when <= at) {
+            match note {
+                Note::State(state) => evidence.note_state(*when, state),
+                Note::Board(board) => evidence.note_board(*when, board.clone()),
+                Note::Event(occurred) => evidence.note_event(occurred.clone()),
+            }
+        }
+        evidence
+    }
+}
+
+fn note(message: &mcap::Message<'_>) -> Result<Option<Note>, DecodeError> {
+    let schema = message.channel.schema.as_ref().map(|schema| schema.name.as_str());
+    Ok(match schema {
+        Some("skein.State") => Some(Note::State(proto::State::decode(&*message.data)?.try_into()?)),
+        Some("skein.Board") => Some(Note::Board(proto::Board::decode(&*message.data)?.try_into()?)),
+        Some("skein.TraceEvent") => Some(Note::Event(TraceEvent::decode(&*message.data)?.try_into()?)),
+        _ => None,
+    })
+}

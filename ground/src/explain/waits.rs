@@ -1,0 +1,106 @@
+//! What a b-thread waits for, in words.
+
+use skein_bp::{Event, EventSet};
+use skein_dbp::{NodeName, facts, first_two_chunks};
+use skein_wire::vocabulary::{self, HAND_BACK, ORDER};
+
+use crate::order::{ALL, ORDERED, ordered_event};
+
+/// Alternatives that are told one by one.
+const MOST_TOLD: usize = 6;
+/// What an operator may say to free a b-thread, as the events and the console's buttons name it.
+const ORDERS: [(&str, &str); 6] = [
+    ("resume", "Resume"),
+    ("return", "Return"),
+    ("land", "Land"),
+    ("goto", "Go to"),
+    ("launch", "Launch"),
+    ("hand_back", "Hand back"),
+];
+/// An order that many wait for, and that frees nobody.
+const HOLD: &str = "hold";
+
+/// What has to happen for a b-thread that waits for `set` to go on; nobody requests any of it.
+pub(super) fn in_words(set: &EventSet, vehicle: &NodeName) -> Vec<String> {
+    let mut alternatives = Vec::new();
+    split(set, &mut alternatives);
+    let (mut orders, mut others, mut confirmations) = (Vec::new(), Vec::new(), Vec::new());
+    for alternative in alternatives {
+        let heard = orders_in(alternative, vehicle);
+        if heard.is_empty() {
+            match confirmed_at(alternative) {
+                Some(node) => confirmations.push(node),
+                None => others.push(format!("`{alternative}`")),
+            }
+        }
+        orders.extend(heard);
+    }
+    let mut words = Vec::new();
+    let names = ORDERS.iter().filter(|(what, _)| orders.contains(what)).map(|(_, name)| *name);
+    let names: Vec<&str> = names.collect();
+    if !names.is_empty() {
+        words.push(format!("the operator orders {}", either(&names)));
+    }
+    words.extend(confirmations.iter().map(|node| format!("every node confirms the block of {node}")));
+    let more = others.len().saturating_sub(MOST_TOLD);
+    others.truncate(MOST_TOLD);
+    if more > 0 {
+        others.push(format!("{more} more"));
+    }
+    if !others.is_empty() {
+        let others: Vec<&str> = others.iter().map(String::as_str).collect();
+        words.push(format!("{} happens, which nobody requests", either(&others)));
+    }
+    words
+}
+
+/// `a, b or c`.
+fn either(names: &[&str]) -> String {
+    match names {
+        [] => String::new(),
+        [only] => (*only).to_owned(),
+        [first @ .., last] => format!("{} or {last}", first.join(", ")),
+    }
+}
+
+/// The sets of which `set` is the union.
+fn split<'a>(set: &'a EventSet, into: &mut Vec<&'a EventSet>) {
+    match set {
+        EventSet::Or(sets) => sets.iter().for_each(|set| split(set, into)),
+        EventSet::None => {}
+        set => into.push(set),
+    }
+}
+
+/// Which orders of an operator are in the set, be it at the station or as they reach a vehicle.
+fn orders_in(set: &EventSet, vehicle: &NodeName) -> Vec<&'static str> {
+    let Some(name) = literal_name(set) else { return Vec::new() };
+    let Some(node) = first_two_chunks(name) else { return Vec::new() };
+    let kind = name.rsplit('/').next();
+    let contains = |what: &'static str| match kind {
+        Some(ORDERED) => {
+            [ALL, vehicle.as_str()].iter().any(|who| set.contains(&ordered_event(node, what, who)))
+        }
+        Some(ORDER) => set.contains(&vocabulary::order(node, what)),
+        // Only an operator hands back.
+        Some(HAND_BACK) => what == HAND_BACK && set.contains(&Event::new(name)),
+        _ => false,
+    };
+    ORDERS.iter().map(|(what, _)| *what).chain([HOLD]).filter(|what| contains(what)).collect()
+}
+
+/// The node whose blocks are to be confirmed, if that is what the set is about.
+fn confirmed_at(set: &EventSet) -> Option<&str> {
+    let (node, kind) = literal_name(set)?.rsplit_once('/')?;
+    (kind == facts::CONFIRMED).then_some(node)
+}
+
+/// The one name that all events of the set have.
+fn literal_name(set: &EventSet) -> Option<&str> {
+    match set {
+        EventSet::Named(name) if name.is_literal() => Some(name.as_str()),
+        EventSet::Exactly(event) => Some(event.name()),
+        EventSet::And(sets) => sets.iter().find_map(literal_name),
+        _ => None,
+    }
+}

@@ -1,0 +1,289 @@
+//! Hot cycles: runs that go on for ever while someone must not stay where it is.
+
+use std::collections::VecDeque;
+
+use super::model::{Model, Moves};
+use super::report::{Inspection, Violation, ViolationKind};
+use super::search::names;
+use super::store::Store;
+
+/// The states in which someone is hot, and the moves among them. States are counted anew, in the order of the search.
+#[derive(Debug)]
+pub(super) struct HotGraph {
+    /// Numbers in the search.
+    states: Vec<u32>,
+    /// Who is hot in each, by number, sorted.
+    hot: Rows<u32>,
+    /// Labels and targets.
+    moves: Rows<(u32, u32)>,
+}
+
+/// How many moves may be looked at to find a shorter cycle than the first.
+const EFFORT: usize = 20_000_000;
+const UNSEEN: u32 = u32::MAX;
+
+/// Lists of different lengths in one.
+#[derive(Debug)]
+struct Rows<T> {
+    ends: Vec<usize>,
+    items: Vec<T>,
+}
+
+impl<T> Rows<T> {
+    fn new() -> Self {
+        Self { ends: Vec::new(), items: Vec::new() }
+    }
+
+    fn close(&mut self) {
+        self.ends.push(self.items.len());
+    }
+
+    fn get(&self, row: u32) -> &[T] {
+        let at = row as usize;
+        let start = at.checked_sub(1).and_then(|before| self.ends.get(before)).copied().unwrap_or(0);
+        let end = self.ends.get(at).copied().unwrap_or(start);
+        self.items.get(start..end).unwrap_or_default()
+    }
+}
+
+impl HotGraph {
+    pub(super) fn of<M: Model>(model: &mut M, store: &Store) -> Self {
+        let mut graph = Self { states: Vec::new(), hot: Rows::new(), moves: Rows::new() };
+        let mut place = vec![UNSEEN; store.len()];
+        let mut hot = Vec::new();
+        for (number, place) in (0_u32..).zip(&mut place) {
+            hot.clear();
+            model.hot(store.state(number), &mut hot);
+            if !hot.is_empty() {
+                hot.sort_unstable();
+                *place = graph.states.len() as u32;
+                graph.states.push(number);
+                graph.hot.items.append(&mut hot);
+                graph.hot.close();
+            }
+        }
+        let mut moves = Moves::default();
+        for number in &graph.states {
+            moves.clear();
+            model.expand(store.state(*number), &mut moves);
+            for (label, target) in moves.iter() {
+                // States beyond a bound are not in the store.
+                let target = store.find(target).and_then(|number| place.get(number as usize)).copied();
+                graph.moves.items.extend(target.filter(|place| *place != UNSEEN).map(|place| (label, place)));
+            }
+            graph.moves.close();
+        }
+        graph
+    }
+
+    /// The shortest run into a cycle that an inspection is about.
+    pub(super) fn violation<M: Model>(
+        &self,
+        model: &M,
+        store: &Store,
+        inspection: &Inspection,
+    ) -> Option<Violation> {
+        match inspection {
+            Inspection::HotSystem => {
+                let lasso = self.lasso(store, |_| true)?;
+                let mut hot: Vec<u32> =
+                    lasso.states.iter().flat_map(|state| self.hot.get(*state)).copied().collect();
+                hot.sort_unstable();
+                hot.dedup();
+                Some(lasso.violation(model, store, self, ViolationKind::HotSystem, &hot))
+            }
+            Inspection::HotRun(group) => {
+                let mut members: Vec<u32> = self.hot.items.clone();
+                members.sort_unstable();
+                members.dedup();
+                members.retain(|number| group.contains(&model.bthread(*number)));
+                let is_hot = |hot: &[u32]| hot.iter().any(|number| members.binary_search(number).is_ok());
+                let lasso = self.lasso(store, is_hot)?;
+                let mut violation = lasso.violation(model, store, self, ViolationKind::HotRun, &[]);
+                violation.violators = group.iter().cloned().collect();
+                Some(violation)
+            }
+            Inspection::HotBThread => {
+                let mut bthreads = self.hot.items.clone();
+                bthreads.sort_unstable();
+                bthreads.dedup();
+                let lassos = bthreads.iter().filter_map(|one| self.lasso(store, |hot| hot.contains(one)));
+                let lasso = lassos.min_by_key(|lasso| lasso.stem + lasso.labels.len())?;
+                let always =
+                    |number: &&u32| lasso.states.iter().all(|state| self.hot.get(*state).contains(number));
+                let hot: Vec<u32> = bthreads.iter().filter(always).copied().collect();
+                Some(lasso.violation(model, store, self, ViolationKind::HotBThread, &hot))
+            }
+            Inspection::Deadlock | Inspection::FailedAssertion | Inspection::HotTermination => None,
+        }
+    }
+
+    /// The shortest way into and round a cycle all of whose states are hot in the sense of `is_hot`.
+    fn lasso(&self, store: &Store, is_hot: impl Fn(&[u32]) -> bool) -> Option<Lasso> {
+        let count = self.states.len() as u32;
+        let within: Vec<bool> = (0..count).map(|state| is_hot(self.hot.get(state))).collect();
+        let component = self.components(&within);
+        let mut best: Option<Lasso> = None;
+        let mut effort = 0;
+        for entry in 0..count {
+            if component.get(entry as usize).is_none_or(|component| *component == UNSEEN) {
+                continue;
+            }
+            let stem = self.states.get(entry as usize).map_or(0, |number| store.path(*number).len());
+            let room =
+                best.as_ref().map_or(usize::MAX, |best| (best.stem + best.labels.len()).saturating_sub(stem));
+            if room < 2 || (best.is_some() && effort > EFFORT) {
+                continue;
+            }
+            best = self.round(entry, stem, room, &component, &mut effort).or(best);
+        }
+        best
+    }
+
+    /// For each state the number of its strongly connected component among those `within`, if that has a cycle (Tarjan
+    /// 1972, without recursion).
+    fn components(&self, within: &[bool]) -> Vec<u32> {
+        let count = within.len();
+        let is_within = |state: u32| within.get(state as usize) == Some(&true);
+        let mut component = vec![UNSEEN; count];
+        let (mut index, mut low) = (vec![UNSEEN; count], vec![UNSEEN; count]);
+        let mut on_stack = vec![false; count];
+        let (mut stack, mut path) = (Vec::new(), Vec::new());
+        let mut next = 0;
+        for root in (0..count as u32).filter(|state| is_within(*state)) {
+            if index.get(root as usize) != Some(&UNSEEN) {
+                continue;
+            }
+            path.push((root, 0));
+            while let Some((state, move_at)) = path.pop() {
+                let at = state as usize;
+                if move_at == 0 {
+                    set(&mut index, at, next);
+                    set(&mut low, at, next);
+                    set(&mut on_stack, at, true);
+                    next += 1;
+                    stack.push(state);
+                }
+                let target = self.moves.get(state).iter().skip(move_at).map(|(_, target)| *target);
+                let mut descended = false;
+                for (skipped, target) in target.enumerate() {
+                    let to = target as usize;
+                    if !is_within(target) {
+                        continue;
+                    }
+                    if get(&index, to) == UNSEEN {
+                        // Come back to this move, to take over what is found beyond it.
+                        path.push((state, move_at + skipped + 1));
+                        path.push((target, 0));
+                        descended = true;
+                        break;
+                    }
+                    if on_stack.get(to) == Some(&true) {
+                        let lowest = get(&low, at).min(get(&index, to));
+                        set(&mut low, at, lowest);
+                    }
+                }
+                if descended {
+                    continue;
+                }
+                if get(&low, at) == get(&index, at) {
+                    let root_at = stack.iter().rposition(|other| *other == state).unwrap_or(0);
+                    let members = stack.split_off(root_at);
+                    let cyclic =
+                        members.len() > 1 || self.moves.get(state).iter().any(|(_, target)| *target == state);
+                    for member in members {
+                        set(&mut on_stack, member as usize, false);
+                        if cyclic {
+                            set(&mut component, member as usize, state);
+                        }
+                    }
+                }
+                if let Some((parent, _)) = path.last() {
+                    let lowest = get(&low, *parent as usize).min(get(&low, at));
+                    set(&mut low, *parent as usize, lowest);
+                }
+            }
+        }
+        component
+    }
+
+    /// The shortest way of less than `room` moves from `entry` back to it, within its component.
+    fn round(
+        &self,
+        entry: u32,
+        stem: usize,
+        room: usize,
+        component: &[u32],
+        effort: &mut usize,
+    ) -> Option<Lasso> {
+        let own = get(component, entry as usize);
+        let mut came_by = rustc_hash::FxHashMap::default();
+        let mut queue = VecDeque::from([(entry, 0_usize)]);
+        while let Some((state, length)) = queue.pop_front() {
+            if length + 1 >= room {
+                return None;
+            }
+            for (label, target) in self.moves.get(state) {
+                *effort += 1;
+                if *target == entry {
+                    let mut lasso = Lasso { stem, labels: vec![*label], states: vec![state] };
+                    let mut at = state;
+                    while let Some((from, label)) = came_by.get(&at) {
+                        lasso.labels.push(*label);
+                        lasso.states.push(*from);
+                        at = *from;
+                    }
+                    lasso.labels.reverse();
+                    lasso.states.reverse();
+                    return Some(lasso);
+                }
+                if get(component, *target as usize) == own && !came_by.contains_key(target) {
+                    came_by.insert(*target, (state, *label));
+                    queue.push_back((*target, length + 1));
+                }
+            }
+        }
+        None
+    }
+}
+
+/// A way into a cycle and round it.
+#[derive(Debug)]
+struct Lasso {
+    /// Moves before the cycle.
+    stem: usize,
+    /// The moves of the cycle, and the states that they leave.
+    labels: Vec<u32>,
+    states: Vec<u32>,
+}
+
+impl Lasso {
+    fn violation<M: Model>(
+        &self,
+        model: &M,
+        store: &Store,
+        graph: &HotGraph,
+        kind: ViolationKind,
+        hot: &[u32],
+    ) -> Violation {
+        let entry = self.states.first().and_then(|entry| graph.states.get(*entry as usize));
+        let stem = entry.map_or_else(Vec::new, |entry| store.path(*entry));
+        let trace = stem.into_iter().chain(self.labels.iter().copied()).map(|label| model.event(label));
+        Violation {
+            kind,
+            violators: names(model, hot),
+            trace: trace.collect(),
+            cycle_length: Some(self.labels.len()),
+        }
+    }
+}
+
+fn get(list: &[u32], at: usize) -> u32 {
+    list.get(at).copied().unwrap_or(UNSEEN)
+}
+
+fn set<T>(list: &mut [T], at: usize, value: T) {
+    if let Some(place) = list.get_mut(at) {
+        *place = value;
+    }
+}

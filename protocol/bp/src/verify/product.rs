@@ -1,0 +1,455 @@
+//! A program as a model: the product of its b-threads' local states.
+//!
+//! A product state is a row: the number of what is not in b-threads (queues, failure), then the numbers of the local
+//! states. B-threads are functions of state and event, so each local move is run once and remembered, and a move of the
+//! product is put together from remembered ones. A move that spawns, enqueues or fails is handed to [`Program`] itself.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::interner::Interner;
+use super::locals::{Cause, ENDED, Kind, Local, LocalId, Locals, Rules};
+use super::model::{Model, Moves};
+use super::{Fault, Inspection, Invariant, Timers, View, ViolationKind};
+use crate::event::Event;
+use crate::program::{Program, Rest};
+use crate::strategy::Strategy;
+
+/// Set in the labels of moves by deadline; the rest of the label is a slot.
+const DEADLINE: u32 = 1 << 31;
+
+/// A program under verification.
+#[derive(Debug)]
+pub(super) struct Product {
+    /// The program before its first selection.
+    program: Program,
+    locals: Locals,
+    rests: Interner<Beside>,
+    timers: Timers,
+    feed: Vec<Event>,
+    invariants: Vec<Invariant>,
+    /// Whether external events may come although internal ones can be selected.
+    externals_any_time: bool,
+    /// Whether rows keep b-threads in the order in which they were added, not in that of their slots.
+    in_order: bool,
+    order: OrderWatch,
+    scratch: Scratch,
+}
+
+/// Whether the order in which b-threads were added can make a difference between runs.
+#[derive(Clone, Copy, Debug, Default)]
+struct OrderWatch {
+    /// Two b-threads moved at once, each with an effect on the rest of the program.
+    matters: bool,
+    /// B-threads were added in an order that is not that of their slots.
+    varies: bool,
+}
+
+/// What a product state holds beside local states.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Beside {
+    /// The external queue, as event numbers.
+    externals: Vec<u32>,
+    occurrences: Vec<Event>,
+    failure: Option<(Arc<str>, String)>,
+    /// Whether the program takes what is left of the feed.
+    daemon: bool,
+    /// How many events of the feed were taken.
+    fed: usize,
+}
+
+/// Kept between expansions to save allocations.
+#[derive(Debug, Default)]
+struct Scratch {
+    blocked: Vec<u64>,
+    open: Vec<u64>,
+    /// Positions in the row that an event moves.
+    movers: Vec<usize>,
+    targets: Vec<LocalId>,
+}
+
+impl Product {
+    /// `program` need not have run yet.
+    pub(super) fn new(
+        mut program: Program,
+        timers: Timers,
+        feed: Vec<Event>,
+        invariants: Vec<Invariant>,
+        in_order: bool,
+    ) -> Self {
+        // A failure is part of the state.
+        let _ = program.synchronise(Duration::ZERO);
+        let config = program.config();
+        let rules = Rules {
+            strategy: config.strategy,
+            protected: config.protected.clone(),
+            home: program.home().clone(),
+        };
+        Self {
+            externals_any_time: config.externals_after.is_some(),
+            program,
+            locals: Locals::new(rules),
+            rests: Interner::default(),
+            timers,
+            feed,
+            invariants,
+            in_order,
+            order: OrderWatch::default(),
+            scratch: Scratch::default(),
+        }
+    }
+
+    /// Whether equal rows may stand for states that differ in the order of b-threads, and that may make a difference.
+    pub(super) fn order_is_lost(&self) -> bool {
+        !self.in_order && self.order.matters && self.order.varies
+    }
+
+    /// The b-threads of which a deadline was met that never fires.
+    pub(super) fn unfired_deadlines(&self) -> Vec<Arc<str>> {
+        match self.timers {
+            Timers::AnyTime => Vec::new(),
+            Timers::Never => self.locals.names_of(|local| local.bid.given_deadline().is_some()),
+        }
+    }
+
+    fn beside(&self, state: &[u32]) -> Option<&Beside> {
+        self.rests.get(*state.first()?)
+    }
+
+    pub(super) fn locals<'a>(&'a self, state: &'a [u32]) -> impl Iterator<Item = &'a Local> {
+        state.iter().skip(1).filter_map(|id| self.locals.get(*id))
+    }
+
+    /// The events in the external queue.
+    pub(super) fn queue<'a>(&'a self, state: &'a [u32]) -> impl Iterator<Item = &'a Event> {
+        let numbers = self.beside(state).map_or(&[][..], |beside| &beside.externals);
+        numbers.iter().filter_map(|number| self.locals.events.get(*number))
+    }
+
+    /// Whose assertion has failed, and what it said.
+    pub(super) fn failure(&self, state: &[u32]) -> Option<(&Arc<str>, &str)> {
+        self.beside(state)?.failure.as_ref().map(|(bthread, message)| (bthread, &**message))
+    }
+
+    /// The row of a program's state, of whose feed so much was taken.
+    fn row_of(&mut self, program: &Program, fed: usize) -> Vec<u32> {
+        let Rest { externals, occurrences, failure, daemon } = program.rest();
+        let externals = externals.iter().map(|event| self.locals.event(event)).collect();
+        let daemon = daemon && fed < self.feed.len();
+        let beside = Beside { externals, occurrences: occurrences.into(), failure, daemon, fed };
+        let mut row = vec![self.rests.number(beside)];
+        for entry in program.entries() {
+            row.push(self.locals.intern(&entry.name, entry.owner.clone(), &entry.bid));
+        }
+        if !self.in_order {
+            let locals = &self.locals;
+            let by_slot = |id: &u32| locals.slot(*id);
+            if let Some(ids) = row.get_mut(1..)
+                && !ids.is_sorted_by_key(by_slot)
+            {
+                ids.sort_unstable_by_key(by_slot);
+                self.order.varies = true;
+            }
+        }
+        row
+    }
+
+    /// The program in a product state.
+    fn program_of(&self, state: &[u32]) -> Program {
+        let beside = self.beside(state);
+        let rest = Rest {
+            externals: self.queue(state).cloned().collect(),
+            occurrences: beside.map(|b| b.occurrences.iter().cloned().collect()).unwrap_or_default(),
+            failure: beside.and_then(|beside| beside.failure.clone()),
+            daemon: beside.is_some_and(|beside| beside.daemon),
+        };
+        let seats =
+            self.locals(state).map(|local| (local.name.clone(), local.owner.clone(), local.bid.clone()));
+        self.program.assemble(seats, rest)
+    }
+
+    fn fed(&self, state: &[u32]) -> usize {
+        self.beside(state).map_or(0, |beside| beside.fed)
+    }
+
+    /// Lets the program itself make a move, and gives the state it comes to.
+    fn run_program(&mut self, state: &[u32], act: impl FnOnce(&mut Program)) -> Vec<u32> {
+        let mut program = self.program_of(state);
+        act(&mut program);
+        // A failure is part of the state.
+        let _ = program.synchronise(Duration::ZERO);
+        self.row_of(&program, self.fed(state))
+    }
+
+    /// Fills `scratch.open` with the internal events that may be selected.
+    fn find_open(&mut self, state: &[u32]) {
+        let Scratch { blocked, open, .. } = &mut self.scratch;
+        let locals = &self.locals;
+        let ids = state.get(1..).unwrap_or_default();
+        union(blocked, locals.width(), ids.iter().map(|id| locals.bits(*id, Kind::Blocks)));
+        match locals.rules.strategy {
+            Strategy::Simple => {
+                union(open, locals.width(), ids.iter().map(|id| locals.bits(*id, Kind::Requests)));
+                open.iter_mut().zip(&*blocked).for_each(|(open, blocked)| *open &= !blocked);
+            }
+            Strategy::Ordered => {
+                let first =
+                    |local: &Local| local.requests.iter().copied().find(|event| !has(blocked, *event));
+                union(open, locals.width(), std::iter::empty());
+                for event in ids.iter().filter_map(|id| locals.get(*id)).filter_map(first) {
+                    if let Some(word) = open.get_mut(event as usize / 64) {
+                        *word |= 1 << (event % 64);
+                    }
+                }
+            }
+            Strategy::SyncPriority | Strategy::BThreadPriority => {
+                let is_open = |id: &&u32| {
+                    locals.bits(**id, Kind::Requests).iter().zip(&*blocked).any(|(r, b)| r & !b != 0)
+                };
+                let rank = |id: &u32| locals.get(*id).and_then(|local| local.rank);
+                let best = ids.iter().filter(is_open).map(rank).max();
+                let foremost = ids.iter().filter(|id| Some(rank(id)) == best);
+                union(open, locals.width(), foremost.map(|id| locals.bits(*id, Kind::Requests)));
+                open.iter_mut().zip(&*blocked).for_each(|(open, blocked)| *open &= !blocked);
+            }
+        }
+    }
+
+    /// The position in the queue of the external event whose turn it is. Needs `scratch.blocked`.
+    fn next_external(&self, state: &[u32]) -> Option<usize> {
+        if state.len() < 2 {
+            return None;
+        }
+        let home = |event: u32| {
+            self.locals.events.get(event).is_some_and(|event| self.locals.rules.home.contains(event))
+        };
+        let queue = &self.beside(state)?.externals;
+        queue.iter().position(|event| !has(&self.scratch.blocked, *event) && home(*event))
+    }
+
+    /// Adds the move of an internal event, or of the external one at a position in the queue.
+    fn select(&mut self, state: &[u32], event: u32, external: Option<usize>, moves: &mut Moves) {
+        let mut scratch = std::mem::take(&mut self.scratch);
+        scratch.movers.clear();
+        scratch.targets.clear();
+        let (mut plain, mut effects) = (true, 0);
+        for (at, id) in state.iter().enumerate().skip(1) {
+            if has(self.locals.bits(*id, Kind::Wakes), event) {
+                let outcome = self.locals.outcome(*id, Cause::Event(event));
+                plain &= outcome.plain;
+                effects += usize::from(!outcome.plain);
+                scratch.movers.push(at);
+                scratch.targets.push(outcome.next);
+            }
+        }
+        self.order.matters |= effects > 1;
+        if plain {
+            let rest = self.without_external(state, external);
+            let mut moved = scratch.movers.iter().copied().zip(scratch.targets.iter().copied()).peekable();
+            let row = state.iter().enumerate().filter_map(|(at, id)| {
+                let id = if at == 0 {
+                    rest
+                } else {
+                    moved.next_if(|(mover, _)| *mover == at).map_or(*id, |m| m.1)
+                };
+                (at == 0 || id != ENDED).then_some(id)
+            });
+            moves.push(event, row);
+        } else if let Some(happens) = self.locals.events.get(event).cloned() {
+            let row = self.run_program(state, |program| program.select(happens, external));
+            moves.push(event, row);
+        }
+        self.scratch = scratch;
+    }
+
+    /// The number of what is beside the local states once an external event was taken from the queue.
+    fn without_external(&mut self, state: &[u32], external: Option<usize>) -> u32 {
+        let present = state.first().copied().unwrap_or(0);
+        match (external, self.beside(state)) {
+            (Some(at), Some(beside)) => {
+                let mut beside = beside.clone();
+                beside.externals.remove(at);
+                self.rests.number(beside)
+            }
+            _ => present,
+        }
+    }
+
+    /// Adds a move for each b-thread whose deadline may fire.
+    fn fire_deadlines(&mut self, state: &[u32], moves: &mut Moves) {
+        for (at, id) in state.iter().enumerate().skip(1) {
+            let Some(local) = self.locals.get(*id).filter(|local| local.bid.given_deadline().is_some())
+            else {
+                continue;
+            };
+            let (label, name) = (DEADLINE | local.slot, local.name.clone());
+            let outcome = self.locals.outcome(*id, Cause::Deadline);
+            if outcome.plain {
+                let row =
+                    state.iter().enumerate().map(|(place, id)| if place == at { outcome.next } else { *id });
+                moves.push(
+                    label,
+                    row.enumerate().filter(|(place, id)| *place == 0 || *id != ENDED).map(|(_, id)| id),
+                );
+            } else {
+                let row = self.run_program(state, |program| program.fire_deadline(&name));
+                moves.push(label, row);
+            }
+        }
+    }
+
+    /// Gives a daemon that has come to rest events of its feed until one can be selected, and adds that move.
+    fn feed(&mut self, state: &[u32], moves: &mut Moves) {
+        let Some(beside) = self.beside(state) else { return };
+        if !beside.daemon || !self.locals(state).any(|local| !local.is_proxy()) {
+            return;
+        }
+        let mut beside = beside.clone();
+        while let Some(event) = self.feed.get(beside.fed) {
+            beside.externals.push(self.locals.event(&event.clone()));
+            beside.fed += 1;
+            beside.daemon = beside.fed < self.feed.len();
+            let mut fed = state.to_vec();
+            if let Some(rest) = fed.first_mut() {
+                *rest = self.rests.number(beside.clone());
+            }
+            self.find_open(&fed);
+            if let Some(at) = self.next_external(&fed)
+                && let Some(event) = self.beside(&fed).and_then(|beside| beside.externals.get(at)).copied()
+            {
+                return self.select(&fed, event, Some(at), moves);
+            }
+        }
+    }
+
+    /// Whether the b-threads among themselves allow nothing, as [`Program::is_deadlocked`] has it.
+    fn is_deadlocked(&self, state: &[u32]) -> bool {
+        let mut blocked = Vec::new();
+        let ids = state.get(1..).unwrap_or_default();
+        let own = |id: &&u32| self.locals.get(**id).is_some_and(|local| !local.is_proxy());
+        union(
+            &mut blocked,
+            self.locals.width(),
+            ids.iter().filter(own).map(|id| self.locals.bits(*id, Kind::Blocks)),
+        );
+        let stuck = |event: &u32| has(&blocked, *event);
+        let home = |event: &&u32| {
+            self.locals.events.get(**event).is_some_and(|e| self.locals.rules.home.contains(e))
+        };
+        let Some(beside) = self.beside(state) else { return false };
+        self.locals(state).any(|local| !local.is_proxy() && !local.requests.is_empty())
+            && self.locals(state).flat_map(|local| &local.requests).all(stuck)
+            && beside.externals.iter().filter(home).all(stuck)
+    }
+
+    fn fault_by(&self, inspection: &Inspection, state: &[u32], stuck: bool) -> Option<Fault> {
+        let names = |is: &dyn Fn(&Local) -> bool| -> Vec<Arc<str>> {
+            self.locals(state).filter(|local| is(local)).map(|local| local.name.clone()).collect()
+        };
+        let failure = self.failure(state);
+        let at_rest =
+            stuck && failure.is_none() && !self.locals(state).any(|l| l.bid.given_deadline().is_some());
+        match inspection {
+            Inspection::FailedAssertion => failure.map(|(bthread, message)| Fault {
+                kind: ViolationKind::FailedAssertion { message: message.to_owned() },
+                violators: vec![bthread.clone()],
+            }),
+            Inspection::Deadlock if at_rest && self.is_deadlocked(state) => Some(Fault {
+                kind: ViolationKind::Deadlock,
+                violators: names(&|local| !local.is_proxy() && !local.requests.is_empty()),
+            }),
+            Inspection::HotTermination if at_rest => {
+                let violators = names(&|local| local.bid.is_hot());
+                (!violators.is_empty()).then_some(Fault { kind: ViolationKind::HotTermination, violators })
+            }
+            _ => None,
+        }
+    }
+
+    fn broken_invariant(&self, state: &[u32]) -> Option<Fault> {
+        let view = View::new(self, state);
+        self.invariants.iter().find_map(|invariant| {
+            let message = (invariant.holds)(&view).err()?;
+            let kind = ViolationKind::Invariant { invariant: invariant.name.clone(), message };
+            Some(Fault { kind, violators: Vec::new() })
+        })
+    }
+}
+
+impl Model for Product {
+    fn start(&mut self) -> Vec<u32> {
+        let program = self.program.clone();
+        self.row_of(&program, 0)
+    }
+
+    fn expand(&mut self, state: &[u32], moves: &mut Moves) {
+        let Some(beside) = self.beside(state) else { return };
+        if beside.failure.is_some() {
+            return;
+        }
+        if let Some(event) = beside.occurrences.first().cloned() {
+            let label = self.locals.event(&event);
+            let row = self.run_program(state, |program| {
+                // It was not failed before.
+                let _ = program.step(Duration::ZERO);
+            });
+            return moves.push(label, row);
+        }
+        self.find_open(state);
+        let external = self.next_external(state);
+        for word in 0..self.scratch.open.len() {
+            let mut open = self.scratch.open.get(word).copied().unwrap_or(0);
+            while open != 0 {
+                self.select(state, word as u32 * 64 + open.trailing_zeros(), None, moves);
+                open &= open - 1;
+            }
+        }
+        if let Some(at) = external.filter(|_| moves.is_empty() || self.externals_any_time)
+            && let Some(event) = self.beside(state).and_then(|beside| beside.externals.get(at)).copied()
+        {
+            self.select(state, event, Some(at), moves);
+        }
+        if moves.is_empty() {
+            self.feed(state, moves);
+        }
+        if self.timers == Timers::AnyTime {
+            self.fire_deadlines(state, moves);
+        }
+    }
+
+    fn fault(&self, state: &[u32], stuck: bool, inspections: &[Inspection]) -> Option<Fault> {
+        inspections
+            .iter()
+            .find_map(|inspection| self.fault_by(inspection, state, stuck))
+            .or_else(|| self.broken_invariant(state))
+    }
+
+    fn hot(&self, state: &[u32], bthreads: &mut Vec<u32>) {
+        bthreads.extend(self.locals(state).filter(|local| local.bid.is_hot()).map(|local| local.slot));
+    }
+
+    fn bthread(&self, number: u32) -> Arc<str> {
+        self.locals.slot_name(number).cloned().unwrap_or_else(|| "".into())
+    }
+
+    fn event(&self, label: u32) -> Event {
+        if label & DEADLINE != 0 {
+            return Event::timeout().with("bthread", self.bthread(label & !DEADLINE));
+        }
+        self.locals.events.get(label).cloned().unwrap_or_else(|| Event::new(""))
+    }
+}
+
+/// Whether an event is in a set of bits.
+fn has(bits: &[u64], event: u32) -> bool {
+    bits.get(event as usize / 64).is_some_and(|word| word >> (event % 64) & 1 != 0)
+}
+
+/// Makes `bits` the union of sets.
+fn union<'a>(bits: &mut Vec<u64>, width: usize, sets: impl Iterator<Item = &'a [u64]>) {
+    bits.clear();
+    bits.resize(width, 0);
+    for set in sets {
+        bits.iter_mut().zip(set).for_each(|(bits, set)| *bits |= set);
+    }
+}

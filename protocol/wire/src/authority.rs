@@ -1,0 +1,64 @@
+//! The rights that a fleet grants unless it is configured otherwise.
+
+use skein_bp::EventSet;
+use skein_dbp::{Authority, Grant, LIFT, NodeName, ROSTER, Role, Roster};
+
+use crate::vocabulary::{ABORT, ADVANCE, ENTER, GOTO, LAUNCH, ORDER, SWARM, TAKEOFF, of_every_vehicle};
+
+/// First chunk of a vehicle's name.
+const VEHICLE: &str = "uav";
+
+/// Who decides together in the first term: the ground station, which coordinates, and the vehicles of the fleet.
+#[must_use]
+pub fn joint_roster<'a>(ground: NodeName, fleet: impl IntoIterator<Item = &'a NodeName>) -> Roster {
+    let vehicles = fleet.into_iter().filter(|node| node.kind() == VEHICLE).cloned();
+    Roster::first(ground, vehicles)
+}
+
+/// Ground stations and operators' scripts launch, order and hold vehicles, change the roster and lift blocks; vehicles
+/// claim passages from one another, keep a joint launch back until they are ready, and may call one off.
+#[must_use]
+pub fn standard_authority() -> Authority {
+    let of_any_node = |verb: &str| EventSet::from(format!("*/*/{verb}"));
+    let every = |verbs: &[&str]| EventSet::any_of(verbs.iter().map(|verb| of_every_vehicle(verb)));
+    let joint = || EventSet::from(format!("{SWARM}/**"));
+    let command = Grant {
+        request: every(&[TAKEOFF, ORDER]).or(of_any_node(ROSTER)).or(of_any_node(LIFT)).or(joint()),
+        block: every(&[TAKEOFF, GOTO, ADVANCE]).or(of_any_node(ENTER)).or(joint()),
+    };
+    let vehicle = Grant {
+        request: EventSet::from(format!("{SWARM}/{ABORT}")),
+        // Whoever claims a passage asks the ground station too.
+        block: of_any_node(ENTER).or(EventSet::from(format!("{SWARM}/{LAUNCH}"))),
+    };
+    let role = |name: &str, nodes: &[&str], grant: &Grant| Role {
+        name: name.to_owned(),
+        nodes: nodes.iter().map(|pattern| (*pattern).into()).collect(),
+        grant: grant.clone(),
+    };
+    let roles = vec![
+        role("ground", &["ground/*"], &command),
+        role("operator", &["operator/*", "script/*"], &command),
+        role("vehicle", &["uav/*"], &vehicle),
+    ];
+    Authority::new(roles, None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vehicles_may_claim_passages_and_not_hold_one_another() {
+        let authority = standard_authority();
+        let vehicle = NodeName::new("uav/2").unwrap();
+        let claim = EventSet::any_of(["uav/1/enter", "uav/30/enter", "ground/main/enter"])
+            .and(EventSet::region([0.0; 3], [6.0; 3]));
+        assert!(authority.may_block(&vehicle, "right_of_way", &claim));
+        assert!(!authority.may_block(&vehicle, "right_of_way", &of_every_vehicle(ADVANCE)));
+        assert!(!authority.may_request(&vehicle, "x", &crate::vocabulary::order("uav/1", "land")));
+        assert!(authority.may_request(&vehicle, "x", &"swarm/abort".into()));
+        let stranger = NodeName::new("camera/1").unwrap();
+        assert!(!authority.may_block(&stranger, "x", &claim));
+    }
+}

@@ -1,0 +1,171 @@
+//! Behavioural programs: how many events a second of one processor's time gives, beside BPpy's on the same programs.
+
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use anyhow::Context as _;
+use nix::time::{ClockId, clock_gettime};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use skein_bp::script::{Op, Script};
+use skein_bp::{Bid, Program, ProgramConfig};
+
+use super::quantile::median;
+
+/// The same programs on BPpy, for a Python that has it.
+const PEER: &str = include_str!("bp_peer.py");
+/// The Python that runs them, if it is not `python3`.
+const PYTHON: &str = "SKEIN_PYTHON";
+/// Events between two looks at the clock.
+const BATCH: u32 = 100;
+
+/// One figure for each program, in events per second of CPU time.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct Figures<T> {
+    /// Two taps that want to run for ever, and a b-thread that makes them take turns.
+    hot_cold: T,
+    /// The same beside 100 b-threads that wait for events which never come.
+    idle_100: T,
+    /// The same beside 1000.
+    idle_1000: T,
+    /// A b-thread that requests an event for ever, and 1000 that each of them wakes.
+    woken_1000: T,
+}
+
+impl<T> Figures<T> {
+    fn map<U>(self, mut to: impl FnMut(T) -> U) -> Figures<U> {
+        let Self { hot_cold, idle_100, idle_1000, woken_1000 } = self;
+        Figures {
+            hot_cold: to(hot_cold),
+            idle_100: to(idle_100),
+            idle_1000: to(idle_1000),
+            woken_1000: to(woken_1000),
+        }
+    }
+}
+
+pub(super) fn run(repetitions: usize, cpu_time: Duration, as_json: bool) -> anyhow::Result<()> {
+    let ours = measure(repetitions, cpu_time)?;
+    let theirs = match measure_peer(repetitions, cpu_time) {
+        Ok(theirs) => Some(theirs),
+        Err(why) => {
+            eprintln!(
+                "skein-sim: no comparison: {why:#}; `python3 -m pip install bppy` provides it, {PYTHON} names another interpreter"
+            );
+            None
+        }
+    };
+    let ratio = |of: fn(&Figures<f64>) -> f64| theirs.as_ref().map(|theirs| of(&ours) / of(theirs));
+    let lost = 1.0 - ours.idle_1000 / ours.hot_cold;
+    if as_json {
+        let object = json!({
+            "hot_cold_events_per_s": ours.hot_cold,
+            "idle_100_events_per_s": ours.idle_100,
+            "idle_1000_events_per_s": ours.idle_1000,
+            "woken_1000_events_per_s": ours.woken_1000,
+            "lost_to_1000_idle": lost,
+            "bppy_events_per_s": theirs,
+            "ratio_hot_cold": ratio(|figures| figures.hot_cold),
+            "ratio_idle_100": ratio(|figures| figures.idle_100),
+            "ratio_idle_1000": ratio(|figures| figures.idle_1000),
+            "ratio_woken_1000": ratio(|figures| figures.woken_1000),
+        });
+        println!("{object}");
+        return Ok(());
+    }
+    let rows: [(&str, fn(&Figures<f64>) -> f64); 4] = [
+        ("hot and cold", |figures| figures.hot_cold),
+        ("with 100 idle", |figures| figures.idle_100),
+        ("with 1000 idle", |figures| figures.idle_1000),
+        ("1000 woken by each", |figures| figures.woken_1000),
+    ];
+    for (name, of) in rows {
+        let beside = match (&theirs, ratio(of)) {
+            (Some(theirs), Some(ratio)) => format!(", {ratio:.0} times BPpy's {:.0}", of(theirs)),
+            _ => String::new(),
+        };
+        println!("{name:<20} {:>10.0} events per CPU second{beside}", of(&ours));
+    }
+    println!("1000 idle b-threads cost {:.1} %", lost * 100.0);
+    Ok(())
+}
+
+/// The median of several runs of each program, one after another so that a disturbance meets all alike.
+fn measure(repetitions: usize, cpu_time: Duration) -> anyhow::Result<Figures<f64>> {
+    let mut runs = Figures { hot_cold: vec![], idle_100: vec![], idle_1000: vec![], woken_1000: vec![] };
+    for _ in 0..repetitions {
+        runs.hot_cold.push(events_per_s(hot_cold(0)?, cpu_time)?);
+        runs.idle_100.push(events_per_s(hot_cold(100)?, cpu_time)?);
+        runs.idle_1000.push(events_per_s(hot_cold(1000)?, cpu_time)?);
+        runs.woken_1000.push(events_per_s(woken(1000)?, cpu_time)?);
+    }
+    Ok(runs.map(median))
+}
+
+/// The same on BPpy.
+fn measure_peer(repetitions: usize, cpu_time: Duration) -> anyhow::Result<Figures<f64>> {
+    let python = std::env::var_os(PYTHON).unwrap_or_else(|| "python3".into());
+    let mut peer = Command::new(&python)
+        .args(["-", &repetitions.to_string(), &cpu_time.as_secs_f64().to_string()])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .with_context(|| format!("{} cannot be started", python.display()))?;
+    if let Some(mut input) = peer.stdin.take() {
+        input.write_all(PEER.as_bytes())?;
+    }
+    let output = peer.wait_with_output()?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    let why = || format!("{}: {}", python.display(), said.trim().lines().last().unwrap_or("no word"));
+    anyhow::ensure!(output.status.success(), why());
+    let runs: Figures<Vec<f64>> = serde_json::from_slice(&output.stdout).with_context(why)?;
+    Ok(runs.map(median))
+}
+
+fn events_per_s(mut program: Program, cpu_time: Duration) -> anyhow::Result<f64> {
+    program.synchronise(Duration::ZERO)?;
+    let since = this_threads_cpu_time()?;
+    let mut events = 0.0;
+    loop {
+        for _ in 0..BATCH {
+            program.step(Duration::ZERO)?.context("the program has stopped")?;
+        }
+        events += f64::from(BATCH);
+        let taken = this_threads_cpu_time()? - since;
+        if taken >= cpu_time && !taken.is_zero() {
+            return Ok(events / taken.as_secs_f64());
+        }
+    }
+}
+
+fn this_threads_cpu_time() -> anyhow::Result<Duration> {
+    Ok(clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID)?.into())
+}
+
+fn hot_cold(idle: usize) -> anyhow::Result<Program> {
+    let mut program = Program::new(ProgramConfig::default());
+    forever(&mut program, "hot tap", [Bid::new().request("hot")])?;
+    forever(&mut program, "cold tap", [Bid::new().request("cold")])?;
+    let cold_first = Bid::new().wait_for("cold").block("hot");
+    forever(&mut program, "alternator", [cold_first, Bid::new().wait_for("hot").block("cold")])?;
+    for n in 0..idle {
+        forever(&mut program, &format!("idle {n}"), [Bid::new().wait_for(format!("never/{n}"))])?;
+    }
+    Ok(program)
+}
+
+fn woken(waiters: usize) -> anyhow::Result<Program> {
+    let mut program = Program::new(ProgramConfig::default());
+    forever(&mut program, "clock", [Bid::new().request("tick")])?;
+    for n in 0..waiters {
+        forever(&mut program, &format!("waiter {n}"), [Bid::new().wait_for("tick")])?;
+    }
+    Ok(program)
+}
+
+fn forever<const N: usize>(program: &mut Program, name: &str, bids: [Bid; N]) -> anyhow::Result<()> {
+    program.add(name, Script::new(&[Op::forever(bids.map(Op::Sync))])?);
+    Ok(())
+}

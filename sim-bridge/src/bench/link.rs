@@ -1,0 +1,414 @@
+//! Round trips between processes over real Zenoh on the loopback interface: plain, through our queues, and as events.
+//!
+//! The other processes are this program again, in a role of its own (see `link_peer`).
+
+use std::io::{Read as _, Write as _};
+use std::net::{Ipv4Addr, TcpListener};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use anyhow::Context as _;
+use clap::ValueEnum as _;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use serde::Serialize;
+use serde_json::json;
+use skein_bp::script::{Op, Script};
+use skein_bp::{BThread, Bid, Context, Event, Program, ProgramConfig};
+use skein_dbp::{NodeName, facts};
+use skein_wire::vocabulary::{ADVANCE, event, of_every_vehicle};
+use skein_wire::{Key, Link as _, Topic};
+use skein_zenoh::{ZenohLink, ZenohSession};
+use zenoh::Wait as _;
+use zenoh::handlers::FifoChannelHandler;
+use zenoh::pubsub::Subscriber;
+use zenoh::qos::CongestionControl;
+use zenoh::sample::Sample;
+
+use super::link_peer::{
+    GROUND, Member, PING, Role, Seen, ZENOH_PING, ZENOH_PONG, fleet, home, plain_zenoh, session,
+};
+use super::quantile::quantile;
+
+/// As long as a bid or an occurrence of one short event.
+const PAYLOAD: usize = 100;
+/// The three kinds take turns, so that a disturbance meets all alike.
+const TURNS: usize = 20;
+/// How long a peer may take to answer for the first time.
+const TIME_TO_MEET: Duration = Duration::from_secs(20);
+/// How long an answer may take before it counts as lost.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// Between two blocks that are to be confirmed.
+const REST: Duration = Duration::from_millis(7);
+
+/// How much is measured.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extent {
+    pub round_trips: usize,
+    pub homes: usize,
+    pub confirmations: usize,
+    /// For how long one process is stopped; more than a lease.
+    pub stopped: Duration,
+}
+
+/// The median and the longest but one in a hundred.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Times {
+    p50: f64,
+    p99: f64,
+}
+
+impl Times {
+    fn of(mut times: Vec<f64>) -> Self {
+        times.sort_by(f64::total_cmp);
+        Self { p50: quantile(&times, 0.5), p99: quantile(&times, 0.99) }
+    }
+}
+
+pub(super) fn run(extent: Extent, as_json: bool) -> anyhow::Result<()> {
+    let [zenoh, queued, event] = round_trips(extent.round_trips)?;
+    let SwarmSeen { confirm, before, during, others_lost } = swarm(extent)?;
+    let stopped = json!({
+        "leases_lost": others_lost,
+        "longest_superstep_us": during,
+        "longest_superstep_before_us": before,
+    });
+    if as_json {
+        let object = json!({
+            "zenoh_rtt_us": zenoh,
+            "queued_rtt_us": queued,
+            "event_rtt_us": event,
+            "ratio_p50": event.p50 / zenoh.p50,
+            "ratio_event_queued_p50": event.p50 / queued.p50,
+            "homes": extent.homes,
+            "confirm_10_homes_us": confirm,
+            "stopped": stopped,
+        });
+        println!("{object}");
+        return Ok(());
+    }
+    let line = |what: &str, times: Times| {
+        println!("{what:<32} median {:>7.0} us, p99 {:>7.0} us", times.p50, times.p99);
+    };
+    line("plain Zenoh, there and back", zenoh);
+    line("through our queues", queued);
+    line("request to resumed b-thread", event);
+    println!(
+        "an event takes {:.2} times plain Zenoh, {:.2} times our queues",
+        event.p50 / zenoh.p50,
+        event.p50 / queued.p50
+    );
+    line(&format!("a block confirmed by {} homes", extent.homes), confirm);
+    println!(
+        "one of them stopped: {others_lost} leases lost among the others, longest superstep {during:.0} us (before: {before:.0} us)"
+    );
+    Ok(())
+}
+
+/// Times in microseconds over plain Zenoh, through our queues, and as events.
+fn round_trips(count: usize) -> anyhow::Result<[Times; 3]> {
+    let mut plain = Plain::start()?;
+    let mut queues = Queues::start()?;
+    let mut events = Events::start()?;
+    let mut times = [Vec::new(), Vec::new(), Vec::new()];
+    for _ in 0..TURNS {
+        let [zenoh_us, queued_us, event_us] = &mut times;
+        // The first of each turn finds everything cold.
+        plain.round_trip()?;
+        queues.round_trip()?;
+        events.round_trip()?;
+        for _ in 0..count.div_ceil(TURNS) {
+            zenoh_us.push(plain.round_trip()?);
+        }
+        for _ in 0..count.div_ceil(TURNS) {
+            queued_us.push(queues.round_trip()?);
+        }
+        events.round_trip()?;
+        for _ in 0..count.div_ceil(TURNS) {
+            event_us.push(events.round_trip()?);
+        }
+    }
+    Ok(times.map(Times::of))
+}
+
+/// Tries until the peer is there.
+fn meet(mut answered: impl FnMut() -> anyhow::Result<bool>) -> anyhow::Result<()> {
+    let deadline = Instant::now() + TIME_TO_MEET;
+    while !answered()? {
+        anyhow::ensure!(Instant::now() < deadline, "a peer does not answer");
+    }
+    Ok(())
+}
+
+fn microseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e6
+}
+
+/// A put, and a reply through a subscriber.
+struct Plain {
+    session: zenoh::Session,
+    replies: Subscriber<FifoChannelHandler<Sample>>,
+    _peer: Peer,
+}
+
+impl Plain {
+    fn start() -> anyhow::Result<Self> {
+        let endpoint = free_endpoint()?;
+        let session = plain_zenoh(std::slice::from_ref(&endpoint), &[])?;
+        let replies = session.declare_subscriber(ZENOH_PONG).wait().map_err(anyhow::Error::from_boxed)?;
+        let plain = Self { session, replies, _peer: Peer::start(Role::Zenoh, 1, 1, &endpoint)? };
+        meet(|| Ok(plain.ask(Duration::from_millis(50))?.is_some()))?;
+        Ok(plain)
+    }
+
+    fn ask(&self, patience: Duration) -> anyhow::Result<Option<Sample>> {
+        let put = self.session.put(ZENOH_PING, vec![0; PAYLOAD]).congestion_control(CongestionControl::Drop);
+        put.wait().map_err(anyhow::Error::from_boxed)?;
+        self.replies.recv_timeout(patience).map_err(anyhow::Error::from_boxed)
+    }
+
+    fn round_trip(&mut self) -> anyhow::Result<f64> {
+        // An answer that came too late is no answer to the next.
+        while let Ok(Some(_)) = self.replies.try_recv() {}
+        let since = Instant::now();
+        self.ask(PATIENCE)?.context("a message over plain Zenoh was lost")?;
+        Ok(microseconds(since))
+    }
+}
+
+fn free_endpoint() -> anyhow::Result<String> {
+    let port = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr()?.port();
+    Ok(format!("tcp/127.0.0.1:{port}"))
+}
+
+/// The same through the queues of links on both sides.
+struct Queues {
+    link: ZenohLink,
+    there: Key,
+    _peer: Peer,
+}
+
+impl Queues {
+    fn start() -> anyhow::Result<Self> {
+        let session = session(Vec::new())?;
+        let me = NodeName::new(GROUND)?;
+        let there = Key::new(&fleet()?, Topic::Bid { from: me.clone(), home: home(1)? });
+        let peer = Peer::start(Role::Queues, 1, 1, locator(&session)?)?;
+        let mut queues = Self { link: session.link(&me)?, there, _peer: peer };
+        meet(|| Ok(queues.ask(Duration::from_millis(50))))?;
+        Ok(queues)
+    }
+
+    fn ask(&mut self, patience: Duration) -> bool {
+        self.link.put(&self.there, vec![0; PAYLOAD]);
+        let (bell, deadline) = (self.link.bell(), Instant::now() + patience);
+        while self.link.poll().is_none() {
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return false;
+            }
+            bell.wait(left);
+        }
+        true
+    }
+
+    fn round_trip(&mut self) -> anyhow::Result<f64> {
+        while self.link.poll().is_some() {}
+        let since = Instant::now();
+        anyhow::ensure!(self.ask(PATIENCE), "a message through the queues was lost");
+        Ok(microseconds(since))
+    }
+}
+
+fn locator(session: &ZenohSession) -> anyhow::Result<&str> {
+    Ok(session.locators().first().context("a session listens somewhere")?)
+}
+
+/// A b-thread's request at another home, until the b-thread goes on and requests again.
+struct Events {
+    member: Member,
+    _peer: Peer,
+}
+
+impl Events {
+    fn start() -> anyhow::Result<Self> {
+        let session = session(Vec::new())?;
+        let mut program = Program::new(ProgramConfig::vehicle(1));
+        let ask = Bid::new().request(event(home(1)?, PING));
+        program.add("asker", Script::new(&[Op::forever([Op::Sync(ask)])])?);
+        let peer = Peer::start(Role::Node, 1, 1, locator(&session)?)?;
+        let mut events =
+            Self { member: Member::new(&session, &NodeName::new(GROUND)?, 1, program)?, _peer: peer };
+        meet(|| events.occurred())?;
+        Ok(events)
+    }
+
+    fn occurred(&mut self) -> anyhow::Result<bool> {
+        Ok(self.member.go_on()?.iter().any(|happened| happened.event.kind() == PING))
+    }
+
+    /// From one occurrence to the next: the resumed b-thread has requested again in the step that resumed it.
+    fn round_trip(&mut self) -> anyhow::Result<f64> {
+        let since = Instant::now();
+        while !self.occurred()? {
+            anyhow::ensure!(since.elapsed() < TIME_TO_MEET, "a requested event does not occur");
+        }
+        Ok(microseconds(since))
+    }
+}
+
+/// What was seen in a fleet of many processes.
+struct SwarmSeen {
+    confirm: Times,
+    /// Longest superstep in microseconds, before and while one process was stopped.
+    before: f64,
+    during: f64,
+    /// How many leases the others lost among themselves meanwhile.
+    others_lost: usize,
+}
+
+/// A ground station here, and each of its homes in a process of its own; the last of them is stopped in the end.
+fn swarm(extent: Extent) -> anyhow::Result<SwarmSeen> {
+    let session = session(Vec::new())?;
+    let ground = NodeName::new(GROUND)?;
+    let mut program = Program::new(ProgramConfig::vehicle(1));
+    let confirm =
+        Confirm { ground: ground.clone(), blocking: false, stated: Duration::ZERO, until: Duration::ZERO };
+    program.add(CONFIRM, confirm);
+    let mut member = Member::new(&session, &ground, extent.homes, program)?;
+    let peers =
+        (1..=extent.homes).map(|number| Peer::start(Role::Node, number, extent.homes, locator(&session)?));
+    let mut peers = peers.collect::<anyhow::Result<Vec<_>>>()?;
+    // The first few find nodes that have not met yet.
+    let mut times_us = Vec::new();
+    meet(|| {
+        times_us.extend(confirmation(&mut member)?);
+        Ok(times_us.len() >= 10)
+    })?;
+    times_us.clear();
+    member.seen = Seen::default();
+    peers.iter_mut().try_for_each(Peer::end_section)?;
+    let deadline = Instant::now() + TIME_TO_MEET + (REST + PATIENCE) * extent.confirmations as u32;
+    while times_us.len() < extent.confirmations {
+        anyhow::ensure!(Instant::now() < deadline, "blocks are not confirmed");
+        times_us.extend(confirmation(&mut member)?);
+    }
+    let before = std::mem::take(&mut member.seen);
+    peers.iter_mut().try_for_each(Peer::end_section)?;
+
+    let victim = peers.last().context("there are homes")?;
+    victim.signal(Signal::SIGSTOP)?;
+    let since = Instant::now();
+    while since.elapsed() < extent.stopped {
+        member.go_on()?;
+    }
+    let during = std::mem::take(&mut member.seen);
+    let (_, awake) = peers.split_last_mut().context("there are homes")?;
+    awake.iter_mut().try_for_each(Peer::end_section)?;
+    // The section of each is over once it has looked.
+    let since = Instant::now();
+    while since.elapsed() < PATIENCE {
+        member.go_on()?;
+    }
+    let victim = peers.pop().context("there are homes")?;
+    let stopped = home(extent.homes)?;
+    victim.signal(Signal::SIGCONT)?;
+
+    let sections = peers.into_iter().map(Peer::end).collect::<anyhow::Result<Vec<_>>>()?;
+    let longest = |own: &Seen, section: usize| {
+        let others = sections.iter().filter_map(|seen| seen.get(section));
+        others.chain([own]).map(|seen| seen.longest_superstep_us).fold(0.0, f64::max)
+    };
+    let lost = sections.iter().filter_map(|seen| seen.get(2)).chain([&during]).flat_map(|seen| &seen.lost);
+    Ok(SwarmSeen {
+        confirm: Times::of(times_us),
+        before: longest(&before, 1),
+        during: longest(&during, 2),
+        others_lost: lost.filter(|whom| **whom != stopped.as_str()).count(),
+    })
+}
+
+/// Lets the fleet go on once; the microseconds that a block took, if it has just been confirmed.
+fn confirmation(member: &mut Member) -> anyhow::Result<Option<f64>> {
+    let confirmed = member.go_on()?.iter().any(|happened| happened.event.kind() == facts::CONFIRMED);
+    let state = member.node.node().program().state_of::<Confirm>(CONFIRM);
+    let took = state.map(|confirm| (member.up() - confirm.stated).as_secs_f64() * 1e6);
+    Ok(took.filter(|_| confirmed))
+}
+
+const CONFIRM: &str = "confirm";
+
+/// Blocks `advance` everywhere until that is confirmed, rests, and blocks again.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+struct Confirm {
+    ground: NodeName,
+    blocking: bool,
+    /// When the last block was stated.
+    stated: Duration,
+    until: Duration,
+}
+
+impl BThread for Confirm {
+    fn bid(&self) -> Option<Bid> {
+        Some(match self.blocking {
+            true => {
+                Bid::new().block(of_every_vehicle(ADVANCE)).wait_for(facts::confirmed(&self.ground, CONFIRM))
+            }
+            false => Bid::new().deadline(self.until),
+        })
+    }
+
+    fn resume(&mut self, _: &Event, cx: &mut Context) {
+        self.blocking = !self.blocking;
+        match self.blocking {
+            true => self.stated = cx.now(),
+            false => self.until = cx.now() + REST,
+        }
+    }
+}
+
+/// A process in a role. It ends with this.
+struct Peer {
+    child: Child,
+    sections: Option<ChildStdin>,
+}
+
+impl Peer {
+    fn start(role: Role, number: usize, homes: usize, connect: &str) -> anyhow::Result<Self> {
+        let role = role.to_possible_value().context("every role has a name")?;
+        let mut child = Command::new(std::env::current_exe().context("where this program is")?)
+            .args(["bench", "link-peer", role.get_name(), connect])
+            .args([number, homes].map(|n| n.to_string()))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()?;
+        let sections = child.stdin.take();
+        Ok(Self { child, sections })
+    }
+
+    fn signal(&self, signal: Signal) -> anyhow::Result<()> {
+        Ok(kill(Pid::from_raw(i32::try_from(self.child.id())?), signal)?)
+    }
+
+    fn end_section(&mut self) -> anyhow::Result<()> {
+        let sections = self.sections.as_mut().context("it has not been ended")?;
+        sections.write_all(b"\n")?;
+        Ok(sections.flush()?)
+    }
+
+    /// What it has seen in each section.
+    fn end(mut self) -> anyhow::Result<Vec<Seen>> {
+        self.sections = None;
+        let mut said = String::new();
+        self.child.stdout.take().context("it is read once")?.read_to_string(&mut said)?;
+        serde_json::from_str(&said).context("a peer has ended without a report")
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
