@@ -296,6 +296,8 @@ impl Member {
         };
         match set {
             EventSet::None => true,
+            // A b-thread blocks with one set what it wants to block at all homes together.
+            set if !set.could_match_home(self.name.as_str()) => true,
             EventSet::Named(pattern) => {
                 let kind = pattern.as_str().rsplit('/').next().unwrap_or_default();
                 grants.blocks.contains(&kind)
