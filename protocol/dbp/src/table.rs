@@ -274,11 +274,15 @@ impl BidTable {
         self.bidders.get(node).is_some_and(|bidder| bidder.knows_this_life)
     }
 
-    /// `node` begins a new life: what it bid before is void.
-    pub(crate) fn drop_life(&mut self, node: &NodeName) -> Vec<ProxyChange> {
+    /// `node` lives in `incarnation`: what it bid in another life is void. A block that was kept over a restart of this
+    /// home may be of the life that its holder still leads, and then is its own to withdraw.
+    pub(crate) fn drop_life(&mut self, node: &NodeName, incarnation: u64) -> Vec<ProxyChange> {
         let Some(bidder) = self.bidders.get_mut(node) else { return Vec::new() };
+        if bidder.incarnation == incarnation {
+            return Vec::new();
+        }
         let before = bidder.bids.clone();
-        *bidder = bidder.reborn(0);
+        *bidder = bidder.reborn(incarnation);
         changes(node, &before, &bidder.bids)
     }
 

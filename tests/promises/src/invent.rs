@@ -172,11 +172,11 @@ impl Author {
             orders.push(Order { at, spread, what: Ordered::Lift { holder, bthread } });
         }
         if joint {
-            for node in 0..size {
+            for (node, cast) in casts.iter_mut().enumerate() {
                 if node == 0 || self.chance(0.3) {
                     let every = self.between(200, 3000);
                     let asks = Role::Asks { event: "swarm/go".to_owned(), every, patience: None };
-                    casts[node].roles.push(("decide".to_owned(), asks));
+                    cast.roles.push(("decide".to_owned(), asks));
                 }
             }
             let mut times: Vec<Duration> =

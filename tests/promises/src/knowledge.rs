@@ -62,6 +62,8 @@ pub(crate) struct Member {
     /// Who decides on joint events, as this node was told last, and as it was told before its last step.
     pub(crate) roster: Option<Roster>,
     pub(crate) former_roster: Option<Roster>,
+    /// The rosters that it had one after another in its last step.
+    pub(crate) rosters: Vec<Roster>,
 }
 
 /// A block that is to outlive its holder.
@@ -157,6 +159,7 @@ impl Knowledge {
         let numbers = &self.numbers;
         let member = &mut self.members[step.node];
         member.former_roster = member.roster.clone();
+        member.rosters = member.roster.iter().cloned().collect();
         for happened in step.happened {
             if happened.home == member.name {
                 member.does(happened, |name| numbers.get(name).copied());
@@ -213,6 +216,7 @@ impl Member {
             kept: BTreeMap::new(),
             lifted: BTreeMap::new(),
             former_roster: roster.clone(),
+            rosters: Vec::new(),
             roster,
         }
     }
@@ -263,6 +267,7 @@ impl Member {
             && let Ok(roster) = Roster::ordered(event)
             && self.roster.as_ref().is_none_or(|known| roster.term > known.term)
         {
+            self.rosters.push(roster.clone());
             self.roster = Some(roster);
         }
         if event.kind() == LIFT

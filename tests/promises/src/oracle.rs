@@ -83,8 +83,9 @@ impl Court {
         self.knowledge.dies(node);
     }
 
-    pub(crate) fn pauses(&mut self, node: usize, paused: bool) {
-        self.knowledge.members[node].paused = paused;
+    /// A node stands still, until its next step.
+    pub(crate) fn pauses(&mut self, node: usize) {
+        self.knowledge.members[node].paused = true;
     }
 
     /// Judges a step; the first violation, if there is one.
@@ -95,6 +96,7 @@ impl Court {
             oracle.judge(step, &self.knowledge, &mut findings);
         }
         self.knowledge.conclude(step);
+        self.knowledge.members[step.node].paused = false;
         self.first(step.at, findings)
     }
 

@@ -214,8 +214,9 @@ impl<'a> Stage<'a> {
             Turn::Still(node, begins) => {
                 let player = &mut self.players[node];
                 player.still = if begins { player.still + 1 } else { player.still - 1 };
-                let still = player.still > 0 && player.alive.is_some();
-                self.court.pauses(node, still);
+                if begins && player.alive.is_some() {
+                    self.court.pauses(node);
+                }
             }
         }
     }
@@ -277,7 +278,9 @@ impl<'a> Stage<'a> {
         player.stepped = None;
         player.senses_next = cast.senses.map(|every| self.now + every);
         let still = player.still > 0;
-        self.court.pauses(node, still);
+        if still {
+            self.court.pauses(node);
+        }
     }
 
     /// Lets a node take in what has come, go on, and send; then judges it.

@@ -8,6 +8,7 @@ use skein_bp::{Bid, Event, EventSet};
 use crate::facts::{self, count};
 use crate::joint::Joint;
 use crate::node::{Delivery, Node};
+use crate::outbox::Outbox;
 use crate::{JointWord, Message, NodeName, Occurrence, Presence, ROSTER, Recipient, Repair, Roster};
 
 /// The proxy that keeps joint events back while a member has not been heard, or has yet to apply a decision.
@@ -73,14 +74,38 @@ impl Node {
             Ok(roster) => match roster.members.iter().find(|member| !self.knows(member)) {
                 Some(stranger) => format!("{stranger} is not of this fleet"),
                 None => {
-                    self.joint = Some(Joint::new(roster, &self.config.name));
+                    let former = self.joint.replace(Joint::new(roster, &self.config.name));
                     self.unsaved = true;
                     self.presence_due = self.now;
-                    return self.take_up_roster();
+                    self.take_up_roster();
+                    return self.leave_unknown(former.as_ref());
                 }
             },
         };
         self.fact(facts::ROSTER_REFUSED, |fact| fact.with("why", refused));
+    }
+
+    /// What was asked of the coordinator of a term that is over may have been decided there or not: it is not asked again
+    /// (G4).
+    fn leave_unknown(&mut self, former: Option<&Joint>) {
+        let Some(former) = former.filter(|former| !former.leads()) else { return };
+        let home = &former.roster.coordinator;
+        let asked = self.outboxes.get(home).map(Outbox::asked).unwrap_or_default();
+        for (bthread, sync) in asked {
+            let bids = self.program.bids();
+            let stays = bids.filter(|(name, _, now_at)| *name == bthread && *now_at == sync);
+            let requests = stays.flat_map(|(_, bid, _)| bid.requests());
+            let Some(event) = requests.filter(|e| Roster::joint_events().contains(e)).cloned().next() else {
+                continue;
+            };
+            let coordinator = self.joint.as_ref().map(|joint| &joint.roster.coordinator);
+            if let Some(outbox) = coordinator.and_then(|coordinator| self.outboxes.get_mut(coordinator)) {
+                outbox.leave_unknown(&bthread, sync);
+            }
+            self.fact(facts::UNKNOWN, |fact| {
+                fact.with("event", event.name()).with("bthread", bthread).with("home", home.as_str())
+            });
+        }
     }
 
     fn knows(&self, node: &NodeName) -> bool {

@@ -39,7 +39,7 @@ impl Node {
 
     /// `node` lives in a new incarnation: nothing of the old one goes on.
     fn begin_life(&mut self, node: &NodeName, incarnation: u64) {
-        let changes = self.table.drop_life(node);
+        let changes = self.table.drop_life(node, incarnation);
         self.change_proxies(changes);
         let mut heard = VecDeque::new();
         if let Some(stream) = self.streams.get_mut(node) {

@@ -66,9 +66,8 @@ impl Joint {
     fn learns(&mut self, step: &Step<'_>, happened: &Happened, knowledge: &Knowledge) -> Result<(), String> {
         let Happened { event, seq, term, .. } = happened;
         let me = knowledge.member(step.node);
-        // The order of a new term may have come within this step.
-        let rosters = [&me.former_roster, &me.roster];
-        let roster = rosters.into_iter().flatten().find(|roster| roster.term == *term);
+        // Orders of new terms may have come within this step.
+        let roster = me.rosters.iter().find(|roster| roster.term == *term);
         let Some(roster) = roster.filter(|roster| roster.coordinator == happened.home) else {
             return Err(format!(
                 "{event} of {}, term {term}, counts here, where that is not the term",
