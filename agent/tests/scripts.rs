@@ -44,6 +44,8 @@ fn config() -> AgentConfig {
         controller: Controller::Bp,
         scripts: Vec::new(),
         lease: Duration::from_secs(1),
+        authority: skein_wire::standard_authority(),
+        kept: skein_dbp::Kept::default(),
         seed: 1,
     }
 }

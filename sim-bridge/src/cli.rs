@@ -81,6 +81,9 @@ pub enum Command {
 /// Campaigns.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum Campaign {
+    /// Generated programs on 2 to 10 nodes in memory, in lockstep, under every fault a network and a process can have;
+    /// every promise is checked at every step.
+    Network(NetworkCampaign),
     /// A swarm as processes over Zenoh, in real time, with a fault at a random moment of each flight.
     #[cfg(feature = "zenoh")]
     Processes {
@@ -103,6 +106,24 @@ pub enum Campaign {
         #[arg(long, value_enum, default_value_t = Network::Peer)]
         network: Network,
     },
+}
+
+/// Options of `campaign network`.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct NetworkCampaign {
+    /// How many seeds.
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    pub seeds: u64,
+    /// The first seed.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub from: u64,
+    /// How many at once; as many as this computer has processors if not given.
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<usize>,
+    /// Let every node break this promise on purpose; needs the cargo feature `mutants`.
+    #[arg(long = "break", value_name = "PROMISE", ignore_case = true,
+        value_parser = ["G1", "G2", "G3", "G4", "G5", "G6", "G7", "G8", "G9"])]
+    pub breaks: Option<String>,
 }
 
 /// Options of `fly`.

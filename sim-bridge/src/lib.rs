@@ -4,7 +4,6 @@
 //! for agents and MAVLink clients in other processes. All take a [`scenario`].
 
 pub mod bench;
-#[cfg(feature = "zenoh")]
 pub mod campaign;
 pub mod check;
 pub mod cli;

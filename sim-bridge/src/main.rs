@@ -47,14 +47,13 @@ fn run(cli: &Cli) -> anyhow::Result<Exit> {
         }
         #[cfg(feature = "zenoh")]
         Command::Configure(args) => skein_sim::configure::run(args, cli.json).map(|()| Exit::Done),
-        #[cfg(feature = "zenoh")]
         Command::Campaign { what } => {
             let sound = skein_sim::campaign::run(what, cli.json)?;
             Ok(if sound { Exit::Done } else { Exit::Failed })
         }
         Command::Bench { what } => skein_sim::bench::run(what, cli.json).map(|()| Exit::Done),
         #[cfg(not(feature = "zenoh"))]
-        Command::Serve(_) | Command::Configure(_) | Command::Campaign { .. } => {
+        Command::Serve(_) | Command::Configure(_) => {
             anyhow::bail!("built without the cargo feature `zenoh`, which this needs")
         }
         Command::List => {

@@ -42,6 +42,9 @@ pub struct NodeConfig {
     pub history: usize,
     /// Selections in one step after which the program counts as unsettled.
     pub settle_limit: usize,
+    /// The promise that this node breaks on purpose.
+    #[cfg(feature = "mutants")]
+    pub mutant: Option<crate::Mutant>,
 }
 
 impl NodeConfig {
@@ -65,6 +68,8 @@ impl NodeConfig {
             remote_priority: i32::MIN..=i32::MAX,
             history: 1024,
             settle_limit: 1000,
+            #[cfg(feature = "mutants")]
+            mutant: None,
         }
     }
 }

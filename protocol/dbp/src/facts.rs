@@ -17,8 +17,8 @@ pub const BLOCK_LAPSED: &str = "block_lapsed";
 pub const REFUSED: &str = "refused";
 /// This home does not honour a bid of `bthread` at `node`, for `reason` (G7): what [`REFUSED`] is to the bidder.
 pub const DENIED: &str = "denied";
-/// `home` has restarted while `bthread` requested `event` there: it may have occurred or not, and is not asked for
-/// again before the b-thread's next synchronisation point (G4).
+/// `home` has restarted, or is coordinator no more, while `bthread` requested `event` there: it may have occurred or not,
+/// and is not asked for again before the b-thread's next synchronisation point (G4).
 pub const UNKNOWN: &str = "unknown";
 /// `event` of `home` has occurred at the request of `bthread`, which had moved on meanwhile.
 pub const ORPHAN: &str = "orphan";

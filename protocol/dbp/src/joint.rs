@@ -33,6 +33,8 @@ pub(crate) struct Joint {
     in_step: bool,
     /// Others that were last heard in another term, and in which.
     astray: BTreeMap<NodeName, u64>,
+    #[cfg(feature = "mutants")]
+    pub(crate) mutant: Option<crate::Mutant>,
 }
 
 impl Joint {
@@ -48,6 +50,8 @@ impl Joint {
             heard: None,
             in_step: false,
             astray: BTreeMap::new(),
+            #[cfg(feature = "mutants")]
+            mutant: None,
         }
     }
 
@@ -112,6 +116,9 @@ impl Joint {
                 && word.heard.is_some_and(|heard| heard <= up && heard + lease > up)
         };
         let others = self.roster.members.iter().filter(|member| **member != self.roster.coordinator);
+        #[cfg(feature = "mutants")]
+        let others = others
+            .filter(|member| self.mutant != Some(crate::Mutant::G8) || self.words.contains_key(*member));
         self.leads
             && self.decisions.latest_seq() < MOST_DECISIONS as u64
             && others.into_iter().all(|member| self.words.get(member).is_some_and(fresh))

@@ -54,6 +54,8 @@ mod history;
 mod joint;
 mod kept;
 mod message;
+#[cfg(feature = "mutants")]
+mod mutant;
 mod name;
 mod node;
 mod outbox;
@@ -73,8 +75,10 @@ pub use message::{
     BidAck, BidRecord, JointWord, Message, Occurrence, OnLoss, Presence, Recipient, Refusal, RefusalReason,
     RemoteBid, Repair, ServedRequest,
 };
+#[cfg(feature = "mutants")]
+pub use mutant::Mutant;
 pub use name::{NodeName, NodeNameError, first_two_chunks, is_chunk};
-pub use node::{Happened, LIFT, Node, NodeError, NodeStats};
+pub use node::{Happened, LIFT, Node, NodeError, NodeStats, ProxyMove};
 pub use peers::Peer;
 pub use roster::{ROSTER, Roster, RosterError, SWARM};
 pub use table::RemoteParty;

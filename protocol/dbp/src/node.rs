@@ -62,6 +62,17 @@ pub struct Happened {
     pub at: Duration,
 }
 
+/// A proxy's bid as the program was told it: the channel's part in the run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ProxyMove {
+    /// How many of the selections that [`Node::take_selections`] gives next came before it.
+    pub after: usize,
+    /// The proxy, `node#bthread`.
+    pub proxy: Arc<str>,
+    /// Its bid from now on; none if it goes.
+    pub bid: Option<Bid>,
+}
+
 /// Why a step did not go well. What happened in it counts all the same.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NodeError {
@@ -144,6 +155,8 @@ pub struct Node {
     two_homed: BTreeMap<String, u64>,
     outgoing: Vec<(Recipient, Message)>,
     selections: Vec<Happened>,
+    /// How proxies moved, where that is recorded.
+    proxy_moves: Option<Vec<ProxyMove>>,
     stats: NodeStats,
 }
 
@@ -202,6 +215,8 @@ impl Node {
             priority: config.remote_priority.clone(),
             longest_lease: config.longest_lease.max(config.lease),
             durable: config.durable,
+            #[cfg(feature = "mutants")]
+            mutant: config.mutant,
         };
         rights.set_home(home.clone());
         let Kept { blocks, roster, term, mut decisions } = std::mem::take(&mut config.kept);
@@ -239,6 +254,7 @@ impl Node {
             two_homed: BTreeMap::new(),
             outgoing: Vec::new(),
             selections: Vec::new(),
+            proxy_moves: None,
             stats: NodeStats::default(),
             config,
         };
@@ -335,6 +351,17 @@ impl Node {
     /// What has happened since the last call, here and elsewhere, in the order in which the program saw it.
     pub fn take_selections(&mut self) -> Vec<Happened> {
         std::mem::take(&mut self.selections)
+    }
+
+    /// Records from now on how proxies move, for one who replays the run; see
+    /// [`take_proxy_moves`](Self::take_proxy_moves).
+    pub fn record_proxies(&mut self) {
+        self.proxy_moves.get_or_insert_default();
+    }
+
+    /// How proxies have moved since the last call, in order; to be taken together with the selections.
+    pub fn take_proxy_moves(&mut self) -> Vec<ProxyMove> {
+        self.proxy_moves.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// When [`step`](Self::step) is due even if no message comes.

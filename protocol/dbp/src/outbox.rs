@@ -112,6 +112,18 @@ impl Outbox {
         unknown
     }
 
+    /// The b-threads, each with its synchronisation point, that the home may have served or may still serve.
+    pub(crate) fn asked(&self) -> Vec<(String, u64)> {
+        let open = self.bids.iter().filter(|bid| self.home_incarnation.is_some() && !bid.requests.is_empty());
+        let open = open.map(|bid| (bid.bthread.clone(), bid.sync));
+        open.chain(self.unknown.iter().map(|(bthread, sync)| (bthread.clone(), *sync))).collect()
+    }
+
+    /// What `bthread` requests since its synchronisation point `sync` may have occurred elsewhere: it is not asked for here.
+    pub(crate) fn leave_unknown(&mut self, bthread: &str, sync: u64) {
+        self.unknown.insert(bthread.into(), sync);
+    }
+
     fn renew_content(&mut self) {
         self.epoch += 1;
         let epoch = self.epoch;

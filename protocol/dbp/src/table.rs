@@ -9,6 +9,8 @@ use std::time::Duration;
 use skein_bp::{Bid, Event, EventSet};
 
 use crate::history::History;
+#[cfg(feature = "mutants")]
+use crate::mutant::Mutant;
 use crate::{
     Authority, BidRecord, KeptBlock, NodeName, OnLoss, Refusal, RefusalReason, RemoteBid, Roster,
     ServedRequest,
@@ -40,6 +42,8 @@ pub(crate) struct Rights {
     pub(crate) longest_lease: Duration,
     /// Whether blocks may outlive their holders, since what must be kept is kept on disk.
     pub(crate) durable: bool,
+    #[cfg(feature = "mutants")]
+    pub(crate) mutant: Option<crate::Mutant>,
 }
 
 /// The change of a proxy: its new bid, or none if it goes.
@@ -217,15 +221,22 @@ impl BidTable {
         bidder.released.clear();
         bidder.knows_this_life |= for_this_life;
         let mut taken = BTreeMap::new();
+        #[cfg(feature = "mutants")]
+        if self.rights.mutant == Some(Mutant::G2) {
+            taken = bidder.bids.clone();
+        }
         for (index, bid) in record.bids.iter().enumerate() {
             let (honoured, reasons) = self.rights.judge(&record.node, bid, index, bidder.lease);
             bidder.refuse(bid, reasons);
             let Some(mut honoured) = honoured else { continue };
             // What has occurred since the bidder stated this resumes its b-thread, which asks no more (G4).
             let resumed = since.iter().any(|event| bid.requests.contains(event));
+            let over = bidder.has_been_served(bid) || resumed;
+            #[cfg(feature = "mutants")]
+            let over = over && self.rights.mutant != Some(Mutant::G4);
             let astray =
                 record.term != past.term && bid.requests.iter().any(|e| Roster::joint_events().contains(e));
-            honoured.open &= for_this_life && !bidder.has_been_served(bid) && !resumed && !astray;
+            honoured.open &= for_this_life && !over && !astray;
             if honoured.keep && bidder.lifted.get(&bid.bthread).is_some_and(|sync| bid.sync <= *sync) {
                 honoured.block = EventSet::None;
                 honoured.keep = false;
@@ -263,11 +274,15 @@ impl BidTable {
         self.bidders.get(node).is_some_and(|bidder| bidder.knows_this_life)
     }
 
-    /// `node` begins a new life: what it bid before is void.
-    pub(crate) fn drop_life(&mut self, node: &NodeName) -> Vec<ProxyChange> {
+    /// `node` lives in `incarnation`: what it bid in another life is void. A block that was kept over a restart of this
+    /// home may be of the life that its holder still leads, and then is its own to withdraw.
+    pub(crate) fn drop_life(&mut self, node: &NodeName, incarnation: u64) -> Vec<ProxyChange> {
         let Some(bidder) = self.bidders.get_mut(node) else { return Vec::new() };
+        if bidder.incarnation == incarnation {
+            return Vec::new();
+        }
         let before = bidder.bids.clone();
-        *bidder = bidder.reborn(0);
+        *bidder = bidder.reborn(incarnation);
         changes(node, &before, &bidder.bids)
     }
 
@@ -275,7 +290,7 @@ impl BidTable {
     pub(crate) fn expire(&mut self, now: Duration) -> Vec<ProxyChange> {
         let mut gone = Vec::new();
         for (node, bidder) in &mut self.bidders {
-            if bidder.live && now >= bidder.heard_at + bidder.lease {
+            if bidder.live && now >= self.rights.lapses_at(bidder) {
                 bidder.live = false;
                 bidder.released = bidder.releasing().collect();
                 let before = std::mem::take(&mut bidder.bids);
@@ -306,7 +321,7 @@ impl BidTable {
         self.bidders
             .values()
             .filter(|bidder| bidder.live && !bidder.bids.is_empty())
-            .map(|bidder| bidder.heard_at + bidder.lease)
+            .map(|bidder| self.rights.lapses_at(bidder))
             .min()
     }
 
@@ -410,9 +425,22 @@ impl Bidder {
 }
 
 impl Rights {
+    /// When the lease of a bidder runs out, on this home's clock.
+    fn lapses_at(&self, bidder: &Bidder) -> Duration {
+        #[cfg(feature = "mutants")]
+        match self.mutant {
+            Some(Mutant::G3) => return bidder.heard_at + bidder.lease * 8 / 10,
+            Some(Mutant::G5) => return Duration::MAX,
+            _ => {}
+        }
+        bidder.heard_at + bidder.lease
+    }
+
     /// From now on, these events have their home here.
     pub(crate) fn set_home(&mut self, home: EventSet) {
         let never = self.facts.clone().or(self.safety.clone()).or(self.gateway.clone());
+        #[cfg(feature = "mutants")]
+        let never = if self.mutant == Some(Mutant::G6) { self.facts.clone() } else { never };
         self.blockable = home.clone().and(never.not());
         self.home = home;
     }
@@ -432,6 +460,11 @@ impl Rights {
             return (None, vec![RefusalReason::LeaseTooLong]);
         }
         let denial = |event: &Event| self.denial(node, &bid.bthread, event);
+        #[cfg(feature = "mutants")]
+        let denial = |event: &Event| {
+            denial(event)
+                .filter(|why| self.mutant != Some(Mutant::G7) || *why != RefusalReason::MayNotRequest)
+        };
         let mut reasons: Vec<_> = bid.requests.iter().filter_map(denial).collect();
         // A b-thread blocks with one set what it wants to block at all homes together.
         let block = match self.authority.may_block(node, &bid.bthread, &bid.block.about(&self.home)) {

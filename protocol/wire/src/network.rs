@@ -46,6 +46,10 @@ pub struct NetworkStats {
     pub delivered: u64,
     /// Messages lost by chance or for lack of a way.
     pub lost: u64,
+    /// Messages that arrive twice.
+    pub duplicated: u64,
+    /// Messages that overtake one that was put before them.
+    pub overtaking: u64,
 }
 
 /// A network in memory with seeded latency, loss, duplication, reordering and partition.
@@ -177,6 +181,15 @@ impl Network {
     }
 }
 
+impl MemoryLink {
+    /// When the next message arrives at this end, if one is on its way.
+    #[must_use]
+    pub fn next_arrival(&self) -> Option<Duration> {
+        let air = self.network.lock();
+        air.ports.get(&self.port)?.arriving.keys().next().map(|(at, _)| *at)
+    }
+}
+
 impl Link for MemoryLink {
     fn put(&mut self, key: &Key, payload: Vec<u8>) {
         self.network.lock().put(self.port, key, payload.into());
@@ -205,12 +218,14 @@ impl Air {
                 .is_some_and(|port| self.groups.get(&port.node) == self.groups.get(&sender));
             // The same draws whether or not there is a way, so that a partition changes nothing else.
             let lost = self.rng.random::<f64>() < self.config.loss;
-            let copies = 1 + usize::from(self.rng.random::<f64>() < self.config.duplicate);
-            for _ in 0..copies {
-                let arrival = self.draw_arrival(from, to);
+            let copies = 1 + u64::from(self.rng.random::<f64>() < self.config.duplicate);
+            for copy in 0..copies {
+                let (arrival, overtakes) = self.draw_arrival(from, to);
                 if !reachable || lost {
                     continue;
                 }
+                self.stats.duplicated += copy;
+                self.stats.overtaking += u64::from(overtakes);
                 let message = self.next_message;
                 self.next_message += 1;
                 if let Some(port) = self.ports.get_mut(&to) {
@@ -223,19 +238,18 @@ impl Air {
         }
     }
 
-    /// When a message put now arrives.
-    fn draw_arrival(&mut self, from: u64, to: u64) -> Duration {
+    /// When a message put now arrives, and whether it overtakes others.
+    fn draw_arrival(&mut self, from: u64, to: u64) -> (Duration, bool) {
         let (least, greatest) = self.config.latency;
         let arrival = self.now + least + greatest.saturating_sub(least).mul_f64(self.rng.random::<f64>());
-        let overtakes = self.rng.random::<f64>() < self.config.reorder;
-        match self.ports.get_mut(&to) {
-            Some(port) if !overtakes => {
-                let until = port.in_order_until.entry(from).or_default();
-                *until = arrival.max(*until);
-                *until
-            }
-            _ => arrival,
+        let may_overtake = self.rng.random::<f64>() < self.config.reorder;
+        let Some(port) = self.ports.get_mut(&to) else { return (arrival, false) };
+        let until = port.in_order_until.entry(from).or_default();
+        if may_overtake {
+            return (arrival, arrival < *until);
         }
+        *until = arrival.max(*until);
+        (*until, false)
     }
 
     fn poll(&mut self, at: u64) -> Option<(Key, Vec<u8>)> {

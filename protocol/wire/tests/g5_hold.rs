@@ -134,3 +134,18 @@ fn a_home_without_a_store_refuses_it() {
     let refused = swarm.saw("ground/main", "ground/main/refused").next().unwrap();
     assert_eq!(refused.happened.event.text("reason"), Some("hold_unsupported"));
 }
+
+#[test]
+fn a_holder_that_lives_withdraws_it_from_a_home_that_has_restarted() {
+    let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
+    let until = 6 * LEASE;
+    start_home(&mut swarm, 1, 1);
+    start_holder(&mut swarm, 1, Bid::new().hold_when_lost(), until);
+    swarm.run(2 * LEASE);
+    start_home(&mut swarm, 2, 1);
+    let restarted = swarm.now;
+    swarm.run(2 * LEASE);
+    assert_eq!(steps_since(&swarm, restarted), 0, "what was promised is kept");
+    swarm.run(6 * LEASE);
+    assert!(steps_since(&swarm, until) > 0, "its holder withdrew it in vain");
+}

@@ -8,6 +8,7 @@ use skein_bp::{Bid, Event, EventSet};
 use crate::facts::{self, count};
 use crate::joint::Joint;
 use crate::node::{Delivery, Node};
+use crate::outbox::Outbox;
 use crate::{JointWord, Message, NodeName, Occurrence, Presence, ROSTER, Recipient, Repair, Roster};
 
 /// The proxy that keeps joint events back while a member has not been heard, or has yet to apply a decision.
@@ -51,6 +52,10 @@ impl Node {
 
     /// Sets what is selected here, and may be bid for here, by the roster.
     fn take_up_roster(&mut self) {
+        #[cfg(feature = "mutants")]
+        if let Some(joint) = &mut self.joint {
+            joint.mutant = self.config.mutant;
+        }
         let own = EventSet::prefix(format!("{}/", self.config.name));
         let leads = self.joint.as_ref().is_some_and(Joint::leads);
         self.home = if leads { own.or(Roster::joint_events()) } else { own };
@@ -69,14 +74,38 @@ impl Node {
             Ok(roster) => match roster.members.iter().find(|member| !self.knows(member)) {
                 Some(stranger) => format!("{stranger} is not of this fleet"),
                 None => {
-                    self.joint = Some(Joint::new(roster, &self.config.name));
+                    let former = self.joint.replace(Joint::new(roster, &self.config.name));
                     self.unsaved = true;
                     self.presence_due = self.now;
-                    return self.take_up_roster();
+                    self.take_up_roster();
+                    return self.leave_unknown(former.as_ref());
                 }
             },
         };
         self.fact(facts::ROSTER_REFUSED, |fact| fact.with("why", refused));
+    }
+
+    /// What was asked of the coordinator of a term that is over may have been decided there or not: it is not asked again
+    /// (G4).
+    fn leave_unknown(&mut self, former: Option<&Joint>) {
+        let Some(former) = former.filter(|former| !former.leads()) else { return };
+        let home = &former.roster.coordinator;
+        let asked = self.outboxes.get(home).map(Outbox::asked).unwrap_or_default();
+        for (bthread, sync) in asked {
+            let bids = self.program.bids();
+            let stays = bids.filter(|(name, _, now_at)| *name == bthread && *now_at == sync);
+            let requests = stays.flat_map(|(_, bid, _)| bid.requests());
+            let Some(event) = requests.filter(|e| Roster::joint_events().contains(e)).cloned().next() else {
+                continue;
+            };
+            let coordinator = self.joint.as_ref().map(|joint| &joint.roster.coordinator);
+            if let Some(outbox) = coordinator.and_then(|coordinator| self.outboxes.get_mut(coordinator)) {
+                outbox.leave_unknown(&bthread, sync);
+            }
+            self.fact(facts::UNKNOWN, |fact| {
+                fact.with("event", event.name()).with("bthread", bthread).with("home", home.as_str())
+            });
+        }
     }
 
     fn knows(&self, node: &NodeName) -> bool {
@@ -147,7 +176,7 @@ impl Node {
     pub(super) fn guard_joint_events(&mut self) {
         let Some(joint) = self.joint.as_ref().filter(|joint| joint.leads()) else {
             if std::mem::take(&mut self.guards_joint) {
-                self.program.remove_proxy(JOINT_GUARD);
+                self.change_proxies(vec![(JOINT_GUARD.into(), None)]);
             }
             return;
         };
@@ -155,11 +184,8 @@ impl Node {
         if std::mem::replace(&mut self.guards_joint, guards) == guards {
             return;
         }
-        if guards {
-            self.program.put_proxy(JOINT_GUARD, &Bid::new().block(Roster::joint_events()));
-        } else {
-            self.program.remove_proxy(JOINT_GUARD);
-        }
+        let block = guards.then(|| Bid::new().block(Roster::joint_events()));
+        self.change_proxies(vec![(JOINT_GUARD.into(), block)]);
     }
 
     /// When joint events must be kept back again, if nobody is heard until then.

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use crate::facts::{self, count};
-use crate::node::{Delivery, LEAST_LEASE, Node, REPEAT_DOUBLE};
+use crate::node::{Delivery, LEAST_LEASE, Node, ProxyMove, REPEAT_DOUBLE};
 use crate::peers::Word;
 use crate::stream::{Heard, REPAIR_CHUNK, Stream};
 use crate::table::{Past, ProxyChange, TakenIn};
@@ -39,7 +39,7 @@ impl Node {
 
     /// `node` lives in a new incarnation: nothing of the old one goes on.
     fn begin_life(&mut self, node: &NodeName, incarnation: u64) {
-        let changes = self.table.drop_life(node);
+        let changes = self.table.drop_life(node, incarnation);
         self.change_proxies(changes);
         let mut heard = VecDeque::new();
         if let Some(stream) = self.streams.get_mut(node) {
@@ -72,11 +72,14 @@ impl Node {
     pub(super) fn change_proxies(&mut self, changes: Vec<ProxyChange>) {
         self.stalls_due |= !changes.is_empty();
         for (proxy, bid) in changes {
-            match bid {
-                Some(bid) => self.program.put_proxy(proxy, &bid),
+            match &bid {
+                Some(bid) => self.program.put_proxy(proxy.clone(), bid),
                 None => {
                     self.program.remove_proxy(&proxy);
                 }
+            }
+            if let Some(moves) = &mut self.proxy_moves {
+                moves.push(ProxyMove { after: self.selections.len(), proxy, bid });
             }
         }
     }
@@ -152,6 +155,10 @@ impl Node {
             return self.take_in_decision(occurrence);
         }
         let mut heard = VecDeque::new();
+        #[cfg(feature = "mutants")]
+        if self.config.mutant == Some(crate::Mutant::G1) {
+            heard.push_back(Heard::Occurrence(occurrence.clone()));
+        }
         if let Some(stream) = self.streams.get_mut(&home) {
             stream.occurrence(occurrence, &mut heard);
         }

@@ -30,7 +30,7 @@ impl Node {
             && (self.now >= self.guard_ends() || self.peers.names().all(|member| self.table.knows(member)))
         {
             self.guarding = false;
-            self.program.remove_proxy(RESTART_GUARD);
+            self.change_proxies(vec![(RESTART_GUARD.into(), None)]);
         }
     }
 
@@ -71,6 +71,12 @@ impl Node {
     }
 
     fn run_program(&mut self, before: usize, select: &mut Select<'_>) -> Result<(), NodeError> {
+        #[cfg(feature = "mutants")]
+        if self.config.mutant == Some(crate::Mutant::G9)
+            && let Some(selection) = self.program.step(self.now)?
+        {
+            self.publish(selection);
+        }
         while let Some(delivery) = self.deliveries.pop_front() {
             match delivery {
                 Delivery::Fact(_, Some((bthread, sync))) if self.sync_of(&bthread) != Some(sync) => {}
@@ -151,7 +157,6 @@ impl Node {
         let choice = choice(&selection);
         let Selection { event, origin, requested_by, .. } = selection;
         let (served, proxies) = self.table.serve(&requested_by);
-        self.change_proxies(proxies);
         self.stalls_due = true;
         self.stats.occurred += 1;
         let travels = self.home.contains(&event);
@@ -176,13 +181,8 @@ impl Node {
             history.push(occurrence.clone());
             self.outgoing.push((Recipient::All, Message::Occurrence(occurrence)));
         }
-        if term > 0 {
-            self.unsaved = true;
-            self.guard_joint_events();
-        }
-        self.heed(&event);
         self.selections.push(Happened {
-            event,
+            event: event.clone(),
             home: self.config.name.clone(),
             seq,
             term,
@@ -191,6 +191,12 @@ impl Node {
             choice,
             at: self.now,
         });
+        if term > 0 {
+            self.unsaved = true;
+            self.guard_joint_events();
+        }
+        self.heed(&event);
+        self.change_proxies(proxies);
     }
 
     fn check_held_blocks(&mut self) {
