@@ -1,7 +1,7 @@
 //! A state of a network as a row of numbers.
 //!
 //! Counters that grow for ever would make every state a new one. Only their order counts, so each family of them is
-//! counted anew, from the least one that is in use.
+//! counted anew, by those that are in use.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -109,11 +109,11 @@ impl<'a> Row<'a> {
         let mut last = None;
         let mut rank = 0;
         for (family, number, place) in self.numbers {
+            // Zero is where all of them begin again after a restart, so it keeps its place.
             rank = match last {
-                Some((before, _)) if before != family => 0,
-                Some((_, same)) if same == number => rank,
-                Some(_) => rank + 1,
-                None => 0,
+                Some((before, same)) if before == family && same == number => rank,
+                Some((before, _)) if before == family => rank + 1,
+                _ => u32::from(number > 0),
             };
             last = Some((family, number));
             if let Some(word) = self.words.get_mut(place) {
