@@ -536,7 +536,7 @@ mod tests {
     /// What a row leaves out, such as times and how far the counters have come, must make no difference.
     #[test]
     fn networks_of_one_row_go_on_alike() {
-        let faults = Faults { lapses: 1, ..Faults::default() };
+        let faults = Faults { lapses: 1, restarts: 1, ..Faults::default() };
         for network in programs::sound().unwrap() {
             let network_name = network.name;
             let mut model = NetworkModel::new(network.members, faults, Vec::new());
