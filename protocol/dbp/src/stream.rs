@@ -40,6 +40,11 @@ impl Stream {
         self.applied.unwrap_or(0)
     }
 
+    /// The life of the home that is heard.
+    pub(crate) fn incarnation(&self) -> Option<u64> {
+        self.incarnation
+    }
+
     /// Whether it is known from where on this home is heard.
     pub(crate) fn has_begun(&self) -> bool {
         self.applied.is_some()

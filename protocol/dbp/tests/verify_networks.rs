@@ -4,10 +4,12 @@
 
 use std::sync::Arc;
 
-use skein_bp::EventSet;
+use skein_bp::script::{Op, Script};
 use skein_bp::verify::{Omission, Report, ViolationKind};
+use skein_bp::{Bid, EventSet, Program, ProgramConfig};
 use skein_dbp::verify::programs::{self, Network};
 use skein_dbp::verify::{Faults, Member, NetworkView};
+use skein_dbp::{NodeConfig, NodeName, facts};
 
 const NONE: Faults = Faults { delay: false, lapses: 0, restarts: 0, late_facts: false, most_under_way: 8 };
 
@@ -88,6 +90,41 @@ fn one_at_most_is_inside_after_a_restart_even_where_entering_is_not_guarded() {
         config.guarded = EventSet::None;
     }
     holds(&network, Faults { restarts: 1, ..NONE });
+}
+
+/// Like the guarded resource, but whoever is inside does not heed that its block has lapsed.
+#[test]
+fn two_are_inside_where_a_lapsed_block_is_not_heeded() {
+    let members = ["uav/1", "uav/2"].map(|name| {
+        let name = NodeName::new(name).unwrap();
+        let own = name.event_name("enter");
+        let mut program = Program::new(ProgramConfig::default());
+        let others = EventSet::from("uav/*/enter").and(EventSet::named(own.as_str()).not());
+        let claim = Bid::new().block(others).wait_for(facts::block_lapsed(&name, "claim"));
+        program.add("claim", Script::new(&[Op::forever([Op::Sync(claim)])]).unwrap());
+        let entrance = [
+            Op::Sync(Bid::new().wait_for(facts::confirmed(&name, "claim"))),
+            Op::Sync(Bid::new().request(own)),
+            Op::Sync(Bid::new()),
+        ];
+        program.add("entrance", Script::new(&entrance).unwrap());
+        Member { config: NodeConfig::new(name, 1, Vec::new()), program, may_restart: false }
+    });
+    let one_inside = |view: &NetworkView<'_>| {
+        let is_inside =
+            |program: &Program| program.bids().any(|(name, _, sync)| name == "entrance" && sync == 3);
+        let inside = view.programs().filter(|(_, program)| is_inside(program)).count();
+        if inside > 1 { Err(format!("{inside} are inside")) } else { Ok(()) }
+    };
+    let network = Network {
+        name: "deaf",
+        members: members.into(),
+        requirement: Some(("one inside", Arc::new(one_inside))),
+    };
+    holds(&network, NONE);
+    let report = network.verifier(Faults { lapses: 1, ..NONE }).run();
+    assert!(report.verdict.is_some(), "{report}");
+    assert!(trace(&report).iter().any(|step| step.contains("lets go of what")), "{report}");
 }
 
 #[test]

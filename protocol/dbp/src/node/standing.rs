@@ -9,8 +9,8 @@ use crate::verify::row::{Family, Part, Row};
 impl Node {
     /// Writes where the node stands. Numbers that only grow are written as such, so that they can be counted anew.
     pub(crate) fn write_standing(&self, row: &mut Row<'_>) {
-        let own = &self.config.name;
-        let sync = |bthread: &str| Family::Sync(own.clone(), bthread.into());
+        let (own, life) = (&self.config.name, self.config.incarnation);
+        let sync = |bthread: &str| Family::Sync(own.clone(), life, bthread.into());
         row.part(Part::Program(Box::new(self.program.clone())));
         for (bthread, _, at) in self.program.bids() {
             row.number(sync(bthread), at);
@@ -38,21 +38,21 @@ impl Node {
         self.write_table(row);
         for (home, stream) in &self.streams {
             row.flag(stream.has_begun());
-            row.number(Family::Seq(home.clone()), stream.applied());
+            row.number(Family::Seq(home.clone(), stream.incarnation().unwrap_or(0)), stream.applied());
         }
-        row.number(Family::Seq(own.clone()), self.history.latest_seq());
+        row.number(Family::Seq(own.clone(), life), self.history.latest_seq());
     }
 
     fn write_outboxes(&self, row: &mut Row<'_>) {
-        let own = &self.config.name;
+        let (own, life) = (&self.config.name, self.config.incarnation);
         for (home, outbox) in &self.outboxes {
-            let epoch = || Family::Epoch(own.clone(), home.clone());
-            let sync = |bthread: &str| Family::Sync(own.clone(), bthread.into());
+            let epoch = || Family::Epoch(own.clone(), life, home.clone());
+            let sync = |bthread: &str| Family::Sync(own.clone(), life, bthread.into());
             row.optional(outbox.home_incarnation);
             row.number(epoch(), outbox.epoch);
             row.number(epoch(), outbox.acked_epoch);
             row.flag(self.is_sure_of(home));
-            row.list(&outbox.bids, |row, bid| row.bid(own, bid));
+            row.list(&outbox.bids, |row, bid| row.bid(own, life, bid));
             row.list(&outbox.since, |row, (bthread, (at, entered))| {
                 row.text(bthread);
                 row.number(sync(bthread), *at);
@@ -62,7 +62,7 @@ impl Node {
                 row.text(bthread);
                 row.number(sync(bthread), *at);
             });
-            row.list(&outbox.refused, |row, refusal| row.refusal(own, refusal));
+            row.list(&outbox.refused, |row, refusal| row.refusal(own, life, refusal));
             row.list(&outbox.durable, |row, (bthread, at)| {
                 row.text(bthread);
                 row.number(sync(bthread), *at);
@@ -72,10 +72,13 @@ impl Node {
 
     fn write_table(&self, row: &mut Row<'_>) {
         row.list(&self.table.bidders, |row, (node, bidder)| {
-            let sync = |bthread: &str| Family::Sync(node.clone(), bthread.into());
+            let sync = |bthread: &str| Family::Sync(node.clone(), bidder.incarnation, bthread.into());
             row.text(node.as_str());
             row.plain(bidder.incarnation);
-            row.number(Family::Epoch(node.clone(), self.config.name.clone()), bidder.epoch);
+            row.number(
+                Family::Epoch(node.clone(), bidder.incarnation, self.config.name.clone()),
+                bidder.epoch,
+            );
             row.flag(bidder.live);
             row.flag(bidder.knows_this_life);
             row.list(&bidder.bids, |row, (bthread, bid)| {
@@ -91,7 +94,7 @@ impl Node {
                 row.text(bthread);
                 row.number(sync(bthread), *at);
             });
-            row.list(&bidder.refused, |row, refusal| row.refusal(node, refusal));
+            row.list(&bidder.refused, |row, refusal| row.refusal(node, bidder.incarnation, refusal));
             row.list(&bidder.lifted, |row, (bthread, at)| {
                 row.text(bthread);
                 row.number(sync(bthread), *at);

@@ -516,3 +516,51 @@ impl Choices {
         selectable.get(taken).map(|event| program.choose(event, now)).transpose()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verify::programs;
+
+    /// Where a network may come to from here. Labels show counters, so they may differ.
+    fn ways(model: &mut NetworkModel, network: &Network) -> Vec<Vec<u32>> {
+        let mut ways = Vec::new();
+        for step in model.steps(network) {
+            for (_, next) in model.outcomes(network, &step) {
+                ways.push(model.row(&next));
+            }
+        }
+        ways.sort();
+        ways
+    }
+
+    /// What a row leaves out, such as times and how far the counters have come, must make no difference.
+    #[test]
+    fn networks_of_one_row_go_on_alike() {
+        let faults = Faults { lapses: 1, restarts: 1, ..Faults::default() };
+        for network in programs::sound().unwrap() {
+            let network_name = network.name;
+            let mut model = NetworkModel::new(network.members, faults, Vec::new());
+            let start = model.formed();
+            let mut seen = FxHashMap::default();
+            let mut queue = std::collections::VecDeque::from([start]);
+            let mut compared = 0;
+            while let Some(network) = queue.pop_front() {
+                let row = model.row(&network);
+                let ways = ways(&mut model, &network);
+                if let Some(known) = seen.get(&row) {
+                    compared += 1;
+                    assert_eq!(&ways, known, "{network_name}");
+                    continue;
+                }
+                seen.insert(row, ways);
+                if seen.len() + queue.len() < 600 {
+                    for step in model.steps(&network) {
+                        queue.extend(model.outcomes(&network, &step).into_iter().map(|(_, next)| next));
+                    }
+                }
+            }
+            assert!(compared > 100, "only {compared} pairs in {network_name}");
+        }
+    }
+}

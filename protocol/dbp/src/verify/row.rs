@@ -1,7 +1,7 @@
 //! A state of a network as a row of numbers.
 //!
 //! Counters that grow for ever would make every state a new one. Only their order counts, so each family of them is
-//! counted anew, from the least one that is in use.
+//! counted anew, by those that are in use.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,12 +25,12 @@ pub(crate) enum Part {
 /// Numbers that are compared with one another and with no others.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Family {
-    /// Synchronisation points of a node's b-thread.
-    Sync(NodeName, String),
-    /// Contents that a bidder has stated to a home.
-    Epoch(NodeName, NodeName),
-    /// Occurrences of a home.
-    Seq(NodeName),
+    /// Synchronisation points of a b-thread in one life of its node.
+    Sync(NodeName, u64, String),
+    /// Contents that a bidder has stated to a home in one of the bidder's lives.
+    Epoch(NodeName, u64, NodeName),
+    /// Occurrences of a home in one of its lives.
+    Seq(NodeName, u64),
 }
 
 /// A row that is being written.
@@ -89,17 +89,17 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// What `node` bids elsewhere.
-    pub(crate) fn bid(&mut self, node: &NodeName, bid: &RemoteBid) {
+    /// What `node` bids elsewhere in one of its lives.
+    pub(crate) fn bid(&mut self, node: &NodeName, life: u64, bid: &RemoteBid) {
         self.text(&bid.bthread);
-        self.number(Family::Sync(node.clone(), bid.bthread.clone()), bid.sync);
+        self.number(Family::Sync(node.clone(), life, bid.bthread.clone()), bid.sync);
         self.part(Part::Bid(bid.requests.clone(), bid.block.clone(), bid.priority));
     }
 
     /// What of a bid of `node` was refused.
-    pub(crate) fn refusal(&mut self, node: &NodeName, refusal: &Refusal) {
+    pub(crate) fn refusal(&mut self, node: &NodeName, life: u64, refusal: &Refusal) {
         self.text(&refusal.bthread);
-        self.number(Family::Sync(node.clone(), refusal.bthread.clone()), refusal.sync);
+        self.number(Family::Sync(node.clone(), life, refusal.bthread.clone()), refusal.sync);
         self.text(refusal.reason.as_str());
     }
 
@@ -109,11 +109,11 @@ impl<'a> Row<'a> {
         let mut last = None;
         let mut rank = 0;
         for (family, number, place) in self.numbers {
+            // Zero is where all of them begin again after a restart, so it keeps its place.
             rank = match last {
-                Some((before, _)) if before != family => 0,
-                Some((_, same)) if same == number => rank,
-                Some(_) => rank + 1,
-                None => 0,
+                Some((before, same)) if before == family && same == number => rank,
+                Some((before, _)) if before == family => rank + 1,
+                _ => u32::from(number > 0),
             };
             last = Some((family, number));
             if let Some(word) = self.words.get_mut(place) {

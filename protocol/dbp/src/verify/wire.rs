@@ -21,10 +21,10 @@ impl Wire {
         row.list(&self.records, |row, record| {
             row.plain(record.incarnation);
             row.optional(record.home_incarnation);
-            row.number(Family::Epoch(from.clone(), to.name().clone()), record.epoch);
+            row.number(Family::Epoch(from.clone(), record.incarnation, to.name().clone()), record.epoch);
             let since = to.occurred_since(record.applied);
             row.list(&record.bids, |row, bid| {
-                row.bid(from, bid);
+                row.bid(from, record.incarnation, bid);
                 // All that the home will ask of what has occurred since the record was made.
                 row.flag(since.iter().any(|event| bid.requests.contains(event)));
             });
@@ -32,18 +32,21 @@ impl Wire {
         row.list(&self.ack, |row, ack| {
             row.plain(ack.incarnation);
             row.plain(ack.home_incarnation);
-            row.number(Family::Epoch(to.name().clone(), from.clone()), ack.epoch);
-            row.list(&ack.refused, |row, refusal| row.refusal(to.name(), refusal));
+            row.number(Family::Epoch(to.name().clone(), ack.incarnation, from.clone()), ack.epoch);
+            row.list(&ack.refused, |row, refusal| row.refusal(to.name(), ack.incarnation, refusal));
         });
         row.list(&self.occurrences, |row, occurrence| {
             row.plain(occurrence.incarnation);
-            row.number(Family::Seq(from.clone()), occurrence.seq);
+            row.number(Family::Seq(from.clone(), occurrence.incarnation), occurrence.seq);
             row.part(Part::Event(occurrence.event.clone()));
             row.list(&occurrence.requests_served, |row, served| {
                 row.text(served.node.as_str());
                 row.plain(served.incarnation);
                 row.text(&served.bthread);
-                row.number(Family::Sync(served.node.clone(), served.bthread.clone()), served.sync);
+                row.number(
+                    Family::Sync(served.node.clone(), served.incarnation, served.bthread.clone()),
+                    served.sync,
+                );
             });
         });
         row.list(&self.presence, |row, presence| row.plain(presence.incarnation));
