@@ -94,10 +94,9 @@ impl Node {
         for (bthread, sync) in asked {
             let bids = self.program.bids();
             let stays = bids.filter(|(name, _, now_at)| *name == bthread && *now_at == sync);
-            let requests = stays.flat_map(|(_, bid, _)| bid.requests());
-            let Some(event) = requests.filter(|e| Roster::joint_events().contains(e)).cloned().next() else {
-                continue;
-            };
+            let joint = |event: &&Event| Roster::joint_events().contains(event);
+            let event = stays.flat_map(|(_, bid, _)| bid.requests()).find(joint).cloned();
+            let Some(event) = event else { continue };
             let coordinator = self.joint.as_ref().map(|joint| &joint.roster.coordinator);
             if let Some(outbox) = coordinator.and_then(|coordinator| self.outboxes.get_mut(coordinator)) {
                 outbox.leave_unknown(&bthread, sync);
