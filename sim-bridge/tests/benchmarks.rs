@@ -48,7 +48,9 @@ fn a_fleet_is_measured_at_every_size_asked_for() {
         let traffic =
             ["sent_messages_per_s", "sent_bytes_per_s", "received_messages_per_s", "received_bytes_per_s"];
         assert_positive(size, &traffic);
-        assert_positive(size, &["memory_bytes", "events_per_s"]);
+        assert_positive(size, &["events_per_s"]);
+        // So few nodes may fit into what the process has anyway.
+        assert!(size["memory_bytes"].as_f64().is_some_and(|bytes| bytes >= 0.0), "{size}");
     }
     // Everybody hears everybody.
     assert!(sizes[1]["received_messages_per_s"].as_f64() > sizes[0]["received_messages_per_s"].as_f64());

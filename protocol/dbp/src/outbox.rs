@@ -71,28 +71,8 @@ impl Outbox {
         }
         bids.retain(|bid| !bid.requests.is_empty() || !bid.block.is_none());
         if bids != self.bids {
-            self.carry_blocks_over(&bids);
             self.bids = bids;
             self.renew_content();
-        }
-    }
-
-    /// A b-thread that moves on with its block, or with less of it, goes on holding what the home has acknowledged.
-    fn carry_blocks_over(&mut self, next: &[RemoteBid]) {
-        for new in next.iter().filter(|new| !new.block.is_none()) {
-            let old = self.bids.iter().find(|old| old.bthread == new.bthread && old.on_loss == new.on_loss);
-            let Some(old) = old.filter(|old| old.sync != new.sync && new.block.is_within(&old.block)) else {
-                continue;
-            };
-            if self.block_refused(&old.bthread, old.sync) {
-                continue;
-            }
-            if let Some((sync, _)) = self.since.get_mut(&new.bthread) {
-                *sync = new.sync;
-            }
-            if let Some(sync) = self.durable.get_mut(&new.bthread) {
-                *sync = new.sync;
-            }
         }
     }
 

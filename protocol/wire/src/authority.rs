@@ -3,7 +3,9 @@
 use skein_bp::EventSet;
 use skein_dbp::{Authority, Grant, LIFT, NodeName, ROSTER, Role, Roster};
 
-use crate::vocabulary::{ABORT, ADVANCE, ENTER, GOTO, LAUNCH, ORDER, SWARM, TAKEOFF, of_every_vehicle};
+use crate::vocabulary::{
+    ABORT, ADVANCE, ENTER, GOTO, LAUNCH, LOAD, ORDER, SWARM, TAKEOFF, UNLOAD, of_every_vehicle,
+};
 
 /// First chunk of a vehicle's name.
 const VEHICLE: &str = "uav";
@@ -23,7 +25,10 @@ pub fn standard_authority() -> Authority {
     let every = |verbs: &[&str]| EventSet::any_of(verbs.iter().map(|verb| of_every_vehicle(verb)));
     let joint = || EventSet::from(format!("{SWARM}/**"));
     let command = Grant {
-        request: every(&[TAKEOFF, ORDER]).or(of_any_node(ROSTER)).or(of_any_node(LIFT)).or(joint()),
+        request: every(&[TAKEOFF, ORDER, LOAD, UNLOAD])
+            .or(of_any_node(ROSTER))
+            .or(of_any_node(LIFT))
+            .or(joint()),
         block: every(&[TAKEOFF, GOTO, ADVANCE]).or(of_any_node(ENTER)).or(joint()),
     };
     let vehicle = Grant {
