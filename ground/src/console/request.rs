@@ -62,7 +62,7 @@ pub(super) enum Request {
 #[derive(Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 enum Message {
-    Order(OrderMessage),
+    Order(Box<OrderMessage>),
     Why { vehicle: Option<NodeName> },
 }
 
@@ -109,7 +109,7 @@ enum To {
 /// Reads a message: its tag, and what is asked for or what is wrong with it.
 pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
     match serde_json::from_str::<Message>(text) {
-        Ok(Message::Order(message)) => (message.tag.clone(), order(message).map(Request::Order)),
+        Ok(Message::Order(message)) => (message.tag.clone(), order(*message).map(Request::Order)),
         Ok(Message::Why { vehicle }) => (None, Ok(Request::Why(vehicle))),
         Err(error) => (None, Err(format!("not an order or a question: {error}"))),
     }

@@ -86,7 +86,8 @@ pub(super) fn run(
         println!("{object}");
         return Ok(());
     }
-    let rows: [(&str, fn(&Figures<f64>) -> f64); 4] = [
+    type Pick = fn(&Figures<f64>) -> f64;
+    let rows: [(&str, Pick); 4] = [
         ("hot and cold", |figures| figures.hot_cold),
         ("with 100 idle", |figures| figures.idle_100),
         ("with 1000 idle", |figures| figures.idle_1000),

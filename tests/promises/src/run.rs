@@ -31,6 +31,15 @@ pub struct Settings {
     pub mutant: Option<skein_dbp::Mutant>,
 }
 
+impl Settings {
+    /// The same, with so many of the last things told.
+    #[must_use]
+    pub fn telling(mut self, told: usize) -> Self {
+        self.told = told;
+        self
+    }
+}
+
 /// What came of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {

@@ -48,7 +48,7 @@ pub fn shrink(story: &Story, violation: &Violation, settings: &Settings) -> Shru
         }
     }
     let (story, violation) = best;
-    let Outcome { told, .. } = run(&story, &Settings { told: TOLD, ..*settings });
+    let Outcome { told, .. } = run(&story, &settings.telling(TOLD));
     Shrunk { story, violation, told }
 }
 

@@ -34,7 +34,7 @@ fn every_promise_is_kept_under_every_kind_of_fault() {
 
 #[test]
 fn a_seed_gives_the_same_run_again() {
-    let settings = Settings { told: 500, ..Settings::default() };
+    let settings = Settings::default().telling(500);
     for seed in [3, 14, 15] {
         let story = Story::invent(seed);
         assert_eq!(run(&story, &settings), run(&story, &settings), "seed {seed}");

@@ -3,6 +3,7 @@
 //! What the script shall not do there is keep something from ever happening again, or go round by itself without waiting
 //! for anybody. Blocks inside one another that end in time are tried with the innermost ending first.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::samples::samples;
@@ -140,8 +141,8 @@ impl<'a> Paths<'a> {
                         came.insert(start, edge);
                         return Some((start, walk_back(&came, start, start)));
                     }
-                    if !came.contains_key(&edge.to) {
-                        came.insert(edge.to, edge);
+                    if let Entry::Vacant(first) = came.entry(edge.to) {
+                        first.insert(edge);
                         queue.push(edge.to);
                     }
                 }
