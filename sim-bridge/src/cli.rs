@@ -6,9 +6,10 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::builder::RangedU64ValueParser;
+use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::experiment::EXPERIMENTS;
 use crate::scenario::{Overrides, Scenario, ScenarioError};
 
 /// How a program ends.
@@ -63,6 +64,8 @@ pub enum Command {
         #[command(subcommand)]
         what: Campaign,
     },
+    /// Run a published experiment again, as tables and plots: exit 1 if something that it must reach was missed.
+    Experiment(Experiment),
     /// Measure something, and print it.
     Bench {
         /// What.
@@ -76,6 +79,28 @@ pub enum Command {
         /// A scenario (.toml), world (.sdf, .world, .csv) or mission (.plan, .json), or a built-in scenario's name.
         file: PathBuf,
     },
+}
+
+/// Options of `experiment`.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct Experiment {
+    /// Which.
+    #[arg(value_parser = PossibleValuesParser::new(
+        EXPERIMENTS.iter().map(|known| PossibleValue::new(known.name).help(known.about))
+    ))]
+    pub name: String,
+    /// How many runs; as many as were published if not given.
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
+    pub runs: Option<usize>,
+    /// How many vehicles; as many as were published if not given.
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
+    pub vehicles: Option<usize>,
+    /// Where published data lies, for those that need it.
+    #[arg(long, value_name = "DIR")]
+    pub dir: Option<PathBuf>,
+    /// Folder for report.json and figures; `out/<name>` if not given.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 /// Campaigns.
