@@ -14,10 +14,11 @@ mod neighbours;
 pub mod pipeline;
 pub mod precedence;
 pub mod scripts;
+pub mod sequential;
 mod watches;
 
 pub use self::{
-    config::{AgentConfig, Controller, Envelope, Fence},
+    config::{AgentConfig, Controller, Envelope, Fence, Layer, LocalPlanner, Planners},
     core::{AgentCore, AgentError, Outcome, SetPointRecord, Status},
     flight::FlightPhase,
     me::Me,

@@ -16,6 +16,8 @@ use skein_planning::{
         apf::{self, ApfConfig},
         braking::{self, BrakingConfig},
         escape::{EscapeConfig, EscapeDetector, Verdict},
+        speed::SpeedConfig,
+        vfh::{Follower, Scene, VfhConfig},
     },
     map::ClearanceMap,
     passage::{Passage, PassageConfig, first_passage},
@@ -24,7 +26,7 @@ use skein_planning::{
 use skein_wire::vocabulary::{ARRIVED, LEAVE, PASSAGE, PATH_BLOCKED, PLANNED, STUCK, UNPLANNABLE};
 
 use crate::{
-    config::{Envelope, Fence},
+    config::{Envelope, Fence, Layer, LocalPlanner, Planners},
     me::Me,
     neighbours::Neighbour,
 };
@@ -71,6 +73,8 @@ const GHOST_SLACK_M: f64 = 0.3;
 const GIVES_WAY_M: f64 = 1.0;
 /// From where a vehicle that is held stops to the place that it was held from, at least, m.
 const ROOM_AHEAD_M: f64 = 1.5;
+/// The cosine of a path's slope below which what is free ahead does not limit its speed: a planar lidar sees nothing of it.
+const LEVEL_SHARE: f64 = 0.05;
 /// Speed at which a hovering vehicle goes back to its place, at most, m/s.
 const STATION_KEEPING_M_S: f64 = 0.5;
 
@@ -154,6 +158,7 @@ struct Following {
 pub struct Guidance {
     envelope: Envelope,
     fence: Fence,
+    planners: Planners,
     leg: Option<Leg>,
     following: Option<Following>,
     leave_until: Duration,
@@ -163,18 +168,26 @@ pub struct Guidance {
     hover_at: Option<Vector3<f64>>,
     speed_m_s: f64,
     braking: BrakingConfig,
+    apf: ApfConfig,
+    /// In place of the potential field.
+    vfh: Option<Follower>,
     filter: FilterConfig,
     escape: EscapeDetector,
     scratch: AstarScratch,
 }
 
 impl Guidance {
-    /// Guidance for a vehicle of this envelope inside this fence.
+    /// Guidance for a vehicle of this envelope inside this fence, by these planners.
     #[must_use]
-    pub fn new(envelope: Envelope, fence: Fence) -> Self {
+    pub fn new(envelope: Envelope, fence: Fence, planners: Planners) -> Self {
+        let avoids = planners.without != Some(Layer::LocalAvoidance);
+        let vfh = (avoids && planners.local == LocalPlanner::Vfh).then(|| gentle_follower(&envelope));
+        let brake_m_s2 = if vfh.is_some() { SpeedConfig::default().gentle_m_s2 } else { envelope.brake_m_s2 };
+        let repulsive_gain = if avoids { ApfConfig::default().repulsive_gain } else { 0.0 };
         Self {
             envelope,
             fence,
+            planners,
             leg: None,
             following: None,
             leave_until: Duration::ZERO,
@@ -183,11 +196,13 @@ impl Guidance {
             speed_m_s: 0.0,
             braking: BrakingConfig {
                 cruise_m_s: envelope.cruise_m_s,
-                decel_m_s2: envelope.brake_m_s2,
-                accel_m_s2: envelope.brake_m_s2,
+                decel_m_s2: brake_m_s2,
+                accel_m_s2: brake_m_s2,
                 latency_s: envelope.latency_s,
                 ..BrakingConfig::default()
             },
+            apf: ApfConfig { repulsive_gain, ..ApfConfig::default() },
+            vfh,
             filter: FilterConfig {
                 separation_m: envelope.separation_m,
                 obstacle_clearance_m: envelope.hull_m + OBSTACLE_MARGIN_M,
@@ -224,6 +239,16 @@ impl Guidance {
     pub fn rest(&mut self) {
         self.hover_at = None;
         self.speed_m_s = 0.0;
+        if let Some(vfh) = &mut self.vfh {
+            vfh.rest();
+        }
+    }
+
+    /// Takes in the obstacle points of a scan of `rays` rays that was taken at `origin`; metres ENU.
+    pub fn look(&mut self, origin: &Vector3<f64>, returns: &[Vector3<f64>], rays: usize) {
+        if let Some(vfh) = &mut self.vfh {
+            vfh.look(origin, returns, rays);
+        }
     }
 
     /// The flight is over.
@@ -329,6 +354,11 @@ impl Guidance {
     /// The path with the widest of the margins that allow one, and the clearance it keeps: level if there is such a path, else
     /// over or under what is in the way.
     fn search(&mut self, map: &mut ClearanceMap, request: &Request<'_>) -> Result<(Path, f64), PlanError> {
+        if self.planners.without == Some(Layer::GlobalPath)
+            && let Some(straight) = Path::new(vec![request.start, request.goal])
+        {
+            return Ok((straight, 0.0));
+        }
         let level = AstarConfig { budget: LEVEL_BUDGET, ..AstarConfig::default() };
         let climbing =
             AstarConfig { planar_band_m: ALL_HEIGHTS, budget: CLIMBING_BUDGET, ..AstarConfig::default() };
@@ -392,7 +422,8 @@ impl Guidance {
     }
 
     fn check_path(&mut self, motion: &Motion, map: &ClearanceMap) -> Option<Report> {
-        let following = self.following.as_mut().filter(|following| !following.blocked)?;
+        let plans = self.planners.without != Some(Layer::GlobalPath);
+        let following = self.following.as_mut().filter(|following| plans && !following.blocked)?;
         // Less than what was planned with, so that a voxel more or less does not make a new plan.
         let clearance_m = (following.clearance_m - REPLAN_SLACK_M).max(0.0);
         let here = following.path.point_at(following.station_m);
@@ -413,6 +444,9 @@ impl Guidance {
     }
 
     fn check_passage(&mut self, motion: &Motion, map: &ClearanceMap) -> Option<Report> {
+        if self.planners.without == Some(Layer::RightOfWay) {
+            return None;
+        }
         if let Some(passage) = self.passage {
             let offset = motion.position - passage.centre;
             let is_past = offset.dot(&passage.direction) > PASSAGE_BEHIND_M;
@@ -440,7 +474,7 @@ impl Guidance {
     }
 
     fn check_progress(&mut self, now: Duration, has_leave: bool) -> Option<Report> {
-        let waits = self.leg.is_none_or(|leg| leg.arrived);
+        let waits = self.leg.is_none_or(|leg| leg.arrived) || self.planners.without == Some(Layer::Escape);
         let Some(following) = self.following.as_ref().filter(|_| has_leave && !waits) else {
             self.escape.reset();
             return None;
@@ -450,14 +484,25 @@ impl Guidance {
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles either way.
     pub fn steer(&mut self, now: Duration, motion: &Motion, surroundings: &Surroundings<'_>) -> SetPoint {
-        let wish =
-            self.along_path(now, motion, surroundings.map).unwrap_or_else(|| self.keep_station(motion));
-        let push =
-            repulsion(&motion.position, &wish.velocity, surroundings.neighbours, &RepulsionConfig::default());
+        let along = self.along_path(now, motion, surroundings);
+        let goes = along.is_some();
+        let wish = along.unwrap_or_else(|| self.keep_station(motion));
+        let push = match self.planners.without {
+            Some(Layer::Repulsion) => Vector3::zeros(),
+            _ => repulsion(
+                &motion.position,
+                &wish.velocity,
+                surroundings.neighbours,
+                &RepulsionConfig::default(),
+            ),
+        };
         let is_level = (wish.height_m - motion.position.z).abs() < PLANAR_BAND_M;
         let mut desired = apf::limited(wish.velocity + push, self.envelope.cruise_m_s);
         desired.z =
             if is_level { 0.0 } else { desired.z.clamp(-self.envelope.climb_m_s, self.envelope.climb_m_s) };
+        if let Some(vfh) = self.vfh.as_ref().filter(|_| goes) {
+            desired = vfh.ease(&desired, TICK_S);
+        }
         let request = separation::Motion {
             position: motion.position,
             velocity: motion.velocity,
@@ -467,7 +512,13 @@ impl Guidance {
         };
         let obstacles: Vec<_> =
             surroundings.obstacles.iter().copied().chain(self.fence_ahead(motion.position)).collect();
-        let safe = filter(&request, surroundings.neighbours, &obstacles, &self.filter).velocity;
+        let safe = match self.planners.without {
+            Some(Layer::SafetyFilter) => desired,
+            _ => filter(&request, surroundings.neighbours, &obstacles, &self.filter).velocity,
+        };
+        if let Some(vfh) = &mut self.vfh {
+            vfh.flew(&safe);
+        }
         if is_level {
             SetPoint::Planar { vx: safe.x, vy: safe.y, z: wish.height_m, yaw: None }
         } else {
@@ -476,12 +527,23 @@ impl Guidance {
     }
 
     /// Along the path; `None` without path or leave.
-    fn along_path(&mut self, now: Duration, motion: &Motion, map: &ClearanceMap) -> Option<Wish> {
+    fn along_path(&mut self, now: Duration, motion: &Motion, surroundings: &Surroundings<'_>) -> Option<Wish> {
+        let map = surroundings.map;
         let following = self.following.as_mut().filter(|_| now <= self.leave_until)?;
         self.hover_at = None;
         let ahead = following.path.direction_at(following.station_m);
-        let sensed_free_m = map.voxels().sensed_free_m(&motion.position, &ahead, SENSED_AHEAD_M);
+        let sensed_free_m = if ahead.xy().norm() < LEVEL_SHARE {
+            SENSED_AHEAD_M
+        } else {
+            map.voxels().sensed_free_m(&motion.position, &ahead, SENSED_AHEAD_M)
+        };
         let (cap, _) = braking::speed_cap(&following.path, following.station_m, sensed_free_m, &self.braking);
+        if let Some(vfh) = &mut self.vfh {
+            let scene = Scene { map, obstacles: surroundings.obstacles };
+            let step = vfh.follow(&following.path, following.station_m, &motion.position, cap, &scene);
+            following.station_m = step.station_m;
+            return Some(Wish { velocity: step.velocity, height_m: step.carrot.z });
+        }
         self.speed_m_s = braking::ramp(self.speed_m_s, cap, TICK_S, &self.braking);
         let attraction = self.escape.attraction();
         let step = apf::follow(
@@ -491,7 +553,7 @@ impl Guidance {
             &motion.position,
             self.speed_m_s,
             attraction,
-            &ApfConfig::default(),
+            &self.apf,
         );
         following.station_m = step.station_m;
         Some(Wish { velocity: step.velocity, height_m: step.carrot.z })
@@ -525,6 +587,22 @@ impl Guidance {
             },
         )
     }
+}
+
+/// A follower by the vector field histogram for a vehicle of this envelope.
+fn gentle_follower(envelope: &Envelope) -> Follower {
+    let clearance_m = envelope.hull_m + OBSTACLE_MARGIN_M;
+    let [tight_m, _] = TIGHT_MARGINS_M;
+    let speed = SpeedConfig {
+        cruise_m_s: envelope.cruise_m_s,
+        hard_m_s2: envelope.brake_m_s2,
+        latency_s: envelope.latency_s,
+        clearance_m,
+        corridor_m: clearance_m + tight_m,
+        ..SpeedConfig::default()
+    };
+    let safety_radius_m = envelope.hull_m + envelope.margin_m;
+    Follower::new(VfhConfig { safety_radius_m, ..VfhConfig::default() }, speed)
 }
 
 /// The velocity wanted before others are considered (ENU, m/s), and the height it leads to (m).

@@ -65,6 +65,7 @@ pub struct Perception {
     last_scan: Option<Duration>,
     ends: Vec<RayEnd>,
     near: Vec<Vector3<f64>>,
+    returns: Vec<Vector3<f64>>,
     ground_m: f64,
     rolls: bool,
     /// Which of the far rays the newest scan followed.
@@ -100,6 +101,7 @@ impl Perception {
             last_scan: None,
             ends: Vec::new(),
             near: Vec::new(),
+            returns: Vec::new(),
             ground_m: config.ground_m,
             rolls,
             far_ray: 0,
@@ -123,6 +125,13 @@ impl Perception {
         &self.near
     }
 
+    /// All obstacle points near the vehicle, of the newest scan; metres ENU. Neither neighbours are among them nor the
+    /// ground, which a beam meets when the vehicle pitches.
+    #[must_use]
+    pub fn returns(&self) -> &[Vector3<f64>] {
+        &self.returns
+    }
+
     /// When the newest scan was taken.
     #[must_use]
     pub fn last_scan(&self) -> Option<Duration> {
@@ -133,6 +142,7 @@ impl Perception {
     pub fn take_in(&mut self, scan: &Scan, pose: &Pose, neighbours: &[Vector3<f64>]) {
         self.last_scan = Some(scan.stamp);
         self.ends.clear();
+        self.returns.clear();
         let mut near = Sectors::new(pose.position);
         let to_world = pose.attitude.to_rotation_matrix();
         self.far_ray = (self.far_ray + 1) % FAR_RAYS;
@@ -159,6 +169,7 @@ impl Perception {
             }
             if hit && range < NEAR_M && point.z > self.ground_m {
                 near.add(point);
+                self.returns.push(point);
             }
             self.ends.push(RayEnd { point, hit });
         }

@@ -10,6 +10,7 @@ pub(crate) mod report;
 mod setup;
 mod swarm;
 mod trace_hash;
+mod trial;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -17,6 +18,7 @@ use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
+use skein_agent::AgentConfig;
 use skein_ground::{Order, Who};
 use skein_wire::{Fleet, Network, NetworkConfig};
 
@@ -24,6 +26,7 @@ pub use self::{
     recording::Recording,
     setup::{FLEET, GROUND, agent_configs, ground_config, simulation_config, vehicle_name},
     swarm::{Happenings, Links, Swarm},
+    trial::{Flown, Trial},
 };
 use crate::{
     cli::{self, Clock},
@@ -55,6 +58,10 @@ pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
     anyhow::ensure!(
         !(args.processes && args.clock == Clock::Lockstep),
         "--processes: each process follows the clock on the wall; leave out --clock lockstep"
+    );
+    anyhow::ensure!(
+        !args.processes || args.controller == cli::Controller::Bp,
+        "--processes: an agent of its own runs its b-threads; leave out --controller"
     );
     let summary = match args.clock {
         Clock::Lockstep => {
@@ -145,7 +152,7 @@ static INTERRUPTIONS: LazyLock<Arc<AtomicU32>> = LazyLock::new(|| {
 struct Flight<'a> {
     scenario: &'a Scenario,
     swarm: Swarm,
-    recording: Recording,
+    recording: Option<Recording>,
     table: Option<LiveTable<std::io::Stderr>>,
     began: Instant,
     /// Why the swarm was ordered to land before its mission was over.
@@ -167,16 +174,26 @@ impl<'a> Flight<'a> {
         recording: Recording,
         table: LiveTable<std::io::Stderr>,
     ) -> anyhow::Result<Self> {
+        let agents = agent_configs(scenario, args.controller);
+        let flight = Self::unseen(scenario, args.controller, agents, links)?;
+        Ok(Self { recording: Some(recording), table: (!args.headless).then_some(table), ..flight })
+    }
+
+    /// A flight that is neither recorded nor shown.
+    fn unseen(
+        scenario: &'a Scenario,
+        controller: cli::Controller,
+        agents: Vec<AgentConfig>,
+        links: Links,
+    ) -> anyhow::Result<Self> {
         LazyLock::force(&INTERRUPTIONS);
         let simulation = skein_world::Simulation::new(simulation_config(scenario));
-        let agents = agent_configs(scenario, args.controller);
-        let ground = ground_config(scenario, Fleet::new(setup::FLEET)?, args.controller);
-        let swarm = Swarm::new(simulation, agents, ground, links)?;
+        let ground = ground_config(scenario, Fleet::new(setup::FLEET)?, controller);
         Ok(Self {
             scenario,
-            swarm,
-            recording,
-            table: (!args.headless).then_some(table),
+            swarm: Swarm::new(simulation, agents, ground, links)?,
+            recording: None,
+            table: None,
             began: Instant::now(),
             called_off: None,
             network_messages: 0,
@@ -189,14 +206,16 @@ impl<'a> Flight<'a> {
             host.before_step(&mut self.swarm);
             let happenings = self.swarm.step();
             host.after_step(&self.swarm, &happenings);
-            self.recording.take_in(&self.swarm, &happenings)?;
+            if let Some(recording) = &mut self.recording {
+                recording.take_in(&self.swarm, &happenings)?;
+            }
             if happenings.ticked {
                 self.look_after_limits();
                 self.network_messages = host.traffic().messages;
                 self.draw()?;
             }
         }
-        self.recording.finish()?;
+        self.recording.map_or(Ok(()), Recording::finish)?;
         let why = self.called_off.map(|called_off| called_off.why);
         let account = self.swarm.account(host.traffic());
         let summary = report::summary(self.scenario, &account, self.began.elapsed(), why);

@@ -1,0 +1,200 @@
+//! How fast the vector field histogram is flown: speed that follows the scene, and never steps (Xu 2023, speed planning).
+
+use nalgebra::Vector3;
+
+use super::apf::limited;
+use super::braking::stopping_speed;
+
+/// The speed planner's numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpeedConfig {
+    /// Speed of the middle phase, m/s.
+    pub cruise_m_s: f64,
+    /// Way over which the first phase speeds up, metres.
+    pub speed_up_m: f64,
+    /// Way over which the last phase slows down, metres.
+    pub slow_down_m: f64,
+    /// `k`: share of the cruising speed wanted at once, so that it does not crawl at the start.
+    pub start_share: f64,
+    /// `a`: shape of the last phase; speed falls with the remaining way to this power.
+    pub slow_down_shape: f64,
+    /// Speed beside what is as near as it may be, m/s; the paper flies it as soon as anything is seen.
+    pub beside_m_s: f64,
+    /// Acceleration that the set-point never exceeds, in any direction, m/s^2. 0.86 is a pitch of 5 degrees.
+    pub gentle_m_s2: f64,
+    /// Deceleration that the vehicle is capable of in need, m/s^2.
+    pub hard_m_s2: f64,
+    /// Time from a thing being there to the vehicle beginning to brake, seconds.
+    pub latency_s: f64,
+    /// Least distance kept between the vehicle's centre and an obstacle, metres.
+    pub clearance_m: f64,
+    /// The way is free where nothing is nearer to it than this, metres.
+    pub corridor_m: f64,
+}
+
+impl Default for SpeedConfig {
+    fn default() -> SpeedConfig {
+        SpeedConfig {
+            cruise_m_s: 5.0,
+            speed_up_m: 20.0,
+            slow_down_m: 20.0,
+            start_share: 0.3,
+            slow_down_shape: 0.8,
+            beside_m_s: 0.5,
+            gentle_m_s2: 0.6,
+            hard_m_s2: 2.5,
+            latency_s: 0.3,
+            clearance_m: 0.35,
+            corridor_m: 0.45,
+        }
+    }
+}
+
+/// The three phases over a leg of which `flown_m` lie behind and `remaining_m` ahead, m/s: from `k v` up to the cruising
+/// speed `v` over the first metres, and down over the last by `v (r / d)^a`.
+///
+/// ```
+/// use skein_planning::local::speed::{SpeedConfig, trapezoid};
+///
+/// let config = SpeedConfig::default();
+/// let at = |flown_m: f64| trapezoid(flown_m, 100.0 - flown_m, &config);
+/// assert_eq!([at(0.0), at(10.0), at(50.0), at(100.0)], [1.5, 3.25, 5.0, 0.0]);
+/// ```
+#[must_use]
+pub fn trapezoid(flown_m: f64, remaining_m: f64, config: &SpeedConfig) -> f64 {
+    let share = |way_m: f64, phase_m: f64| (way_m / phase_m).clamp(0.0, 1.0);
+    let up = config.start_share + (1.0 - config.start_share) * share(flown_m, config.speed_up_m);
+    let down = share(remaining_m, config.slow_down_m).powf(config.slow_down_shape);
+    config.cruise_m_s * up.min(down)
+}
+
+/// Speed at which an obstacle `aside_m` beside a straight way may be passed, m/s: so slow that wherever on the way the
+/// vehicle is, it could stop before the obstacle if that were in its way. The safety filter then has nothing to do.
+///
+/// With the distance `d = aside / sin t` towards the obstacle, `t` off the way, that is the least over `t` of
+/// `v_stop(d - clearance) / cos t`.
+#[must_use]
+pub fn passing_speed(aside_m: f64, config: &SpeedConfig) -> f64 {
+    // Sine and cosine of 15, 25, ... 75 degrees.
+    const ANGLES: [(f64, f64); 7] = [
+        (0.258_819, 0.965_926),
+        (0.422_618, 0.906_308),
+        (0.573_576, 0.819_152),
+        (0.707_107, 0.707_107),
+        (0.819_152, 0.573_576),
+        (0.906_308, 0.422_618),
+        (0.965_926, 0.258_819),
+    ];
+    let bound = |(sin, cos): (f64, f64)| {
+        stopping_speed(aside_m / sin - config.clearance_m, config.hard_m_s2, config.latency_s) / cos
+    };
+    ANGLES.into_iter().map(bound).fold(f64::INFINITY, f64::min).max(config.beside_m_s)
+}
+
+/// The speed, m/s, from which a vehicle at `origin` that goes in the unit direction `ahead` can, gently, stop before each of
+/// the `obstacles` in its way and slow down to the [`passing_speed`] of each beside it (ENU, metres; horizontal).
+#[must_use]
+pub fn speed_among(
+    origin: &Vector3<f64>,
+    ahead: &Vector3<f64>,
+    obstacles: &[Vector3<f64>],
+    config: &SpeedConfig,
+) -> f64 {
+    let lag = config.gentle_m_s2 * config.latency_s;
+    let bound = |obstacle: &Vector3<f64>| {
+        let offset = obstacle - origin;
+        let along_m = offset.x * ahead.x + offset.y * ahead.y;
+        let aside_m = (offset.x * ahead.y - offset.y * ahead.x).abs();
+        if along_m <= 0.0 {
+            return f64::INFINITY;
+        }
+        if aside_m < config.corridor_m {
+            let free_m = along_m - config.corridor_m;
+            return stopping_speed(free_m, config.gentle_m_s2, config.latency_s);
+        }
+        // Where the obstacle is abeam the vehicle passes at this speed; before, it has as far to slow down.
+        let passing = passing_speed(aside_m, config);
+        let run_up_m = (along_m - aside_m).max(0.0);
+        ((lag + passing) * (lag + passing) + 2.0 * config.gentle_m_s2 * run_up_m).sqrt() - lag
+    };
+    obstacles.iter().map(bound).fold(f64::INFINITY, f64::min)
+}
+
+/// The next velocity of a set-point that was `previous`, on its way to `wanted`, after `step_s`: it turns and changes its
+/// speed by no more than `accel_m_s2`.
+#[must_use]
+pub fn step(
+    previous: &Vector3<f64>,
+    wanted: &Vector3<f64>,
+    step_s: f64,
+    accel_m_s2: f64,
+) -> Vector3<f64> {
+    previous + limited(wanted - previous, accel_m_s2 * step_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_start_does_not_crawl_and_a_short_leg_never_cruises() {
+        let config = SpeedConfig::default();
+        assert_eq!(trapezoid(0.0, 15.0, &config), 1.5);
+        let fastest = (0..=15).map(|s| trapezoid(f64::from(s), 15.0 - f64::from(s), &config)).fold(0.0, f64::max);
+        assert!(fastest < 3.5, "{fastest}");
+    }
+
+    #[test]
+    fn what_is_further_aside_is_passed_faster() {
+        let config = SpeedConfig::default();
+        let speeds = [0.2, 0.45, 0.7, 1.0, 2.0].map(|aside_m| passing_speed(aside_m, &config));
+        assert_eq!(speeds[0], config.beside_m_s);
+        assert!(speeds.windows(2).all(|pair| pair[0] <= pair[1]), "{speeds:?}");
+        assert!(speeds[4] > 3.0, "{speeds:?}");
+    }
+
+    #[test]
+    fn what_is_ahead_is_stopped_for_and_what_is_behind_is_not() {
+        let config = SpeedConfig::default();
+        let among = |x: f64, y: f64| {
+            let obstacle = [Vector3::new(x, y, 3.0)];
+            speed_among(&Vector3::new(0.0, 0.0, 3.0), &Vector3::x(), &obstacle, &config)
+        };
+        assert_eq!(among(0.4, 0.0), 0.0);
+        assert!((among(3.45, 0.1) - stopping_speed(3.0, 0.6, 0.3)).abs() < 1e-12);
+        assert_eq!(among(-1.0, 0.0), f64::INFINITY);
+        assert!(among(3.0, 1.0) > among(1.0, 1.0));
+    }
+
+    proptest! {
+        /// Driven by the planner alone a vehicle stops before what is in its way, and passes what is beside it no faster than it may.
+        #[test]
+        fn it_is_slow_enough_in_time(x in 3.0..12.0_f64, aside in 0.0..1.5_f64) {
+            let config = SpeedConfig::default();
+            let obstacle = [Vector3::new(x, aside, 0.0)];
+            let (mut at, mut v, dt) = (Vector3::zeros(), Vector3::zeros(), 0.02);
+            for _ in 0..2000 {
+                let cap = speed_among(&at, &Vector3::x(), &obstacle, &config).min(config.cruise_m_s);
+                v = step(&v, &(Vector3::x() * cap), dt, config.gentle_m_s2);
+                at += v * dt;
+                let distance = (obstacle[0] - at).norm();
+                if aside < config.corridor_m {
+                    prop_assert!(distance >= config.clearance_m - 1e-6, "{distance} at {at:?}");
+                } else if at.x < x && distance < 2.0 * aside {
+                    let to_stop = stopping_speed(distance - config.clearance_m, config.hard_m_s2, config.latency_s);
+                    let towards = v.x * (x - at.x) / distance;
+                    prop_assert!(towards <= to_stop.max(config.beside_m_s) + 0.1, "{towards} > {to_stop} at {at:?}");
+                }
+            }
+        }
+
+        #[test]
+        fn a_set_point_never_steps(from in -4.0..4.0_f64, to in -4.0..4.0_f64, across in -4.0..4.0_f64) {
+            let (previous, wanted) = (Vector3::new(from, 0.0, 0.0), Vector3::new(to, across, 0.0));
+            let next = step(&previous, &wanted, 0.02, 0.6);
+            prop_assert!((next - previous).norm() <= 0.012 + 1e-12);
+            prop_assert!((wanted - next).norm() <= (wanted - previous).norm());
+        }
+    }
+}
