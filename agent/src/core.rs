@@ -265,7 +265,7 @@ impl AgentCore {
         }
         let others: Vec<_> = self.neighbours.at(now).map(|neighbour| neighbour.position()).collect();
         self.perception.take_in(scan, &pose, &others);
-        self.guidance.look(&pose.position, self.perception.returns(), scan.ranges_m.len());
+        self.guidance.look(scan.stamp, &pose.position, self.perception.returns(), scan.ranges_m.len());
     }
 
     /// The vehicle's estimated pose at a time near the newest telemetry.

@@ -16,6 +16,7 @@ use skein_planning::{
         apf::{self, ApfConfig},
         braking::{self, BrakingConfig},
         escape::{EscapeConfig, EscapeDetector, Verdict},
+        moving::{MovingConfig, Tracker},
         speed::SpeedConfig,
         vfh::{Follower, Scene, VfhConfig},
     },
@@ -171,6 +172,8 @@ pub struct Guidance {
     apf: ApfConfig,
     /// In place of the potential field.
     vfh: Option<Follower>,
+    /// What moves and tells nobody where it is.
+    moving: Tracker,
     filter: FilterConfig,
     escape: EscapeDetector,
     scratch: AstarScratch,
@@ -203,6 +206,7 @@ impl Guidance {
             },
             apf: ApfConfig { repulsive_gain, ..ApfConfig::default() },
             vfh,
+            moving: Tracker::new(MovingConfig::default()),
             filter: FilterConfig {
                 separation_m: envelope.separation_m,
                 obstacle_clearance_m: envelope.hull_m + OBSTACLE_MARGIN_M,
@@ -244,10 +248,11 @@ impl Guidance {
         }
     }
 
-    /// Takes in the obstacle points of a scan of `rays` rays that was taken at `origin`; metres ENU.
-    pub fn look(&mut self, origin: &Vector3<f64>, returns: &[Vector3<f64>], rays: usize) {
+    /// Takes in the obstacle points of a scan of `rays` rays that was taken at `stamp` and `origin`; metres ENU.
+    pub fn look(&mut self, stamp: Duration, origin: &Vector3<f64>, returns: &[Vector3<f64>], rays: usize) {
         if let Some(vfh) = &mut self.vfh {
             vfh.look(origin, returns, rays);
+            self.moving.look(stamp, returns);
         }
     }
 
@@ -487,14 +492,11 @@ impl Guidance {
         let along = self.along_path(now, motion, surroundings);
         let goes = along.is_some();
         let wish = along.unwrap_or_else(|| self.keep_station(motion));
+        let others: Vec<_> =
+            surroundings.neighbours.iter().copied().chain(self.moving.moving(now)).collect();
         let push = match self.planners.without {
             Some(Layer::Repulsion) => Vector3::zeros(),
-            _ => repulsion(
-                &motion.position,
-                &wish.velocity,
-                surroundings.neighbours,
-                &RepulsionConfig::default(),
-            ),
+            _ => repulsion(&motion.position, &wish.velocity, &others, &RepulsionConfig::default()),
         };
         let is_level = (wish.height_m - motion.position.z).abs() < PLANAR_BAND_M;
         let mut desired = apf::limited(wish.velocity + push, self.envelope.cruise_m_s);
@@ -514,7 +516,7 @@ impl Guidance {
             surroundings.obstacles.iter().copied().chain(self.fence_ahead(motion.position)).collect();
         let safe = match self.planners.without {
             Some(Layer::SafetyFilter) => desired,
-            _ => filter(&request, surroundings.neighbours, &obstacles, &self.filter).velocity,
+            _ => filter(&request, &others, &obstacles, &self.filter).velocity,
         };
         if let Some(vfh) = &mut self.vfh {
             vfh.flew(&safe);
@@ -594,12 +596,11 @@ fn gentle_follower(envelope: &Envelope) -> Follower {
     let clearance_m = envelope.hull_m + OBSTACLE_MARGIN_M;
     let [tight_m, _] = TIGHT_MARGINS_M;
     let speed = SpeedConfig {
-        cruise_m_s: envelope.cruise_m_s,
         hard_m_s2: envelope.brake_m_s2,
         latency_s: envelope.latency_s,
         clearance_m,
         corridor_m: clearance_m + tight_m,
-        ..SpeedConfig::default()
+        ..SpeedConfig::default().cruising_at(envelope.cruise_m_s)
     };
     let safety_radius_m = envelope.hull_m + envelope.margin_m;
     Follower::new(VfhConfig { safety_radius_m, ..VfhConfig::default() }, speed)

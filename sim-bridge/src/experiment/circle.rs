@@ -27,6 +27,7 @@ const JOINING_S: f64 = 8.0;
 const JOINED_M: f64 = 0.5;
 /// Steps of the world between two set-points: 50 a second.
 const STEPS_PER_TICK: u32 = 5;
+const TICKS_BEFORE_OFFBOARD: u32 = 25;
 /// No command takes longer than this, s.
 const PATIENCE_S: f64 = 20.0;
 
@@ -152,7 +153,8 @@ fn fly(integral: PositionIntegral, seed: u64) -> anyhow::Result<Flight> {
     rig.until("armed", Some(Command::Arm), None, |companion| companion.telemetry().armed)?;
     rig.until("climbing", Some(Command::Takeoff { height_m: HEIGHT_M }), None, is(FlightMode::Takeoff))?;
     rig.until("holding", None, None, is(FlightMode::Hold))?;
-    rig.tick(Some(to(start.xy())));
+    // The autopilot wants to see set-points before it follows them.
+    (0..TICKS_BEFORE_OFFBOARD).for_each(|_| rig.tick(Some(to(start.xy()))));
     rig.until("in offboard", Some(Command::Offboard), Some(to(start.xy())), is(FlightMode::Offboard))?;
     let since = rig.simulation.now();
     let mut flown = Vec::new();

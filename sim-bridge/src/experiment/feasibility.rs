@@ -12,7 +12,7 @@ use crate::scenario::Scenario;
 
 const RUNS: usize = 5;
 /// How long a vehicle that does nothing is waited for, s: twice as long as one that flies needs.
-const PATIENCE_S: f64 = 120.0;
+const PATIENCE_S: f64 = 90.0;
 /// A program whose word is older than this does not run.
 const SILENT: Duration = Duration::from_millis(500);
 

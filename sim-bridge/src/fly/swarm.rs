@@ -147,6 +147,12 @@ impl Swarm {
         self.simulation.send(index, bytes);
     }
 
+    /// Takes what the autopilot of vehicle `index` has said since the last call, where no agent listens to it: of a
+    /// vehicle that the world has beside those of the agents.
+    pub fn receive_mavlink(&mut self, index: usize) -> Vec<u8> {
+        self.simulation.receive(index)
+    }
+
     /// The ground station.
     #[must_use]
     pub fn ground(&self) -> &GroundCore {

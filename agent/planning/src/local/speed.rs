@@ -32,6 +32,20 @@ pub struct SpeedConfig {
     pub corridor_m: f64,
 }
 
+impl SpeedConfig {
+    /// The same for another cruising speed: its first and last phases are as long as the same acceleration makes them.
+    #[must_use]
+    pub fn cruising_at(self, cruise_m_s: f64) -> SpeedConfig {
+        let ratio = cruise_m_s / self.cruise_m_s;
+        SpeedConfig {
+            cruise_m_s,
+            speed_up_m: self.speed_up_m * ratio * ratio,
+            slow_down_m: self.slow_down_m * ratio * ratio,
+            ..self
+        }
+    }
+}
+
 impl Default for SpeedConfig {
     fn default() -> SpeedConfig {
         SpeedConfig {
@@ -143,6 +157,13 @@ mod tests {
         assert_eq!(trapezoid(0.0, 15.0, &config), 1.5);
         let fastest = (0..=15).map(|s| trapezoid(f64::from(s), 15.0 - f64::from(s), &config)).fold(0.0, f64::max);
         assert!(fastest < 3.5, "{fastest}");
+    }
+
+    #[test]
+    fn another_cruising_speed_is_reached_with_the_same_acceleration() {
+        let slow = SpeedConfig::default().cruising_at(1.0);
+        assert_eq!((slow.speed_up_m, slow.slow_down_m), (0.8, 0.8));
+        assert_eq!(trapezoid(1.0, 5.0, &slow), 1.0);
     }
 
     #[test]

@@ -148,15 +148,10 @@ pub struct Opening {
 }
 
 impl Opening {
-    /// The bearing inside that is nearest to `target`.
-    fn nearest(&self, target: f64) -> f64 {
-        let into = (target - self.from).rem_euclid(TAU);
-        if into <= self.width {
-            return target;
-        }
-        let past_left = into - self.width;
-        let short_of_right = TAU - into;
-        self.from + if past_left <= short_of_right { self.width } else { 0.0 }
+    /// The bearings to choose from: its edges, and the target's if it lies inside.
+    fn candidates(&self, target: f64) -> impl Iterator<Item = f64> + use<> {
+        let is_inside = (target - self.from).rem_euclid(TAU) <= self.width;
+        [self.from, self.from + self.width].into_iter().chain(is_inside.then_some(target))
     }
 }
 
@@ -236,7 +231,7 @@ impl Vfh {
     /// The bearing to fly towards a target at the bearing `target`, while `heading` is flown (none at rest); all in
     /// radians counter-clockwise from east. `None` where no opening is left.
     ///
-    /// Of each opening its bearing nearest to the target is a candidate, and its middle; the least
+    /// The edges of each opening are candidates, and the target if it lies in one; the least
     /// `mu1 |c - target| + mu2 |c - heading| + mu3 |c - previous|` wins (Ulrich and Borenstein 1998).
     pub fn steer(&mut self, target: f64, heading: Option<f64>) -> Option<f64> {
         let VfhConfig { target_weight, heading_weight, previous_weight, .. } = self.config;
@@ -247,10 +242,7 @@ impl Vfh {
                 + heading_weight * apart(heading, bearing)
                 + previous_weight * apart(previous, bearing)
         };
-        let candidates = self
-            .openings
-            .iter()
-            .flat_map(|opening| [opening.nearest(target), opening.from + opening.width / 2.0]);
+        let candidates = self.openings.iter().flat_map(|opening| opening.candidates(target));
         self.chosen = candidates.map(wrapped).min_by(|a, b| cost(*a).total_cmp(&cost(*b)));
         self.chosen
     }
