@@ -18,7 +18,7 @@ use skein_planning::{
         escape::{EscapeConfig, EscapeDetector, Verdict},
         moving::{MovingConfig, Tracker},
         speed::SpeedConfig,
-        vfh::{Follower, Scene, VfhConfig},
+        vfh::{Follower, VfhConfig},
     },
     map::ClearanceMap,
     passage::{Passage, PassageConfig, first_passage},
@@ -493,7 +493,7 @@ impl Guidance {
         let goes = along.is_some();
         let wish = along.unwrap_or_else(|| self.keep_station(motion));
         let others: Vec<_> =
-            surroundings.neighbours.iter().copied().chain(self.moving.moving(now)).collect();
+            surroundings.neighbours.iter().copied().chain(self.moving.moving(now, surroundings.map)).collect();
         let push = match self.planners.without {
             Some(Layer::Repulsion) => Vector3::zeros(),
             _ => repulsion(&motion.position, &wish.velocity, &others, &RepulsionConfig::default()),
@@ -541,8 +541,7 @@ impl Guidance {
         };
         let (cap, _) = braking::speed_cap(&following.path, following.station_m, sensed_free_m, &self.braking);
         if let Some(vfh) = &mut self.vfh {
-            let scene = Scene { map, obstacles: surroundings.obstacles };
-            let step = vfh.follow(&following.path, following.station_m, &motion.position, cap, &scene);
+            let step = vfh.follow(&following.path, following.station_m, &motion.position, cap, map);
             following.station_m = step.station_m;
             return Some(Wish { velocity: step.velocity, height_m: step.carrot.z });
         }
@@ -593,13 +592,13 @@ impl Guidance {
 
 /// A follower by the vector field histogram for a vehicle of this envelope.
 fn gentle_follower(envelope: &Envelope) -> Follower {
-    let clearance_m = envelope.hull_m + OBSTACLE_MARGIN_M;
-    let [tight_m, _] = TIGHT_MARGINS_M;
+    // A little more than the filter keeps, so that it need not act.
+    let clearance_m = envelope.hull_m + OBSTACLE_MARGIN_M + 0.05;
     let speed = SpeedConfig {
         hard_m_s2: envelope.brake_m_s2,
         latency_s: envelope.latency_s,
         clearance_m,
-        corridor_m: clearance_m + tight_m,
+        corridor_m: clearance_m + 0.05,
         ..SpeedConfig::default().cruising_at(envelope.cruise_m_s)
     };
     let safety_radius_m = envelope.hull_m + envelope.margin_m;

@@ -125,7 +125,7 @@ impl Perception {
         &self.near
     }
 
-    /// All obstacle points near the vehicle, of the newest scan; metres ENU. Neither neighbours are among them nor the
+    /// All obstacle points within the range of the map, of the newest scan; metres ENU. Neither neighbours are among them nor the
     /// ground, which a beam meets when the vehicle pitches.
     #[must_use]
     pub fn returns(&self) -> &[Vector3<f64>] {
@@ -167,9 +167,11 @@ impl Perception {
                 self.ends.push(RayEnd { point, hit: false });
                 continue;
             }
-            if hit && range < NEAR_M && point.z > self.ground_m {
-                near.add(point);
+            if hit && range < MAP_RANGE_M && point.z > self.ground_m {
                 self.returns.push(point);
+                if range < NEAR_M {
+                    near.add(point);
+                }
             }
             self.ends.push(RayEnd { point, hit });
         }
@@ -236,7 +238,7 @@ mod tests {
 
     #[test]
     fn what_is_far_away_is_not_among_the_returns() {
-        assert!(seen(3.0, 0.0, 8.0).is_empty());
+        assert!(seen(3.0, 0.0, 12.0).is_empty());
         assert!(seen(3.0, 0.0, 4.0).iter().all(|point| point.z > 2.0));
     }
 }

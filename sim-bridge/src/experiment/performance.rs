@@ -129,7 +129,11 @@ fn compare(report: &mut Report, pairs: &[[Flight; 2]]) {
             .chain(PUBLISHED.iter().map(|p| format!("{} of {PUBLISHED_RUNS}", p.succeeded)))
             .collect(),
     );
+    let same = |[bp, sequential]: &&[Flight; 2]| {
+        (bp.navigation_s, bp.odometry_m) == (sequential.navigation_s, sequential.odometry_m)
+    };
     report.number("runs", pairs.len());
+    report.number("pairs_flown_alike", pairs.iter().filter(same).count());
     report.number("succeeded", json!({ "bp": succeeded[0], "sequential": succeeded[1] }));
     report.number(
         "failed_seeds_bp",

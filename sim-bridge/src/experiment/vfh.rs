@@ -82,7 +82,7 @@ fn fly(scenario: &Scenario) -> anyhow::Result<Flight> {
         if let (Some(vehicle), Some(model)) = (vehicle, model) {
             let motion = &vehicle.motion;
             let mode = swarm.agents().next().map(|agent| agent.status(swarm.now()).mode);
-            if tilt_from_trim_deg(motion, model) > 5.0 { eprintln!("{:?} {:.2} {:?} v {:?} tilt {:.1}", mode, swarm.now().as_secs_f64(), motion.position, motion.velocity, tilt_from_trim_deg(motion, model)); }
+            if tilt_from_trim_deg(motion, model) > 5.0 { eprintln!("seed {} {:?} {:.2} {:?} v {:?} tilt {:.1}", scenario.seed, mode, swarm.now().as_secs_f64(), motion.position, motion.velocity, tilt_from_trim_deg(motion, model)); }
             track.push(Moment {
                 time_s: swarm.now().as_secs_f64(),
                 position: motion.position,

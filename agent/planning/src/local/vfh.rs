@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::Vector3;
 
-pub use follower::{Follower, Scene, Step};
+pub use follower::{Follower, Step};
 
 /// How the histogram is made and read.
 #[derive(Clone, Copy, Debug, PartialEq)]

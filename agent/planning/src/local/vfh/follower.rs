@@ -4,21 +4,17 @@ use nalgebra::Vector3;
 
 use super::{Vfh, VfhConfig, bearing, direction};
 use crate::local::apf::{ApfConfig, carrot};
-use crate::local::speed::{self, SpeedConfig, speed_among, trapezoid};
-use crate::map::ClearanceMap;
+use crate::local::speed::{self, SpeedConfig, run_up, speed_to_stop, trapezoid, unhindered_speed};
+use crate::map::{ClearanceMap, Sectors};
 use crate::path::Path;
 
 /// Slower than this the vehicle has no heading of its own, m/s.
 const AT_REST_M_S: f64 = 0.3;
 
-/// What is around a follower now.
-#[derive(Clone, Copy, Debug)]
-pub struct Scene<'a> {
-    /// The map, to see which part of the path is straight ahead.
-    pub map: &'a ClearanceMap,
-    /// The nearest returns of the newest scan (ENU, metres).
-    pub obstacles: &'a [Vector3<f64>],
-}
+/// The path ahead is looked at so far, metres: as far as it takes to slow down from any speed that is flown among obstacles.
+const PREVIEW_M: f64 = 8.0;
+/// Between two places on the path that are looked at, metres.
+const PREVIEW_STEP_M: f64 = 0.5;
 
 /// What to fly now.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +33,8 @@ pub struct Follower {
     vfh: Vfh,
     speed: SpeedConfig,
     aim: ApfConfig,
+    /// The nearest returns of the newest scan, in each direction (ENU, metres).
+    obstacles: Vec<Vector3<f64>>,
     /// The last set-point, which the next one is near to (ENU, m/s).
     set_point: Vector3<f64>,
 }
@@ -46,12 +44,15 @@ impl Follower {
     #[must_use]
     pub fn new(vfh: VfhConfig, speed: SpeedConfig) -> Follower {
         let aim = ApfConfig { look_ahead_m: 3.0, ..ApfConfig::default() };
-        Follower { vfh: Vfh::new(vfh), speed, aim, set_point: Vector3::zeros() }
+        Follower { vfh: Vfh::new(vfh), speed, aim, obstacles: Vec::new(), set_point: Vector3::zeros() }
     }
 
     /// Takes in the returns of a scan; see [`Histogram::of`](super::Histogram::of).
     pub fn look(&mut self, origin: &Vector3<f64>, points: &[Vector3<f64>], rays: usize) {
         self.vfh.look(origin, points, rays);
+        let mut nearest = Sectors::new(*origin);
+        points.iter().for_each(|point| nearest.add(*point));
+        self.obstacles = nearest.points().collect();
     }
 
     /// The velocity that follows `path` from about `station_m` (where the last call was), no faster than `cap_m_s`.
@@ -64,31 +65,41 @@ impl Follower {
         station_m: f64,
         position: &Vector3<f64>,
         cap_m_s: f64,
-        scene: &Scene<'_>,
+        map: &ClearanceMap,
     ) -> Step {
         let reach_m = 2.0 * self.aim.look_ahead_m;
         let station_m = path.project_within(position, station_m - reach_m, station_m + reach_m).station_m;
-        let carrot = carrot(scene.map, path, station_m, position, &self.aim);
+        let carrot = carrot(map, path, station_m, position, &self.aim);
         let offset = carrot - position;
         let phase_m_s = trapezoid(station_m, path.length_m() - station_m, &self.speed);
         let speed_m_s = cap_m_s.min(phase_m_s.max(self.speed.start_share * cap_m_s));
+        let speed_m_s = speed_m_s.min(self.speed_ahead(path, station_m));
         let share = offset.try_normalize(1e-6).unwrap_or_default();
-        let level = self.level(&offset, speed_m_s * share.xy().norm(), position, scene.obstacles);
+        let level = self.level(&offset, speed_m_s * share.xy().norm(), position);
         Step { velocity: Vector3::new(level.x, level.y, speed_m_s * share.z), carrot, station_m }
     }
 
+    /// The speed from which every place of the path ahead is reached, gently, as slowly as it has to be flown through.
+    fn speed_ahead(&self, path: &Path, station_m: f64) -> f64 {
+        let places = (PREVIEW_M.min(path.length_m() - station_m) / PREVIEW_STEP_M).floor().max(0.0) as u32;
+        let allowed = |step: u32| {
+            let way_m = f64::from(step) * PREVIEW_STEP_M;
+            let (place, ahead) = (path.point_at(station_m + way_m), path.direction_at(station_m + way_m));
+            run_up(unhindered_speed(&place, &ahead, &self.obstacles, &self.speed), way_m, &self.speed)
+        };
+        (0..=places).map(allowed).fold(f64::INFINITY, f64::min)
+    }
+
     /// The horizontal part, of at most `speed_m_s`.
-    fn level(
-        &mut self,
-        offset: &Vector3<f64>,
-        speed_m_s: f64,
-        position: &Vector3<f64>,
-        obstacles: &[Vector3<f64>],
-    ) -> Vector3<f64> {
+    fn level(&mut self, offset: &Vector3<f64>, speed_m_s: f64, position: &Vector3<f64>) -> Vector3<f64> {
         let heading = (self.set_point.xy().norm() > AT_REST_M_S).then(|| bearing(&self.set_point));
         let Some(chosen) = self.vfh.steer(bearing(offset), heading) else { return Vector3::zeros() };
-        let among = |bearing| speed_among(position, &direction(bearing), obstacles, &self.speed);
-        let free_m_s = among(chosen).min(heading.map_or(f64::INFINITY, among));
+        let free = |bearing| {
+            let ahead = direction(bearing);
+            let to_stop = speed_to_stop(position, &ahead, &self.obstacles, &self.speed);
+            to_stop.min(unhindered_speed(position, &ahead, &self.obstacles, &self.speed))
+        };
+        let free_m_s = free(chosen).min(heading.map_or(f64::INFINITY, free));
         direction(chosen) * speed_m_s.min(free_m_s)
     }
 
@@ -131,8 +142,7 @@ mod tests {
             if tick % 5 == 0 {
                 follower.look(&position, &points, 72);
             }
-            let scene = Scene { map: &map, obstacles: &points };
-            let step = follower.follow(&path, station_m, &position, 2.0, &scene);
+            let step = follower.follow(&path, station_m, &position, 2.0, &map);
             station_m = step.station_m;
             let set_point = follower.ease(&step.velocity, 0.02);
             follower.flew(&set_point);
