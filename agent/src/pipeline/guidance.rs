@@ -185,7 +185,7 @@ impl Guidance {
     pub fn new(envelope: Envelope, fence: Fence, planners: Planners) -> Self {
         let avoids = planners.without != Some(Layer::LocalAvoidance);
         let vfh = (avoids && planners.local == LocalPlanner::Vfh).then(|| gentle_follower(&envelope));
-        let brake_m_s2 = if vfh.is_some() { SpeedConfig::default().gentle_m_s2 } else { envelope.brake_m_s2 };
+        let brake_m_s2 = if vfh.is_some() { env("GENTLE", 0.6) } else { envelope.brake_m_s2 };
         let repulsive_gain = if avoids { ApfConfig::default().repulsive_gain } else { 0.0 };
         Self {
             envelope,
@@ -590,19 +590,22 @@ impl Guidance {
     }
 }
 
+fn env(name: &str, d: f64) -> f64 { std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(d) }
+
 /// A follower by the vector field histogram for a vehicle of this envelope.
 fn gentle_follower(envelope: &Envelope) -> Follower {
     // A little more than the filter keeps, so that it need not act.
-    let clearance_m = envelope.hull_m + OBSTACLE_MARGIN_M + 0.05;
+    let clearance_m = envelope.hull_m + OBSTACLE_MARGIN_M + env("CLR", 0.05);
     let speed = SpeedConfig {
-        hard_m_s2: envelope.brake_m_s2,
-        latency_s: envelope.latency_s,
+        hard_m_s2: envelope.brake_m_s2 * env("HARD", 1.0),
+        latency_s: envelope.latency_s + env("LAT", 0.0),
+        gentle_m_s2: env("GENTLE", 0.6),
         clearance_m,
-        corridor_m: clearance_m + 0.05,
+        corridor_m: clearance_m + env("COR", 0.05),
         ..SpeedConfig::default().cruising_at(envelope.cruise_m_s)
     };
     let safety_radius_m = envelope.hull_m + envelope.margin_m;
-    Follower::new(VfhConfig { safety_radius_m, ..VfhConfig::default() }, speed)
+    Follower::new(VfhConfig { safety_radius_m, comfort_radius_m: env("COMFORT", 0.8), ..VfhConfig::default() }, speed)
 }
 
 /// The velocity wanted before others are considered (ENU, m/s), and the height it leads to (m).

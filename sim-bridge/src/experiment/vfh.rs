@@ -17,7 +17,7 @@ const RUNS: usize = 100;
 /// The published speed where an obstacle is seen, m/s: what is compared with flies no faster anywhere.
 const SLOW_M_S: f64 = 0.5;
 /// In so many of the worlds it is flown.
-const SLOW_RUNS: usize = 10;
+const SLOW_RUNS: usize = 1;
 /// The published bound on pitch, degrees.
 const MOST_PITCH_DEG: f64 = 5.0;
 /// The autopilot's mode in which it flies the planner's set-points.

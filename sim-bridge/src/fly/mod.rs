@@ -206,6 +206,7 @@ impl<'a> Flight<'a> {
             host.before_step(&mut self.swarm);
             let happenings = self.swarm.step();
             host.after_step(&self.swarm, &happenings);
+            if std::env::var("DBG").is_ok() { for s in &happenings.selections { if !s.event.name().ends_with("advance") { eprintln!("{:.2} {} {:?}", self.swarm.now().as_secs_f64(), s.event, self.swarm.simulation().vehicle(0).map(|v| v.motion.position)); } } }
             if let Some(recording) = &mut self.recording {
                 recording.take_in(&self.swarm, &happenings)?;
             }

@@ -3,11 +3,14 @@
 
 mod follower;
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use nalgebra::Vector3;
 
 pub use follower::{Follower, Step};
+
+/// A detour for comfort turns from the target by no more than this, radians.
+const DETOUR: f64 = FRAC_PI_4;
 
 /// How the histogram is made and read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +27,8 @@ pub struct VfhConfig {
     pub high_m: f64,
     /// Distance that the vehicle's centre keeps from what bounds an opening, metres.
     pub safety_radius_m: f64,
+    /// Distance that it keeps where an opening is wide enough, and leads about where the target is, metres.
+    pub comfort_radius_m: f64,
     /// Cost of a radian between the bearing and the target's; more than the other two together, or it turns in circles.
     pub target_weight: f64,
     /// Cost of a radian between the bearing and the one that is flown.
@@ -50,6 +55,7 @@ impl Default for VfhConfig {
             low_m: 0.5,
             high_m: 1.5,
             safety_radius_m: 0.6,
+            comfort_radius_m: 0.9,
             target_weight: 5.0,
             heading_weight: 2.0,
             previous_weight: 2.0,
@@ -138,7 +144,7 @@ pub fn decide(states: &[SectorState], was_blocked: Option<&[bool]>) -> Vec<bool>
     states.iter().enumerate().map(decided).collect()
 }
 
-/// Bearings that lead through between obstacles, with the safety radius to spare on both sides.
+/// Bearings that lead through between obstacles, with a distance to spare on both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Opening {
     /// The rightmost bearing, radians counter-clockwise from east.
@@ -155,19 +161,19 @@ impl Opening {
     }
 }
 
-/// Every opening: runs of free sectors that are wide enough for the safety radius, at the distance of the nearest return
-/// in the blocked sectors that bound them.
+/// Every opening: runs of free sectors that are wide enough to keep `radius_m`, at the distance of the nearest return in the
+/// blocked sectors that bound them.
 #[must_use]
-pub fn openings(histogram: &Histogram, blocked: &[bool], config: &VfhConfig) -> Vec<Opening> {
+pub fn openings(histogram: &Histogram, blocked: &[bool], radius_m: f64) -> Vec<Opening> {
     let count = blocked.len();
     let Some(first) = blocked.iter().position(|blocked| *blocked) else {
         return vec![Opening { from: -PI, width: TAU }];
     };
     let step = TAU / count as f64;
-    // What a boundary takes of the opening: the angle under which the safety radius is seen at its distance.
+    // What a boundary takes of the opening: the angle under which the radius is seen at its distance.
     let margin = |sector: usize| {
         let nearest_m = histogram.nearest_m[sector % count];
-        (config.safety_radius_m / nearest_m).min(1.0).asin()
+        (radius_m / nearest_m).min(1.0).asin()
     };
     let mut found = Vec::new();
     let mut right = first;
@@ -198,13 +204,14 @@ pub fn openings(histogram: &Histogram, blocked: &[bool], config: &VfhConfig) -> 
 /// let wall: Vec<_> = (-10..=10).map(|k| Vector3::new(2.0, 0.1 * f64::from(k), 3.0)).collect();
 /// vfh.look(&Vector3::new(0.0, 0.0, 3.0), &wall, 72);
 /// let bearing = vfh.steer(0.1, None).unwrap();
-/// assert!(bearing > 0.5 && bearing < 1.2, "around its left end: {bearing}");
+/// assert!(bearing > 0.5 && bearing < 1.3, "around its left end: {bearing}");
 /// ```
 #[derive(Clone, Debug)]
 pub struct Vfh {
     config: VfhConfig,
     blocked: Option<Vec<bool>>,
-    openings: Vec<Opening>,
+    /// Those that leave the comfort radius, then those that leave the safety radius.
+    openings: [Vec<Opening>; 2],
     chosen: Option<f64>,
 }
 
@@ -212,26 +219,24 @@ impl Vfh {
     /// A planner that has seen nothing, and takes all to be free.
     #[must_use]
     pub fn new(config: VfhConfig) -> Vfh {
-        Vfh { config, blocked: None, openings: vec![Opening { from: -PI, width: TAU }], chosen: None }
-    }
-
-    /// From now on keeps this distance from what bounds an opening, metres.
-    pub fn keep_away(&mut self, safety_radius_m: f64) {
-        self.config.safety_radius_m = safety_radius_m;
+        let all = vec![Opening { from: -PI, width: TAU }];
+        Vfh { config, blocked: None, openings: [all.clone(), all], chosen: None }
     }
 
     /// Takes in the returns of a scan, as [`Histogram::of`] does.
     pub fn look(&mut self, origin: &Vector3<f64>, points: &[Vector3<f64>], rays: usize) {
         let histogram = Histogram::of(origin, points, rays, &self.config);
         let blocked = decide(&histogram.states(&self.config), self.blocked.as_deref());
-        self.openings = openings(&histogram, &blocked, &self.config);
+        self.openings = [self.config.comfort_radius_m, self.config.safety_radius_m]
+            .map(|radius_m| openings(&histogram, &blocked, radius_m));
         self.blocked = Some(blocked);
     }
 
     /// The bearing to fly towards a target at the bearing `target`, while `heading` is flown (none at rest); all in
     /// radians counter-clockwise from east. `None` where no opening is left.
     ///
-    /// The edges of each opening are candidates, and the target if it lies in one; the least
+    /// The edges of each opening are candidates, and the target if it lies in one; openings that leave the comfort radius come
+    /// first, as long as they lead within an eighth of a turn of the target. The least
     /// `mu1 |c - target| + mu2 |c - heading| + mu3 |c - previous|` wins (Ulrich and Borenstein 1998).
     pub fn steer(&mut self, target: f64, heading: Option<f64>) -> Option<f64> {
         let VfhConfig { target_weight, heading_weight, previous_weight, .. } = self.config;
@@ -242,8 +247,13 @@ impl Vfh {
                 + heading_weight * apart(heading, bearing)
                 + previous_weight * apart(previous, bearing)
         };
-        let candidates = self.openings.iter().flat_map(|opening| opening.candidates(target));
-        self.chosen = candidates.map(wrapped).min_by(|a, b| cost(*a).total_cmp(&cost(*b)));
+        let best = |openings: &[Opening], within: f64| {
+            let all = openings.iter().flat_map(|opening| opening.candidates(target)).map(wrapped);
+            let near = all.filter(|candidate| wrapped(candidate - target).abs() <= within);
+            near.min_by(|a, b| cost(*a).total_cmp(&cost(*b)))
+        };
+        let [comfortable, safe] = &self.openings;
+        self.chosen = best(comfortable, DETOUR).or_else(|| best(safe, PI));
         self.chosen
     }
 
@@ -354,7 +364,7 @@ mod tests {
         let config = VfhConfig::default();
         let left = steered(&[(2.0, 0.0, 0.4)], 0.05, config).unwrap();
         let right = steered(&[(2.0, 0.0, 0.4)], -0.05, config).unwrap();
-        assert!(left > 0.4 && left < 1.0, "{left}");
+        assert!(left > 0.4 && left < 1.1, "{left}");
         assert!((left + right).abs() < 0.1, "and as far on the other side: {right}");
     }
 
@@ -362,9 +372,22 @@ mod tests {
     fn a_gap_too_narrow_for_the_safety_radius_is_no_opening() {
         // 1.2 m apart, at 1.5 m.
         let gate = [(1.5, 1.0, 0.4), (1.5, -1.0, 0.4)];
-        let with = |safety_radius_m| VfhConfig { safety_radius_m, ..VfhConfig::default() };
+        let with = |radius_m| VfhConfig {
+            safety_radius_m: radius_m,
+            comfort_radius_m: radius_m,
+            ..VfhConfig::default()
+        };
         assert!(steered(&gate, 0.0, with(0.4)).unwrap().abs() < 0.1);
         assert!(steered(&gate, 0.0, with(0.8)).unwrap().abs() > 0.8);
+    }
+
+    #[test]
+    fn a_wide_opening_is_passed_at_a_comfortable_distance_and_a_narrow_one_all_the_same() {
+        let config = VfhConfig { safety_radius_m: 0.4, ..VfhConfig::default() };
+        // The target is half a metre beside the right pillar.
+        let steered = |gap_m: f64| steered(&[(2.0, gap_m - 0.2, 0.4), (2.0, -1.0, 0.4)], -0.05, config).unwrap();
+        assert!(steered(3.0) > 0.1, "{}", steered(3.0));
+        assert!(steered(1.6).abs() < 0.1, "{}", steered(1.6));
     }
 
     #[test]
@@ -422,7 +445,7 @@ mod tests {
                 .collect();
             let count = |points: &[Vector3<f64>]| {
                 let histogram = Histogram::of(&Vector3::zeros(), points, 720, &config);
-                openings(&histogram, &decide(&histogram.states(&config), None), &config).len()
+                openings(&histogram, &decide(&histogram.states(&config), None), config.safety_radius_m).len()
             };
             // Rays that lie on a border may fall on either side of it.
             prop_assert!(count(&points).abs_diff(count(&turned)) <= 1);
