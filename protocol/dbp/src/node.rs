@@ -15,7 +15,7 @@ use skein_bp::{Bid, Event, EventSet, Origin, Program, ProgramError, Selection};
 
 use crate::explain::NodeExplanation;
 use crate::facts::{self, count, tell};
-use crate::held_blocks::HeldBlocks;
+use crate::held_blocks::{BlockNews, HeldBlocks};
 use crate::history::History;
 use crate::joint::Joint;
 use crate::outbox::Outbox;
@@ -167,8 +167,10 @@ pub(crate) type Select<'a> =
 /// What the program is to be told before it goes on.
 #[derive(Clone, Debug)]
 enum Delivery {
-    /// A fact of this node's own; with a b-thread, only while that is at the synchronisation point.
-    Fact(Event, Option<(String, u64)>),
+    /// A fact of this node's own.
+    Fact(Event),
+    /// Whether a b-thread's block is sure.
+    Block(BlockNews),
     /// What has occurred elsewhere.
     Occurrence(Occurrence),
     /// What a former life of this node has decided.
@@ -379,7 +381,7 @@ impl Node {
             .chain(self.outboxes.values().map(|outbox| outbox.next_deadline(lease)))
             .chain(self.streams.values().map(Stream::next_deadline))
             .chain([self.held.next_deadline(|home, bthread, sync| {
-                self.outboxes.get(home)?.kept_until(bthread, sync, lease)
+                self.outboxes.get(home)?.upheld(bthread, sync, lease)
             })])
             .chain([self.guard_due(), decisions])
             .flatten()
@@ -429,9 +431,8 @@ impl Node {
         let lease = self.config.lease;
         held.into_iter().flat_map(|(sync, homes)| homes.iter().map(move |home| (home, sync))).map(
             move |(home, sync)| {
-                let until =
-                    self.outboxes.get(home).and_then(|outbox| outbox.kept_until(bthread, sync, lease));
-                (home, until.is_some_and(|until| self.now < until))
+                let upheld = self.outboxes.get(home).and_then(|outbox| outbox.upheld(bthread, sync, lease));
+                (home, upheld.is_some_and(|upheld| self.now < upheld.until))
             },
         )
     }
@@ -500,7 +501,7 @@ impl Node {
     }
 
     fn fact(&mut self, what: &str, data: impl FnOnce(Event) -> Event) {
-        self.deliveries.push_back(Delivery::Fact(data(tell(&self.config.name, what)), None));
+        self.deliveries.push_back(Delivery::Fact(data(tell(&self.config.name, what))));
     }
 }
 

@@ -16,11 +16,6 @@ use crate::{
     ServedRequest,
 };
 
-/// How many bids one node may have here.
-const MOST_BIDS: usize = 256;
-/// How many events one bid may request.
-const MOST_REQUESTS: usize = 64;
-
 /// What of a remote bid this home honours.
 #[derive(Clone, Debug)]
 pub(crate) struct Rights {
@@ -225,8 +220,8 @@ impl BidTable {
         if self.rights.mutant == Some(Mutant::G2) {
             taken = bidder.bids.clone();
         }
-        for (index, bid) in record.bids.iter().enumerate() {
-            let (honoured, reasons) = self.rights.judge(&record.node, bid, index, bidder.lease);
+        for (place, bid) in record.bids.iter().enumerate() {
+            let (honoured, reasons) = self.rights.judge(&record.node, bid, place, bidder.lease);
             bidder.refuse(bid, reasons);
             let Some(mut honoured) = honoured else { continue };
             // What has occurred since the bidder stated this resumes its b-thread, which asks no more (G4).
@@ -237,7 +232,7 @@ impl BidTable {
             let astray =
                 record.term != past.term && bid.requests.iter().any(|e| Roster::joint_events().contains(e));
             honoured.open &= for_this_life && !over && !astray;
-            if honoured.keep && bidder.lifted.get(&bid.bthread).is_some_and(|sync| bid.sync <= *sync) {
+            if honoured.keep && bidder.lifted.get(&bid.bthread).is_some_and(|sync| bid.block_since <= *sync) {
                 honoured.block = EventSet::None;
                 honoured.keep = false;
                 bidder.refuse(bid, vec![RefusalReason::Lifted]);
@@ -445,15 +440,15 @@ impl Rights {
         self.home = home;
     }
 
-    /// What of the `index`-th bid of a record is honoured, and why not the rest.
+    /// What of a bid at this place of a record is honoured, and why not the rest.
     fn judge(
         &self,
         node: &NodeName,
         bid: &RemoteBid,
-        index: usize,
+        place: usize,
         lease: Duration,
     ) -> (Option<TakenBid>, Vec<RefusalReason>) {
-        if index >= MOST_BIDS || bid.requests.len() > MOST_REQUESTS {
+        if !bid.is_within_quota(place) {
             return (None, vec![RefusalReason::Quota]);
         }
         if lease > self.longest_lease {

@@ -245,7 +245,9 @@ impl Member {
             let key = (bidder, bid.bthread.clone());
             let stay = (record.incarnation, bid.sync);
             let known = self.kept.get(&key).is_some_and(|kept| (kept.incarnation, kept.sync) == stay);
-            let lifted = self.lifted.get(&key).is_some_and(|lifted| *lifted >= stay);
+            // What was lifted stays so while its holder moves on with it.
+            let begun = (record.incarnation, bid.block_since);
+            let lifted = self.lifted.get(&key).is_some_and(|lifted| *lifted >= begun);
             if !known && !lifted && self.may_block(record.node.as_str(), &bid.block) {
                 let (incarnation, sync) = stay;
                 let set = bid.block.clone();
