@@ -62,15 +62,37 @@ pub struct Happened {
     pub at: Duration,
 }
 
-/// A proxy's bid as the program was told it: the channel's part in the run.
+/// The channel's part in the run: what it has changed on the program's board.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ProxyMove {
+pub struct ChannelMove {
     /// How many of the selections that [`Node::take_selections`] gives next came before it.
     pub after: usize,
-    /// The proxy, `node#bthread`.
-    pub proxy: Arc<str>,
-    /// Its bid from now on; none if it goes.
-    pub bid: Option<Bid>,
+    /// What has changed.
+    pub change: BoardChange,
+}
+
+/// A change that a channel makes on a program's board.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum BoardChange {
+    /// This proxy, `node#bthread`, states this bid from now on.
+    Put(Arc<str>, Bid),
+    /// This proxy is gone.
+    Gone(Arc<str>),
+    /// This b-thread's requests count no more at its synchronisation point.
+    Withdrawn(Arc<str>),
+}
+
+impl BoardChange {
+    /// Makes the change on the board of `program`.
+    pub fn apply(&self, program: &mut Program) {
+        match self {
+            Self::Put(proxy, bid) => program.put_proxy(proxy.clone(), bid),
+            Self::Gone(proxy) => {
+                program.remove_proxy(proxy);
+            }
+            Self::Withdrawn(bthread) => program.withdraw_requests(bthread),
+        }
+    }
 }
 
 /// Why a step did not go well. What happened in it counts all the same.
@@ -155,8 +177,8 @@ pub struct Node {
     two_homed: BTreeMap<String, u64>,
     outgoing: Vec<(Recipient, Message)>,
     selections: Vec<Happened>,
-    /// How proxies moved, where that is recorded.
-    proxy_moves: Option<Vec<ProxyMove>>,
+    /// What the channel has changed on the program's board, where that is recorded.
+    channel_moves: Option<Vec<ChannelMove>>,
     stats: NodeStats,
 }
 
@@ -213,6 +235,7 @@ impl Node {
             facts,
             safety: config.safety.clone(),
             gateway: config.gateway.clone(),
+            orders: deciding::orders(&config.name),
             authority: config.authority.clone(),
             priority: config.remote_priority.clone(),
             longest_lease: config.longest_lease.max(config.lease),
@@ -256,7 +279,7 @@ impl Node {
             two_homed: BTreeMap::new(),
             outgoing: Vec::new(),
             selections: Vec::new(),
-            proxy_moves: None,
+            channel_moves: None,
             stats: NodeStats::default(),
             config,
         };
@@ -355,15 +378,15 @@ impl Node {
         std::mem::take(&mut self.selections)
     }
 
-    /// Records from now on how proxies move, for one who replays the run; see
-    /// [`take_proxy_moves`](Self::take_proxy_moves).
-    pub fn record_proxies(&mut self) {
-        self.proxy_moves.get_or_insert_default();
+    /// Records from now on what the channel changes on the program's board, for one who replays the run; see
+    /// [`take_channel_moves`](Self::take_channel_moves).
+    pub fn record_channel(&mut self) {
+        self.channel_moves.get_or_insert_default();
     }
 
-    /// How proxies have moved since the last call, in order; to be taken together with the selections.
-    pub fn take_proxy_moves(&mut self) -> Vec<ProxyMove> {
-        self.proxy_moves.as_mut().map(std::mem::take).unwrap_or_default()
+    /// What the channel has changed since the last call, in order; to be taken together with the selections.
+    pub fn take_channel_moves(&mut self) -> Vec<ChannelMove> {
+        self.channel_moves.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// When [`step`](Self::step) is due even if no message comes.
@@ -380,9 +403,9 @@ impl Node {
             .into_iter()
             .chain(self.outboxes.values().map(|outbox| outbox.next_deadline(lease)))
             .chain(self.streams.values().map(Stream::next_deadline))
-            .chain([self.held.next_deadline(|home, bthread, sync| {
-                self.outboxes.get(home)?.upheld(bthread, sync, lease)
-            })])
+            .chain([self
+                .held
+                .next_deadline(|home, bthread, sync| self.outboxes.get(home)?.upheld(bthread, sync, lease))])
             .chain([self.guard_due(), decisions])
             .flatten()
             .fold(self.presence_due, Duration::min)
@@ -498,6 +521,15 @@ impl Node {
     /// How long this node has been up.
     fn up(&self) -> Duration {
         self.now - self.started.unwrap_or(self.now)
+    }
+
+    /// Changes the program's board.
+    fn change_board(&mut self, change: BoardChange) {
+        self.stalls_due = true;
+        change.apply(&mut self.program);
+        if let Some(moves) = &mut self.channel_moves {
+            moves.push(ChannelMove { after: self.selections.len(), change });
+        }
     }
 
     fn fact(&mut self, what: &str, data: impl FnOnce(Event) -> Event) {

@@ -105,7 +105,8 @@ impl Outbox {
         bids.retain(|bid| !bid.requests.is_empty() || !bid.block.is_none());
         let mut blocks = BTreeMap::new();
         for (place, bid) in bids.iter_mut().enumerate().filter(|(_, bid)| !bid.block.is_none()) {
-            let statement = self.continued(place, bid).unwrap_or_else(|| Statement::new(bid.sync, self.epoch + 1));
+            let statement =
+                self.continued(place, bid).unwrap_or_else(|| Statement::new(bid.sync, self.epoch + 1));
             bid.block_since = statement.since;
             blocks.insert(bid.bthread.clone(), statement);
         }
@@ -122,14 +123,18 @@ impl Outbox {
     fn continued(&self, place: usize, bid: &RemoteBid) -> Option<Statement> {
         let before = self.bids.iter().find(|before| before.bthread == bid.bthread)?;
         let statement = *self.blocks.get(&bid.bthread)?;
-        if before.on_loss != bid.on_loss || !bid.block.is_within(&before.block) || !bid.is_within_quota(place) {
+        if before.on_loss != bid.on_loss || !bid.block.is_within(&before.block) || !bid.is_within_quota(place)
+        {
             return None;
         }
         if before.sync == bid.sync {
             return Some(statement);
         }
-        self.upheld_by(statement, &bid.bthread)
-            .then_some(Statement { sync: bid.sync, entered: self.epoch + 1, ..statement })
+        self.upheld_by(statement, &bid.bthread).then_some(Statement {
+            sync: bid.sync,
+            entered: self.epoch + 1,
+            ..statement
+        })
     }
 
     /// The home lives in a new incarnation: nothing that the old one had taken in counts any more. Gives the bids

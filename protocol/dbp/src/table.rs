@@ -27,6 +27,8 @@ pub(crate) struct Rights {
     pub(crate) safety: EventSet,
     /// ... but for these, which may be requested.
     pub(crate) gateway: EventSet,
+    /// An operator's orders to the node itself, which nobody blocks from afar.
+    pub(crate) orders: EventSet,
     /// What may be blocked from afar: the home's events without all of these.
     pub(crate) blockable: EventSet,
     /// Who may do what of the rest.
@@ -433,7 +435,7 @@ impl Rights {
 
     /// From now on, these events have their home here.
     pub(crate) fn set_home(&mut self, home: EventSet) {
-        let never = self.facts.clone().or(self.safety.clone()).or(self.gateway.clone());
+        let never = EventSet::any_of([&self.facts, &self.safety, &self.gateway, &self.orders]);
         #[cfg(feature = "mutants")]
         let never = if self.mutant == Some(Mutant::G6) { self.facts.clone() } else { never };
         self.blockable = home.clone().and(never.not());

@@ -225,9 +225,8 @@ impl Node {
 
     fn check_held_blocks(&mut self) {
         let (outboxes, lease) = (&self.outboxes, self.config.lease);
-        let news = self
-            .held
-            .check(self.now, |home, bthread, sync| outboxes.get(home)?.upheld(bthread, sync, lease));
+        let news =
+            self.held.check(self.now, |home, bthread, sync| outboxes.get(home)?.upheld(bthread, sync, lease));
         self.deliveries.extend(news.into_iter().map(Delivery::Block));
     }
 
