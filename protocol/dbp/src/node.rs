@@ -343,9 +343,12 @@ impl Node {
         outcome
     }
 
-    /// The messages to send, in order.
+    /// The messages to send, in order. Acknowledgements come last, so that no occurrence that a b-thread waits for
+    /// elsewhere goes behind one.
     pub fn take_outgoing(&mut self) -> Vec<(Recipient, Message)> {
-        std::mem::take(&mut self.outgoing)
+        let mut outgoing = std::mem::take(&mut self.outgoing);
+        outgoing.sort_by_key(|(_, message)| matches!(message, Message::Ack(_)));
+        outgoing
     }
 
     /// What this node must not forget, if that has changed since the last call: to be on disk before
