@@ -31,8 +31,7 @@ pub struct FilterConfig {
     pub hull_radius_m: f64,
     /// Standard deviations of the relative position by which the distance is widened.
     pub sigmas: f64,
-    /// Age at which a neighbour's state is no longer fresh, seconds: it is then taken to keep its velocity,
-    /// whatever happens.
+    /// Age at which a neighbour's state is no longer fresh, seconds: from then on its ghost grows.
     pub fresh_s: f64,
     /// Speed with which the ghost of a neighbour grows that has fallen silent, m/s.
     pub ghost_growth_m_s: f64,
@@ -59,6 +58,15 @@ impl Default for FilterConfig {
             ghost_max_m: 3.0,
             vertical_stretch: 1.5,
         }
+    }
+}
+
+impl FilterConfig {
+    /// Two vehicles that know of one another's place and keep their distance both do not limit one another beyond this, centre to centre, metres:
+    /// `separation + 2 v (t + v / 2a)` at the greatest speed `v`.
+    #[must_use]
+    pub fn reach_m(&self) -> f64 {
+        self.separation_m + 2.0 * self.max_speed_m_s * stop_s(self.max_speed_m_s, self)
     }
 }
 
@@ -135,7 +143,7 @@ struct Limit {
 /// |---|---|---|
 /// | obstacle | `g = d - r` | `g` |
 /// | neighbour that keeps its distance too | `g = d - D` | `min(g / 2, g - S_j) + w^2 / 4a`: half the gap for each, less if the neighbour has come to need more; `w` is the speed with which it leads away |
-/// | neighbour that does not, or is silent | `g = d - D` | `g`, and `n . v_j` added to the bound if it comes nearer |
+/// | neighbour that does not | `g = d - D` | `g`, and `n . v_j` added to the bound if it comes nearer |
 ///
 /// For `g < 0` the bound is `g / t` (half that when shared): the vehicle must leave. `D` is widened by what is not
 /// known of the neighbour, see [`distance_kept_m`]. Distances between vehicles are stretched vertically.
@@ -255,7 +263,7 @@ fn neighbour_limit(motion: &Motion, neighbour: &Neighbour, stop: f64, config: &F
     let gap = distance - distance_kept_m(motion.sigma_m, neighbour, config);
 
     let leads_away = gradient.dot(&neighbour.velocity);
-    let bound = if neighbour.cooperative && silent_s(neighbour, config) == 0.0 {
+    let bound = if neighbour.cooperative {
         approach(shared_reach(gap, leads_away, neighbour.velocity.norm(), config), stop, config)
     } else {
         leads_away.min(0.0) + approach(gap, stop, config)
