@@ -99,12 +99,8 @@ impl Neighbours {
     pub fn echo(&mut self, now: Duration) -> Option<Echo> {
         let is_fresh = |heard: &&Heard| now.saturating_sub(heard.at) <= ECHO_FOR;
         let after = |heard: &&Heard| self.echoed.as_ref().is_none_or(|echoed| heard.state.node > *echoed);
-        let heard = self
-            .last
-            .values()
-            .filter(is_fresh)
-            .find(after)
-            .or_else(|| self.last.values().find(is_fresh))?;
+        let heard =
+            self.last.values().filter(is_fresh).find(after).or_else(|| self.last.values().find(is_fresh))?;
         let (State { node, incarnation, time, .. }, held) = (&heard.state, now.saturating_sub(heard.at));
         let echo = Echo { node: node.clone(), incarnation: *incarnation, time: *time, held };
         self.echoed = Some(node.clone());
@@ -154,9 +150,8 @@ impl Heard {
 
 /// Of two tellings the one that may be less wrong by now.
 fn better(now: Duration, known: Option<Clock>, heard: Option<Clock>) -> Option<Clock> {
-    let wrong_s = |clock: &Clock| {
-        0.5 * clock.round_trip_s + DRIFT * now.saturating_sub(clock.at).as_secs_f64()
-    };
+    let wrong_s =
+        |clock: &Clock| 0.5 * clock.round_trip_s + DRIFT * now.saturating_sub(clock.at).as_secs_f64();
     known.into_iter().chain(heard).min_by(|a, b| wrong_s(a).total_cmp(&wrong_s(b)))
 }
 

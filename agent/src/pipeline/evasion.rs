@@ -52,15 +52,21 @@ impl Evasion {
     /// The way to leave the height at `now`, after the filter said `outcome`; `None` to stay.
     ///
     /// `rank` is the number of neighbours whose names come before this vehicle's: of two, the one whose name comes first climbs. Both
-    /// judge alike without a word. Who has no room that way takes the other; with none either way it stays and brakes.
-    pub fn decide(&mut self, now: Duration, outcome: &Outcome, rank: u32, room: Room) -> Option<Way> {
+    /// judge alike without a word. `room` is asked only when it matters. Who has no room that way takes the other; with none either way it stays and brakes.
+    pub fn decide(
+        &mut self,
+        now: Duration,
+        outcome: &Outcome,
+        rank: u32,
+        room: impl Fn() -> Room,
+    ) -> Option<Way> {
         let neighbour = match outcome {
             Outcome::Infeasible { by: Cause::Neighbour(id), .. } => Some(*id),
             _ => None,
         };
         let Some(neighbour) = neighbour else {
             self.hemmed_in_since = None;
-            self.way = self.way.filter(|(way, until)| now < *until && room.allows(*way));
+            self.way = self.way.filter(|(way, until)| now < *until && room().allows(*way));
             return self.way.map(|(way, _)| way);
         };
         let since = *self.hemmed_in_since.get_or_insert(now);
@@ -70,6 +76,7 @@ impl Evasion {
         let by_rank = if neighbour < rank { [Way::Down, Way::Up] } else { [Way::Up, Way::Down] };
         // Once begun, a way is kept to its end.
         let begun = self.way.map(|(way, _)| way);
+        let room = room();
         let way = begun.into_iter().chain(by_rank).find(|way| room.allows(*way));
         self.way = way.map(|way| (way, now + LASTS));
         way
@@ -89,7 +96,7 @@ impl Room {
 mod tests {
     use super::*;
 
-    const BOTH: Room = Room { up: true, down: true };
+    const BOTH: fn() -> Room = || Room { up: true, down: true };
 
     fn hemmed_in_by(id: u32) -> Outcome {
         Outcome::Infeasible { by: Cause::Neighbour(id), excess_m_s: 0.1 }
@@ -100,7 +107,7 @@ mod tests {
     }
 
     /// What is decided after braking did not help.
-    fn after_braking(by: &Outcome, rank: u32, room: Room) -> Option<Way> {
+    fn after_braking(by: &Outcome, rank: u32, room: fn() -> Room) -> Option<Way> {
         let mut evasion = Evasion::default();
         assert_eq!(evasion.decide(ms(0), by, rank, room), None, "it brakes first");
         assert_eq!(evasion.decide(ms(480), by, rank, room), None);
@@ -116,9 +123,9 @@ mod tests {
 
     #[test]
     fn where_there_is_no_room_the_vehicle_does_not_go() {
-        assert_eq!(after_braking(&hemmed_in_by(0), 0, Room { up: false, down: true }), Some(Way::Down));
-        assert_eq!(after_braking(&hemmed_in_by(0), 1, Room { up: true, down: false }), Some(Way::Up));
-        assert_eq!(after_braking(&hemmed_in_by(0), 0, Room { up: false, down: false }), None);
+        assert_eq!(after_braking(&hemmed_in_by(0), 0, || Room { up: false, down: true }), Some(Way::Down));
+        assert_eq!(after_braking(&hemmed_in_by(0), 1, || Room { up: true, down: false }), Some(Way::Up));
+        assert_eq!(after_braking(&hemmed_in_by(0), 0, || Room { up: false, down: false }), None);
     }
 
     #[test]
@@ -133,7 +140,11 @@ mod tests {
         let mut evasion = Evasion::default();
         evasion.decide(ms(0), &hemmed_in_by(4), 2, BOTH);
         assert_eq!(evasion.decide(ms(500), &hemmed_in_by(4), 2, BOTH), Some(Way::Up));
-        assert_eq!(evasion.decide(ms(520), &hemmed_in_by(1), 2, BOTH), Some(Way::Up), "though now it would sink");
+        assert_eq!(
+            evasion.decide(ms(520), &hemmed_in_by(1), 2, BOTH),
+            Some(Way::Up),
+            "though now it would sink"
+        );
         assert_eq!(evasion.decide(ms(1900), &Outcome::Clear, 2, BOTH), Some(Way::Up));
         assert_eq!(evasion.decide(ms(2100), &Outcome::Clear, 2, BOTH), None);
     }

@@ -477,7 +477,8 @@ impl Guidance {
         let obstacles: Vec<_> =
             surroundings.obstacles.iter().copied().chain(self.fence_ahead(motion.position)).collect();
         let filtered = filter(&request, surroundings.neighbours, &obstacles, &self.filter);
-        let room = self.room(motion.position, surroundings.map);
+        let clearance_m = self.filter.obstacle_clearance_m;
+        let room = || room(motion.position, surroundings.map, clearance_m);
         if let Some(way) = self.evasion.decide(now, &filtered.outcome, surroundings.rank, room) {
             let mut desired = filtered.velocity;
             desired.z = way.sign() * self.envelope.climb_m_s;
@@ -491,16 +492,6 @@ impl Guidance {
         } else {
             SetPoint::Velocity { velocity: safe, yaw: None }
         }
-    }
-
-    /// Whether the vehicle can leave its height, as far as the map reaches and tells.
-    fn room(&self, position: Vector3<f64>, map: &ClearanceMap) -> Room {
-        let clearance_m = self.filter.obstacle_clearance_m;
-        let leads_free = |way: Way| {
-            let there = position + Vector3::z() * (way.sign() * EVASION_M);
-            map.voxels().index_of(&there).is_some() && map.is_segment_clear(&position, &there, clearance_m)
-        };
-        Room { up: leads_free(Way::Up), down: leads_free(Way::Down) }
     }
 
     /// Along the path; `None` without path or leave.
@@ -553,6 +544,15 @@ impl Guidance {
             },
         )
     }
+}
+
+/// Whether a vehicle can leave its height, as far as the map reaches and tells.
+fn room(position: Vector3<f64>, map: &ClearanceMap, clearance_m: f64) -> Room {
+    let leads_free = |way: Way| {
+        let there = position + Vector3::z() * (way.sign() * EVASION_M);
+        map.voxels().index_of(&there).is_some() && map.is_segment_clear(&position, &there, clearance_m)
+    };
+    Room { up: leads_free(Way::Up), down: leads_free(Way::Down) }
 }
 
 /// The velocity wanted before others are considered (ENU, m/s), and the height it leads to (m).

@@ -11,9 +11,7 @@ mod dodgy;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use skein_planning::local::apf::limited;
-use skein_planning::separation::{
-    FilterConfig, Grid, Motion, Neighbour, RepulsionConfig, filter, repulsion,
-};
+use skein_planning::separation::{FilterConfig, Grid, Motion, Neighbour, RepulsionConfig, filter, repulsion};
 
 use super::{Bound, Figure, Line, Options, Report, Style};
 use crate::cpu_time;
@@ -297,7 +295,15 @@ pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
     }
     report.table(
         "Through the middle of a sphere",
-        &["vehicles", "", "arrived", "time (s)", "least distance (m)", "steps too near", "CPU of a step (ms)"],
+        &[
+            "vehicles",
+            "",
+            "arrived",
+            "time (s)",
+            "least distance (m)",
+            "steps too near",
+            "CPU of a step (ms)",
+        ],
         first.rows().into_iter().chain(many.iter().flat_map(Both::rows)),
     );
     report.goal("arrived", first.ours.arrived as f64, Bound::Exactly(first.vehicles as f64));
@@ -341,11 +347,8 @@ fn separation_figure(both: &Both) -> Figure {
 }
 
 fn ways_figure(both: &Both) -> Figure {
-    let way = |points: &Vec<(f64, f64)>| Line {
-        name: String::new(),
-        style: Style::Solid,
-        points: points.clone(),
-    };
+    let way =
+        |points: &Vec<(f64, f64)>| Line { name: String::new(), style: Style::Solid, points: points.clone() };
     Figure {
         x: "east (m)".to_owned(),
         y: "north (m)".to_owned(),

@@ -142,7 +142,7 @@ struct Limit {
 /// | what, at distance `d` | gap | reach `h` for `g >= 0` |
 /// |---|---|---|
 /// | obstacle | `g = d - r` | `g` |
-/// | neighbour that keeps its distance too | `g = d - D` | `min(g / 2, g - S_j) + w^2 / 4a`: half the gap for each, less if the neighbour has come to need more; `w` is the speed with which it leads away |
+/// | neighbour that keeps its distance too | `g = d - D` | `min(g / 2, g - S_j) + w^2 / 4a`: half the gap for each, less if the neighbour has come to need more; `w` is the speed with which it leads away, less `a t` |
 /// | neighbour that does not | `g = d - D` | `g`, and `n . v_j` added to the bound if it comes nearer |
 ///
 /// For `g < 0` the bound is `g / t` (half that when shared): the vehicle must leave. `D` is widened by what is not
@@ -280,7 +280,9 @@ fn shared_reach(gap_m: f64, leads_away_m_s: f64, speed_m_s: f64, config: &Filter
         return half;
     }
     if leads_away_m_s > 0.0 {
-        return half + leads_away_m_s * leads_away_m_s / (4.0 * config.decel_m_s2);
+        // What is left of it if the neighbour brakes from now on, when this vehicle begins to.
+        let left_m_s = (leads_away_m_s - config.decel_m_s2 * config.latency_s).max(0.0);
+        return half + left_m_s * left_m_s / (4.0 * config.decel_m_s2);
     }
     let its_stop = -leads_away_m_s * stop_s(speed_m_s, config);
     half.min(gap_m - its_stop).max(0.0)
