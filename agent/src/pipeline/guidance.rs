@@ -10,7 +10,7 @@ use skein_planning::{
     global::{
         Potential, PotentialObstacle,
         astar::{self, AstarConfig, AstarScratch, Disc, PlanError, Request},
-        simplify,
+        simplify_around,
     },
     local::{
         apf::{self, ApfConfig},
@@ -23,6 +23,7 @@ use skein_planning::{
 };
 use skein_wire::vocabulary::{ARRIVED, LEAVE, PASSAGE, PATH_BLOCKED, PLANNED, STUCK, UNPLANNABLE};
 
+use super::evasion::{Evasion, Room, Way};
 use crate::{
     config::{Envelope, Fence},
     me::Me,
@@ -73,6 +74,9 @@ const GIVES_WAY_M: f64 = 1.0;
 const ROOM_AHEAD_M: f64 = 1.5;
 /// Speed at which a hovering vehicle goes back to its place, at most, m/s.
 const STATION_KEEPING_M_S: f64 = 0.5;
+
+/// A vehicle that is hemmed in leaves its height where it has this much room, m.
+const EVASION_M: f64 = 1.0;
 
 /// How the vehicle moves. World ENU.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -165,6 +169,7 @@ pub struct Guidance {
     braking: BrakingConfig,
     filter: FilterConfig,
     escape: EscapeDetector,
+    evasion: Evasion,
     scratch: AstarScratch,
 }
 
@@ -198,6 +203,7 @@ impl Guidance {
                 ..FilterConfig::default()
             },
             escape: EscapeDetector::new(EscapeConfig::default()),
+            evasion: Evasion::default(),
             scratch: AstarScratch::default(),
         }
     }
@@ -346,7 +352,10 @@ impl Guidance {
             let clearance_m = self.envelope.hull_m + margin_m;
             let config = AstarConfig { clearance_m, ..config };
             match astar::plan(map, request, &config, &mut self.scratch) {
-                Ok(plan) => return Ok((simplify(map, &plan.path, clearance_m), clearance_m)),
+                Ok(plan) => {
+                    let path = simplify_around(map, &plan.path, clearance_m, request.discs);
+                    return Ok((path, clearance_m));
+                }
                 // Far away: begin with the part of the way that leads nearest to the goal.
                 Err(PlanError::BudgetExhausted { partial, .. }) if config.planar_band_m > 0.0 => {
                     return Ok((partial, clearance_m));
@@ -467,7 +476,17 @@ impl Guidance {
         };
         let obstacles: Vec<_> =
             surroundings.obstacles.iter().copied().chain(self.fence_ahead(motion.position)).collect();
-        let safe = filter(&request, surroundings.neighbours, &obstacles, &self.filter).velocity;
+        let filtered = filter(&request, surroundings.neighbours, &obstacles, &self.filter);
+        let clearance_m = self.filter.obstacle_clearance_m;
+        let room = || room(motion.position, surroundings.map, clearance_m);
+        if let Some(way) = self.evasion.decide(now, &filtered.outcome, surroundings.rank, room) {
+            let mut desired = filtered.velocity;
+            desired.z = way.sign() * self.envelope.climb_m_s;
+            let request = separation::Motion { desired, planar: false, ..request };
+            let velocity = filter(&request, surroundings.neighbours, &obstacles, &self.filter).velocity;
+            return SetPoint::Velocity { velocity, yaw: None };
+        }
+        let safe = filtered.velocity;
         if is_level {
             SetPoint::Planar { vx: safe.x, vy: safe.y, z: wish.height_m, yaw: None }
         } else {
@@ -527,6 +546,15 @@ impl Guidance {
     }
 }
 
+/// Whether a vehicle can leave its height, as far as the map reaches and tells.
+fn room(position: Vector3<f64>, map: &ClearanceMap, clearance_m: f64) -> Room {
+    let leads_free = |way: Way| {
+        let there = position + Vector3::z() * (way.sign() * EVASION_M);
+        map.voxels().index_of(&there).is_some() && map.is_segment_clear(&position, &there, clearance_m)
+    };
+    Room { up: leads_free(Way::Up), down: leads_free(Way::Down) }
+}
+
 /// The velocity wanted before others are considered (ENU, m/s), and the height it leads to (m).
 #[derive(Clone, Copy, Debug)]
 struct Wish {
@@ -543,4 +571,6 @@ pub struct Surroundings<'a> {
     pub obstacles: &'a [Vector3<f64>],
     /// The other vehicles in the air.
     pub neighbours: &'a [separation::Neighbour],
+    /// How many of them, and of those on the ground, have names that come before this vehicle's.
+    pub rank: u32,
 }

@@ -4,6 +4,7 @@
 
 mod figure;
 mod report;
+mod sphere;
 
 use std::path::PathBuf;
 
@@ -23,7 +24,11 @@ pub struct Experiment {
 }
 
 /// Every experiment.
-pub const EXPERIMENTS: &[Experiment] = &[];
+pub const EXPERIMENTS: &[Experiment] = &[Experiment {
+    name: "sphere",
+    about: "a hundred vehicles through the middle of a sphere, beside ORCA",
+    run: sphere::run,
+}];
 
 /// What the command line says to an experiment. What is not given is the experiment's own.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -5,4 +5,4 @@ mod potential;
 mod simplify;
 
 pub use potential::{Potential, PotentialObstacle, is_in_field};
-pub use simplify::{elide_collinear, simplify};
+pub use simplify::{elide_collinear, simplify, simplify_around};
