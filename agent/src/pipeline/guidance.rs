@@ -9,7 +9,7 @@ use skein_planning::{
     Path,
     global::{
         Potential, PotentialObstacle,
-        astar::{self, AstarConfig, AstarScratch, Disc, PlanError, Request},
+        astar::{self, AstarConfig, Astar, Disc, PlanError, Request},
         simplify,
     },
     local::{
@@ -165,7 +165,7 @@ pub struct Guidance {
     braking: BrakingConfig,
     filter: FilterConfig,
     escape: EscapeDetector,
-    scratch: AstarScratch,
+    scratch: Astar,
 }
 
 impl Guidance {
@@ -198,7 +198,7 @@ impl Guidance {
                 ..FilterConfig::default()
             },
             escape: EscapeDetector::new(EscapeConfig::default()),
-            scratch: AstarScratch::default(),
+            scratch: Astar::default(),
         }
     }
 
