@@ -4,7 +4,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use crate::grid::{Lattice, MOVES, Pages, moved, octile};
+use crate::grid::{Bricks, Lattice, MOVES, Packed, moved, octile};
 use crate::map::VoxelIndex;
 
 /// How hard a search tries, and for how long.
@@ -39,6 +39,8 @@ impl Effort {
 
 /// The weight that a budgeted search begins with.
 const FIRST_WEIGHT: f64 = 1.5;
+/// What is left of the excess weight from one round to the next.
+const TIGHTENED: f64 = 0.25;
 
 /// A way through a grid.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,15 +87,14 @@ pub enum Unsolved {
 /// Memory is taken near the cells that were looked at only.
 #[derive(Clone, Debug)]
 pub struct Search {
-    nodes: Pages<Node>,
+    nodes: Bricks<Node>,
     /// Number of the search that `nodes` belong to.
     generation: u32,
     /// Number of the round within the search: rounds differ by weight.
     round: u8,
     open: BinaryHeap<Open>,
     /// Cells whose cost improved after they were expanded in this round.
-    inconsistent: Vec<usize>,
-    size: [usize; 3],
+    inconsistent: Vec<VoxelIndex>,
     least_costs: [f64; 3],
     start: VoxelIndex,
     goal: VoxelIndex,
@@ -120,24 +121,27 @@ struct Node {
 
 /// Mark of the start, which no move led to.
 const ROOT: u8 = u8::MAX;
-/// Rounds are few because each at least halves the excess weight.
+/// The excess weight is beneath rounding after fewer.
 const LAST_ROUND: u8 = 60;
 
-/// An entry of the open list: least `f` first, then greatest `g`, then lowest index, so that ties have one answer.
+/// An entry of the open list: least `f` first, then greatest `g`, then lowest cell, so that ties have one answer.
 #[derive(Clone, Copy, Debug)]
 struct Open {
     f: f64,
     g: f64,
-    index: usize,
+    cell: Packed,
 }
 
 impl Ord for Open {
+    #[inline]
     fn cmp(&self, other: &Self) -> Ordering {
-        other.f.total_cmp(&self.f).then(self.g.total_cmp(&other.g)).then(other.index.cmp(&self.index))
+        let by_f = other.f.total_cmp(&self.f);
+        by_f.then_with(|| self.g.total_cmp(&other.g)).then_with(|| other.cell.cmp(&self.cell))
     }
 }
 
 impl PartialOrd for Open {
+    #[inline]
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
@@ -155,12 +159,11 @@ impl Default for Search {
     fn default() -> Self {
         let origin = VoxelIndex::default();
         Search {
-            nodes: Pages::default(),
+            nodes: Bricks::default(),
             generation: 0,
             round: 1,
             open: BinaryHeap::new(),
             inconsistent: Vec::new(),
-            size: [0; 3],
             least_costs: [1.0; 3],
             start: origin,
             goal: origin,
@@ -211,9 +214,8 @@ impl Search {
     pub fn begin(&mut self, lattice: &impl Lattice, start: VoxelIndex, goal: VoxelIndex, effort: Effort) {
         self.open.clear();
         self.inconsistent.clear();
-        self.size = lattice.size();
         self.least_costs = lattice.least_costs();
-        self.nodes.reserve(self.size.iter().product());
+        self.nodes.fit(lattice.size());
         self.generation = self.generation.checked_add(1).unwrap_or_else(|| {
             self.nodes.clear();
             1
@@ -224,11 +226,11 @@ impl Search {
         self.bound = f64::INFINITY;
         self.expanded = 0;
         self.goal_g = if start == goal { 0.0 } else { f64::INFINITY };
-        let (index, h) = (self.index(start), self.heuristic(start));
+        let h = self.heuristic(start);
         self.nearest = (start, h);
-        *self.nodes.slot(index) =
+        *self.nodes.slot(start) =
             Node { g: 0.0, generation: self.generation, arrived_by: ROOT, closed_in: 0 };
-        self.open.push(Open { f: self.weight * h, g: 0.0, index });
+        self.open.push(Open { f: self.weight * h, g: 0.0, cell: Packed::of(start) });
     }
 
     /// Goes on with a search, for at most `expansions` cells. `None` if there is no answer yet.
@@ -271,7 +273,7 @@ impl Search {
             if self.goal_g <= next.f {
                 return true;
             }
-            let node = self.nodes.slot(next.index);
+            let node = self.nodes.slot(next.cell.unpacked());
             if node.closed_in == self.round || next.g > node.g {
                 self.open.pop();
                 continue;
@@ -288,12 +290,11 @@ impl Search {
     }
 
     fn expand(&mut self, lattice: &impl Lattice, next: Open) {
-        let here = self.cell(next.index);
+        let here = next.cell.unpacked();
         lattice.steps_from(here, |number, cost| {
             let there = moved(here, MOVES[number].by);
-            let index = self.index(there);
             let g = next.g + cost;
-            let node = self.nodes.slot(index);
+            let node = self.nodes.slot(there);
             if node.generation != self.generation {
                 *node =
                     Node { g: f64::INFINITY, generation: self.generation, arrived_by: ROOT, closed_in: 0 };
@@ -304,11 +305,11 @@ impl Search {
             node.g = g;
             node.arrived_by = number as u8;
             if node.closed_in == self.round {
-                self.inconsistent.push(index);
+                self.inconsistent.push(there);
                 return;
             }
             let h = octile(there, self.goal, self.least_costs);
-            self.open.push(Open { f: g + self.weight * h, g, index });
+            self.open.push(Open { f: g + self.weight * h, g, cell: Packed::of(there) });
             if h < self.nearest.1 {
                 self.nearest = (there, h);
             }
@@ -330,25 +331,28 @@ impl Search {
         }
     }
 
-    /// Begins the next round, with half the excess weight.
+    /// Begins the next round, with less weight.
     fn tighten(&mut self) {
-        let weight = (1.0 + self.weight) / 2.0;
+        let weight = 1.0 + (self.weight - 1.0) * TIGHTENED;
         self.weight = weight.max(self.effort.bound.max(1.0)).min(self.bound);
         let weight = self.weight;
-        let open = self.unfinished().map(|(index, g, h)| Open { f: g + weight * h, g, index }).collect();
+        let open = self
+            .unfinished()
+            .map(|(cell, g, h)| Open { f: g + weight * h, g, cell: Packed::of(cell) })
+            .collect();
         self.open = open;
         self.inconsistent.clear();
         self.round += 1;
     }
 
-    /// The cells that may still be expanded, or expanded again: index, `g` and `h`.
-    fn unfinished(&self) -> impl Iterator<Item = (usize, f64, f64)> + '_ {
+    /// The cells that may still be expanded, or expanded again: `g` and `h` of each.
+    fn unfinished(&self) -> impl Iterator<Item = (VoxelIndex, f64, f64)> + '_ {
         let open = self.open.iter().filter(|entry| {
-            let node = self.nodes.get(entry.index);
+            let node = self.nodes.get(entry.cell.unpacked());
             node.closed_in != self.round && entry.g == node.g
         });
-        let indices = open.map(|entry| entry.index).chain(self.inconsistent.iter().copied());
-        indices.map(|index| (index, self.nodes.get(index).g, self.heuristic(self.cell(index))))
+        let cells = open.map(|entry| entry.cell.unpacked()).chain(self.inconsistent.iter().copied());
+        cells.map(|cell| (cell, self.nodes.get(cell).g, self.heuristic(cell)))
     }
 
     /// The path known. Its cost may be less than the goal's `g`: a cell on it may have improved since.
@@ -362,7 +366,7 @@ impl Search {
     fn way_to(&self, last: VoxelIndex) -> Vec<VoxelIndex> {
         let mut cells = vec![last];
         let mut here = last;
-        while let Some(step) = MOVES.get(usize::from(self.nodes.get(self.index(here)).arrived_by)) {
+        while let Some(step) = MOVES.get(usize::from(self.nodes.get(here).arrived_by)) {
             here = moved(here, step.by.map(|c| -c));
             cells.push(here);
         }
@@ -372,15 +376,6 @@ impl Search {
 
     fn heuristic(&self, cell: VoxelIndex) -> f64 {
         octile(cell, self.goal, self.least_costs)
-    }
-
-    fn index(&self, cell: VoxelIndex) -> usize {
-        (cell.z * self.size[1] + cell.y) * self.size[0] + cell.x
-    }
-
-    fn cell(&self, index: usize) -> VoxelIndex {
-        let [nx, ny, _] = self.size;
-        VoxelIndex { x: index % nx, y: index / nx % ny, z: index / (nx * ny) }
     }
 }
 

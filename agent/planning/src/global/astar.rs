@@ -122,8 +122,10 @@ pub enum PlanError {
 const BLOCKED: i32 = i32::MIN;
 /// How finely depth in a disc is told apart.
 const DISC_STEPS: f64 = 64.0;
-/// Beginning to track a layer takes as long as so many expansions.
+/// Beginning to track a layer takes as long as so many expansions in one layer.
 const LAYER_EXPANSIONS: usize = 4000;
+/// An expansion with 26 neighbours takes as long as so many with 8.
+const SPACE_EXPANSIONS: usize = 4;
 
 /// Finds the path of least cost from start to goal.
 ///
@@ -166,7 +168,7 @@ pub fn plan(
 ) -> Result<Plan, PlanError> {
     search.begin(map, request, config)?;
     loop {
-        if let Some(answer) = search.advance(map, request, config, usize::MAX) {
+        if let Some(answer) = search.advance(map, request, config, &mut usize::MAX.clone()) {
             return answer;
         }
     }
@@ -223,7 +225,8 @@ impl Astar {
         Ok(())
     }
 
-    /// Goes on with a search, for about as long as `expansions` expansions take. `None` if there is no answer yet.
+    /// Goes on with a search, for about as long as `allowance` expansions in one layer take, and takes what was used from
+    /// it; a last layer or expansion may cost more than is left. `None` if there is no answer yet.
     ///
     /// What the map has learnt meanwhile counts for what is still to be expanded. If its window has moved, begin again.
     pub fn advance(
@@ -231,16 +234,15 @@ impl Astar {
         map: &mut ClearanceMap,
         request: &Request<'_>,
         config: &AstarConfig,
-        expansions: usize,
+        allowance: &mut usize,
     ) -> Option<Result<Plan, PlanError>> {
         let Extent { start, goal, low, layers, planar } = self.extent;
-        let mut left = expansions;
         for z in low..low + layers {
-            if left == 0 {
+            if *allowance == 0 {
                 return None;
             }
             if map.track_layer(z) {
-                left = left.saturating_sub(LAYER_EXPANSIONS);
+                *allowance = allowance.saturating_sub(LAYER_EXPANSIONS);
             }
         }
         let [nx, ny, _] = map.voxels().counts();
@@ -261,8 +263,11 @@ impl Astar {
             let effort = Effort { budget: config.budget, ..Effort::OPTIMAL };
             self.search.begin(&rooms, rooms.cell(start), rooms.cell(goal), effort);
         }
-        let answer = self.search.advance(&rooms, left)?;
-        Some(match answer {
+        let each = if layers == 1 { 1 } else { SPACE_EXPANSIONS };
+        let before = self.search.expanded();
+        let answer = self.search.advance(&rooms, allowance.div_ceil(each));
+        *allowance = allowance.saturating_sub(each * (self.search.expanded() - before));
+        Some(match answer? {
             Ok(route) => Ok(Plan {
                 path: rooms.path(&route.cells, request.goal, planar),
                 cost: route.cost * rooms.resolution_m(),

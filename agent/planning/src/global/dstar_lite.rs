@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::{Route, Unsolved};
-use crate::grid::{Lattice, MOVES, Pages, moved, octile};
+use crate::grid::{Bricks, Lattice, MOVES, Packed, moved, octile};
 use crate::map::VoxelIndex;
 
 /// A search from the goal to a vehicle that moves, over a [`Lattice`] that changes.
@@ -39,7 +39,7 @@ use crate::map::VoxelIndex;
 /// ```
 #[derive(Clone, Debug)]
 pub struct DStarLite {
-    nodes: Pages<Node>,
+    nodes: Bricks<Node>,
     open: BinaryHeap<Open>,
     /// Entries that the open list may have before outdated ones are looked for.
     most_open: usize,
@@ -74,23 +74,25 @@ impl Node {
     }
 }
 
-/// An entry of the open list: least key first, then lowest index.
+/// An entry of the open list: least key first, then lowest cell.
 #[derive(Clone, Copy, Debug)]
 struct Open {
     key: f64,
     /// The key's second part, `min(g, rhs)`: if that has changed, the entry is outdated.
     least: f64,
-    index: usize,
+    cell: Packed,
 }
 
 impl Ord for Open {
+    #[inline]
     fn cmp(&self, other: &Self) -> Ordering {
-        let by_key = other.key.total_cmp(&self.key).then(other.least.total_cmp(&self.least));
-        by_key.then(other.index.cmp(&self.index))
+        let by_key = other.key.total_cmp(&self.key);
+        by_key.then_with(|| other.least.total_cmp(&self.least)).then_with(|| other.cell.cmp(&self.cell))
     }
 }
 
 impl PartialOrd for Open {
+    #[inline]
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
@@ -114,7 +116,7 @@ impl DStarLite {
     #[must_use]
     pub fn new(lattice: &impl Lattice, start: VoxelIndex, goal: VoxelIndex) -> DStarLite {
         let mut search = DStarLite {
-            nodes: Pages::default(),
+            nodes: Bricks::default(),
             open: BinaryHeap::new(),
             most_open: OPEN_AT_LEAST,
             size: lattice.size(),
@@ -124,10 +126,9 @@ impl DStarLite {
             keyed_for: start,
             km: 0.0,
         };
-        search.nodes.reserve(search.size.iter().product());
-        let index = search.index(goal);
-        search.nodes.slot(index).rhs = 0.0;
-        search.push(index);
+        search.nodes.fit(search.size);
+        search.nodes.slot(goal).rhs = 0.0;
+        search.push(goal);
         search
     }
 
@@ -152,12 +153,11 @@ impl DStarLite {
         };
         let [nx, ny, nz] = self.size;
         let inside = |cell: &VoxelIndex| cell.x < nx && cell.y < ny && cell.z < nz;
-        let mut touched: Vec<usize> =
-            changed.iter().flat_map(around).filter(inside).map(|cell| self.index(cell)).collect();
+        let mut touched: Vec<VoxelIndex> = changed.iter().flat_map(around).filter(inside).collect();
         touched.sort_unstable();
         touched.dedup();
-        for index in touched {
-            self.renew(lattice, index);
+        for cell in touched {
+            self.renew(lattice, cell);
         }
     }
 
@@ -187,38 +187,37 @@ impl DStarLite {
 
     /// The first entry of the open list, if it may matter to the way from the start.
     fn next(&self) -> Option<Open> {
-        let reached = self.nodes.get(self.index(self.start)).least() + self.km;
+        let reached = self.nodes.get(self.start).least() + self.km;
         self.open.peek().copied().filter(|next| next.key <= reached + ROUNDING * (1.0 + reached))
     }
 
     /// Takes an entry of the open list; whether its cell was expanded.
     fn settle(&mut self, lattice: &impl Lattice, next: Open) -> bool {
-        let node = self.nodes.get(next.index);
+        let cell = next.cell.unpacked();
+        let node = self.nodes.get(cell);
         if node.is_consistent() || node.least() != next.least {
             return false;
         }
-        let key = self.key(next.index);
+        let key = self.key(cell);
         if next.key + ROUNDING * (1.0 + key) < key {
             self.open.push(Open { key, ..next });
             return false;
         }
         if node.g > node.rhs {
-            self.lower(lattice, next.index, node.rhs);
+            self.lower(lattice, cell, node.rhs);
         } else {
-            self.raise(lattice, next.index, node.g);
+            self.raise(lattice, cell, node.g);
         }
         true
     }
 
     /// The way from a cell has become cheaper: so may be those through it.
-    fn lower(&mut self, lattice: &impl Lattice, index: usize, g: f64) {
-        self.nodes.slot(index).g = g;
-        let here = self.cell(index);
+    fn lower(&mut self, lattice: &impl Lattice, here: VoxelIndex, g: f64) {
+        self.nodes.slot(here).g = g;
         lattice.steps_into(here, |number, cost| {
-            let before = self.before(here, number);
-            let is_goal = before == self.index(self.goal);
+            let before = before(here, number);
             let node = self.nodes.slot(before);
-            if cost + g < node.rhs && !is_goal {
+            if cost + g < node.rhs && before != self.goal {
                 node.rhs = cost + g;
                 self.push(before);
             }
@@ -226,12 +225,11 @@ impl DStarLite {
     }
 
     /// The way from a cell has become dearer: those that led through it must be found again.
-    fn raise(&mut self, lattice: &impl Lattice, index: usize, g: f64) {
-        self.nodes.slot(index).g = f64::INFINITY;
-        self.push(index);
-        let here = self.cell(index);
+    fn raise(&mut self, lattice: &impl Lattice, here: VoxelIndex, g: f64) {
+        self.nodes.slot(here).g = f64::INFINITY;
+        self.push(here);
         lattice.steps_into(here, |number, cost| {
-            let before = self.before(here, number);
+            let before = before(here, number);
             if self.nodes.get(before).rhs == cost + g {
                 self.renew(lattice, before);
             }
@@ -239,38 +237,32 @@ impl DStarLite {
     }
 
     /// Works `rhs` out anew from the neighbours.
-    fn renew(&mut self, lattice: &impl Lattice, index: usize) {
-        if index == self.index(self.goal) {
+    fn renew(&mut self, lattice: &impl Lattice, cell: VoxelIndex) {
+        if cell == self.goal {
             return;
         }
-        let cell = self.cell(index);
         let mut rhs = f64::INFINITY;
         lattice.steps_from(cell, |number, cost| {
-            let there = self.index(moved(cell, MOVES[number].by));
+            let there = moved(cell, MOVES[number].by);
             rhs = rhs.min(cost + self.nodes.get(there).g);
         });
-        let node = self.nodes.slot(index);
+        let node = self.nodes.slot(cell);
         if node.rhs != rhs {
             node.rhs = rhs;
-            self.push(index);
+            self.push(cell);
         }
     }
 
     /// Puts a cell on the open list, if it belongs there.
-    fn push(&mut self, index: usize) {
-        let node = self.nodes.get(index);
+    fn push(&mut self, cell: VoxelIndex) {
+        let node = self.nodes.get(cell);
         if !node.is_consistent() {
-            self.open.push(Open { key: self.key(index), least: node.least(), index });
+            self.open.push(Open { key: self.key(cell), least: node.least(), cell: Packed::of(cell) });
         }
     }
 
-    /// The cell that a step leads from into `here`.
-    fn before(&self, here: VoxelIndex, number: usize) -> usize {
-        self.index(moved(here, MOVES[number].by.map(|c| -c)))
-    }
-
-    fn key(&self, index: usize) -> f64 {
-        self.nodes.get(index).least() + octile(self.start, self.cell(index), self.least_costs) + self.km
+    fn key(&self, cell: VoxelIndex) -> f64 {
+        self.nodes.get(cell).least() + octile(self.start, cell, self.least_costs) + self.km
     }
 
     /// Forgets outdated entries of the open list once they may be many.
@@ -278,10 +270,10 @@ impl DStarLite {
         if self.open.len() <= self.most_open {
             return;
         }
-        let mut indices: Vec<usize> = self.open.drain().map(|entry| entry.index).collect();
-        indices.sort_unstable();
-        indices.dedup();
-        indices.into_iter().for_each(|index| self.push(index));
+        let mut cells: Vec<Packed> = self.open.drain().map(|entry| entry.cell).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        cells.into_iter().for_each(|cell| self.push(cell.unpacked()));
         self.most_open = OPEN_AT_LEAST.max(2 * self.open.len());
     }
 
@@ -294,7 +286,7 @@ impl DStarLite {
             let mut best: Option<(f64, f64, VoxelIndex)> = None;
             lattice.steps_from(here, |number, step_cost| {
                 let there = moved(here, MOVES[number].by);
-                let g = self.nodes.get(self.index(there)).g;
+                let g = self.nodes.get(there).g;
                 if best.is_none_or(|(least, ..)| step_cost + g < least) {
                     best = Some((step_cost + g, step_cost, there));
                 }
@@ -308,13 +300,9 @@ impl DStarLite {
         }
         Some(Route { cells, cost, bound: 1.0, expanded })
     }
+}
 
-    fn index(&self, cell: VoxelIndex) -> usize {
-        (cell.z * self.size[1] + cell.y) * self.size[0] + cell.x
-    }
-
-    fn cell(&self, index: usize) -> VoxelIndex {
-        let [nx, ny, _] = self.size;
-        VoxelIndex { x: index % nx, y: index / nx % ny, z: index / (nx * ny) }
-    }
+/// The cell that a step leads from into `here`.
+fn before(here: VoxelIndex, number: usize) -> VoxelIndex {
+    moved(here, MOVES[number].by.map(|c| -c))
 }

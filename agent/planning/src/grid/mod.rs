@@ -3,15 +3,15 @@
 //! The searches in [`crate::global`] know a grid by its [`Lattice`] alone. [`Grid`] is the plain one, of benchmarks and
 //! experiments; the vehicle's own map is another.
 
+mod bricks;
 mod lattice;
 mod moves;
 pub mod movingai;
 mod occupancy;
-mod pages;
 
 pub use lattice::{Grid, Lattice, StepCosts};
 pub use moves::{MOVES, Move, octile};
 pub use occupancy::{OccupancyGrid, SizeError};
 
-pub(crate) use moves::{CENTRE, SQRT_3, moved};
-pub(crate) use pages::Pages;
+pub(crate) use bricks::Bricks;
+pub(crate) use moves::{CENTRE, Packed, SQRT_3, moved};

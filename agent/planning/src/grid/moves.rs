@@ -73,6 +73,26 @@ pub(crate) fn moved(cell: VoxelIndex, by: [i8; 3]) -> VoxelIndex {
     }
 }
 
+/// Bits of a coordinate in a [`Packed`] cell: more than a grid can have along an axis.
+pub(crate) const PACKED_BITS: u32 = 21;
+
+/// A cell in one word, ordered by z, then y, then x.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Packed(u64);
+
+impl Packed {
+    #[inline]
+    pub fn of(VoxelIndex { x, y, z }: VoxelIndex) -> Packed {
+        Packed(((z as u64) << PACKED_BITS | y as u64) << PACKED_BITS | x as u64)
+    }
+
+    #[inline]
+    pub fn unpacked(self) -> VoxelIndex {
+        let at = |axis: u32| (self.0 >> (axis * PACKED_BITS) & ((1 << PACKED_BITS) - 1)) as usize;
+        VoxelIndex { x: at(0), y: at(1), z: at(2) }
+    }
+}
+
 /// Cost of the shortest way between two cells on an empty grid whose steps through a face, across an edge and across a
 /// corner cost `[1, sqrt 2, sqrt 3]` times the unit, or anything else for which the longer diagonals pay.
 #[must_use]

@@ -148,7 +148,7 @@ fn sized(lines: &Lines<'_>, size: [usize; 3]) -> Result<OccupancyGrid, FormatErr
     OccupancyGrid::new(size).map_err(|_| {
         lines.error(
             format!("a map of {x} x {y} x {z} cells"),
-            "at least 1 along each axis and at most 256 MB of bits",
+            "1 to 2,000,000 along each axis, and no more in all than 256 MB hold at a bit for each",
         )
     })
 }

@@ -4,13 +4,15 @@ use crate::map::VoxelIndex;
 
 /// A grid that takes more than this, in bytes, is refused: some two thousand million cells.
 const MOST_BYTES: usize = 256 << 20;
+/// Searches keep a cell in one word.
+const MOST_ALONG_AN_AXIS: usize = 2_000_000;
 /// The neighbourhood's lowest and highest cells along x, y and z, as bits.
 const FACES: [[u32; 2]; 3] =
     [[0o111_111_111, 0o444_444_444], [0o007_007_007, 0o700_700_700], [0o000_000_777, 0o777_000_000]];
 
 /// The size of a grid cannot be.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("a grid of {} x {} x {} cells, expected at least 1 along each axis and no more than 256 MB hold at a bit for each", .size[0], .size[1], .size[2])]
+#[error("a grid of {} x {} x {} cells, expected 1 to 2,000,000 along each axis and no more in all than 256 MB hold at a bit for each", .size[0], .size[1], .size[2])]
 pub struct SizeError {
     /// What was asked for: cells along x, y and z.
     pub size: [usize; 3],
@@ -36,12 +38,12 @@ impl OccupancyGrid {
     /// No cells, or too many.
     pub fn new(size: [usize; 3]) -> Result<OccupancyGrid, SizeError> {
         let [nx, _, nz] = size;
-        let is_empty = size.contains(&0);
+        let is_possible = size.iter().all(|side| (1..=MOST_ALONG_AN_AXIS).contains(side));
         let [wide, layer, high] = size.map(|side| side.saturating_add(2));
         // A byte more, because three bits may lie across two bytes.
         let row = wide.div_ceil(8) + 1;
         let bytes = row.saturating_mul(layer).saturating_mul(high);
-        if is_empty || bytes > MOST_BYTES {
+        if !is_possible || bytes > MOST_BYTES {
             return Err(SizeError { size });
         }
         let mut grid = OccupancyGrid { size, row, layer, bits: vec![0; bytes] };
@@ -94,7 +96,7 @@ impl OccupancyGrid {
     /// Which of the 27 cells around a cell of the grid, itself included, are blocked: a bit for each, lowest first, x
     /// fastest, z slowest.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn blocked_around(&self, cell: VoxelIndex) -> u32 {
         let slab = self.row * self.layer;
         // Cell (x, y, z) is bit x + 1 of row y + 1 of layer z + 1, so its lowest neighbour is bit x of row y of layer z.
@@ -175,7 +177,13 @@ mod tests {
 
     #[test]
     fn sizes_without_end_are_refused() {
-        for size in [[0, 1, 1], [usize::MAX, 2, 2], [1, 1, 50_000_000], [100_000, 100_000, 100_000]] {
+        for size in [
+            [0, 1, 1],
+            [usize::MAX, 2, 2],
+            [1, 1, 5_000_000],
+            [2_000_000, 2_000_000, 1],
+            [100_000, 100_000, 100_000],
+        ] {
             assert_eq!(OccupancyGrid::new(size), Err(SizeError { size }));
         }
     }
