@@ -22,7 +22,7 @@ use crate::{
     me::Me,
     neighbours::{Neighbour, Neighbours},
     pipeline::{
-        guidance::{Guidance, Motion, Surroundings},
+        guidance::{Guidance, Motion, Report, Surroundings},
         perception::{Perception, Pose, Scan},
         set_point::{FRESH_FOR, KeepAlive, SILENT_AFTER, keep_alive, oldest_age},
     },
@@ -282,6 +282,8 @@ impl AgentCore {
         let neighbours: Vec<Neighbour> = self.neighbours.at(now).collect();
         self.follow_autopilot(now);
         self.watch(now, &neighbours);
+        let report = self.guidance.go_on_planning(self.perception.map_mut());
+        self.hear_of_path(report);
         if now >= self.next_cycle {
             self.next_cycle = now + CYCLE_PERIOD;
             self.begin_cycle(now, &neighbours, link);
@@ -370,6 +372,14 @@ impl AgentCore {
         })
     }
 
+    /// Tells the program what came of a plan, if something did.
+    fn hear_of_path(&mut self, report: Option<Report>) {
+        if let Some(report) = report {
+            self.node.node_mut().enqueue(report.into_event(&self.me));
+            self.script_facts.forget_path();
+        }
+    }
+
     /// A navigation cycle: looks along the path, and tells the others where this vehicle is.
     fn begin_cycle(&mut self, now: Duration, neighbours: &[Neighbour], link: &mut dyn Link) {
         if let (FlightPhase::Flying, Some(motion)) = (self.flight.phase(), self.motion()) {
@@ -435,8 +445,7 @@ impl AgentCore {
             Some(PLAN) => {
                 if let Some(motion) = self.motion() {
                     let report = self.guidance.plan(why, &motion, self.perception.map_mut(), neighbours);
-                    self.node.node_mut().enqueue(report.into_event(&self.me));
-                    self.script_facts.forget_path();
+                    self.hear_of_path(report);
                 }
             }
             Some(ADVANCE | HOMEWARD) => self.guidance.grant_leave(now),
@@ -648,6 +657,12 @@ impl AgentCore {
     #[must_use]
     pub fn node(&self) -> &NodeLink {
         &self.node
+    }
+
+    /// Whether a path is being searched for that the last tick was not enough for.
+    #[must_use]
+    pub fn is_planning(&self) -> bool {
+        self.guidance.is_planning()
     }
 
     /// The vehicle's node name.

@@ -115,7 +115,7 @@ impl Swarm {
             let began = Instant::now();
             vehicle.agent.tick(now, vehicle.link.as_mut());
             let mut heard = vehicle.agent.take_selections();
-            self.plan_times.take_in(began, &heard);
+            self.plan_times.take_in(index, began, &heard, vehicle.agent.is_planning());
             self.simulation.send(index, &vehicle.agent.take_mavlink());
             keep_own(&mut heard, vehicle.agent.name());
             selections.append(&mut heard);
