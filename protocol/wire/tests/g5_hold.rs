@@ -8,9 +8,9 @@ mod swarm;
 use std::time::Duration;
 
 use skein_bp::{Bid, Event};
-use skein_dbp::NodeConfig;
+use skein_dbp::{NodeConfig, Roster};
 use skein_wire::NetworkConfig;
-use swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, program};
+use swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, name, program};
 
 const ROSTER: [&str; 3] = ["uav/1", "ground/main", "ground/spare"];
 
@@ -108,6 +108,26 @@ fn a_new_life_that_does_not_state_it_does_not_end_it_but_an_authority_does() {
     let restarted = swarm.now;
     swarm.run(2 * LEASE);
     assert!(steps_since(&swarm, restarted) > 0, "what was lifted is not kept");
+}
+
+#[test]
+fn a_new_life_withdraws_it_also_from_a_home_that_has_become_the_coordinator_meanwhile() {
+    let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
+    let mut home = program(1);
+    home.add("steps", Requester::new("uav/1/step", i64::MAX, TICK));
+    let joint = Some(Roster::first(name("ground/spare"), [name("uav/1")]));
+    let config = NodeConfig { durable: true, joint, ..swarm.config("uav/1", 1) };
+    swarm.start_with(config, home);
+    start_holder(&mut swarm, 1, Bid::new().hold_when_lost(), NEVER);
+    swarm.run(2 * LEASE);
+    swarm.crash("ground/main");
+    let lead = Roster { term: 2, ..Roster::first(name("uav/1"), []) };
+    swarm.node("uav/1").enqueue(lead.order(&name("uav/1")));
+    swarm.run(LEASE);
+    let until = swarm.now + 2 * LEASE;
+    start_holder(&mut swarm, 2, Bid::new().hold_when_lost(), until);
+    swarm.run(4 * LEASE);
+    assert!(steps_since(&swarm, until) > 0, "it was withdrawn in vain");
 }
 
 #[test]

@@ -78,6 +78,8 @@ pub(crate) struct Keeping {
 pub(crate) struct Life {
     /// When it began, true time.
     pub(crate) began: Duration,
+    /// When it made its first step, true time: later, if the process was started and then stood still.
+    pub(crate) ran: Option<Duration>,
     /// What its clock showed at its first step.
     pub(crate) began_clock: Option<Duration>,
     pub(crate) over: bool,
@@ -133,7 +135,13 @@ impl Knowledge {
     /// A node begins a life.
     pub(crate) fn starts(&mut self, node: usize, at: Duration) {
         let member = &mut self.members[node];
-        member.lives.push(Life { began: at, began_clock: None, over: false, occurred: Vec::new() });
+        member.lives.push(Life {
+            began: at,
+            ran: None,
+            began_clock: None,
+            over: false,
+            occurred: Vec::new(),
+        });
         member.up = true;
         member.bids.clear();
         member.revision = None;
@@ -166,6 +174,7 @@ impl Knowledge {
             }
         }
         if let Some(life) = member.lives.last_mut() {
+            life.ran.get_or_insert(step.at);
             life.began_clock.get_or_insert(step.clock);
         }
     }

@@ -89,7 +89,7 @@ pub fn guarded_resource(count: usize) -> Result<Network, NetworkError> {
     let members = (1..=count).map(|number| {
         let (name, mut program) = vehicle(number)?;
         let others = EventSet::from("uav/*/enter").and(EventSet::named(name.event_name("enter")).not());
-        // It stays where it is while the block is to hold, since every synchronisation point is a new block.
+        // It stays where it is until the block lapses.
         let claim = Bid::new().block(others).wait_for(facts::block_lapsed(&name, "claim"));
         program.add("claim", Script::new(&[Op::forever([Op::Sync(claim)])])?);
         program.add("entrance", Entrance { node: name.clone(), place: Place::Outside, careful: true });
