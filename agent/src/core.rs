@@ -439,7 +439,9 @@ impl AgentCore {
             }
             Some(ADVANCE | HOMEWARD) => self.guidance.grant_leave(now),
             Some(LAND) => self.task = format!("landing: {why}"),
-            Some(RETURN) => self.task = format!("returning: {why}"),
+            Some(RETURN) if self.flight.phase() != FlightPhase::Landing => {
+                self.task = format!("returning: {why}");
+            }
             Some(HOLD) => self.task = "holding".to_owned(),
             Some(LANDED) => self.guidance.forget(),
             Some(vocabulary::TAKEOFF) => self.task = "taking off".to_owned(),
@@ -657,7 +659,9 @@ fn heights(config: &AgentConfig) -> [f64; 2] {
     [lowest_m.max(home_m + LEAST_HEIGHT_M), heights().fold(0.0, f64::max) + ABOVE_WAYPOINTS_M]
 }
 
-/// What no remote b-thread can block, and only the operator's gateway can request.
-fn safety_events(me: &Me) -> EventSet {
-    me.any_of(&vocabulary::OWN)
+/// What no remote b-thread can block, and only the operator's gateway can request; the waypoint at home is part of it, for
+/// without it `return` would lead nowhere.
+pub(crate) fn safety_events(me: &Me) -> EventSet {
+    let home = me.any(GOTO).and(EventSet::field_is("leg", bthreads::HOME_LEG));
+    me.any_of(&vocabulary::OWN).or(home)
 }

@@ -18,13 +18,15 @@ use skein_bp::script::Script;
 use skein_bp::verify::{Coverage, Inspection, Progress, Report, Timers, Verifier, View};
 use skein_bp::{BThread, Bid, Event, EventSet, Program, ProgramConfig};
 use skein_dbp::facts;
-use skein_wire::vocabulary::{self, AHEAD, AT, BATTERY, HOLD, HOMEWARD, LAND, NEIGHBOUR, OWN, PLAN, RETURN};
+use skein_wire::vocabulary::{
+    self, AHEAD, AT, BATTERY, GOTO, HOLD, HOMEWARD, LAND, NEIGHBOUR, OWN, PLAN, RETURN,
+};
 
 pub use self::part::{Part, Place};
 pub use self::requirement::{Requirement, requirements};
 pub use self::scene::Scene;
 use self::scene::{WORLD, World};
-use crate::bthreads::{self, RIGHT_OF_WAY};
+use crate::bthreads::{self, HOME_LEG, RIGHT_OF_WAY};
 use crate::scripts::{Runner, Scripts};
 use crate::{AgentConfig, AgentError, me::Me};
 
@@ -38,12 +40,14 @@ const FLIGHT: &str = "world/flight";
 /// See [`MAY_BLOCK`].
 const SAFETY_RULE: &str = "nobody blocks a safety event but who goes before it";
 
-/// Which b-threads may block an event that is for the vehicle's safety; nobody may block those that are not named.
-const MAY_BLOCK: [(&str, &[&str]); 5] = [
+/// Which b-threads may block an event that is for the vehicle's safety; nobody may block those that are not named. `goto` is
+/// that to home.
+const MAY_BLOCK: [(&str, &[&str]); 6] = [
     (HOLD, &["pilot"]),
     (LAND, &["pilot"]),
     // An empty battery does not carry it home.
     (RETURN, &["pilot", "battery"]),
+    (GOTO, &["pilot", "battery", "found_airborne"]),
     (PLAN, &["pilot"]),
     (HOMEWARD, &["pilot", "separation", "obstacle_avoidance", RIGHT_OF_WAY, "found_airborne"]),
 ];
@@ -182,13 +186,17 @@ impl VehicleVerifier {
                 outside.push(name);
             }
         }
-        let me = self.me.clone();
+        let (me, [x, y, _]) = (self.me.clone(), self.config.home);
+        let home = self.me.event(GOTO).with("leg", HOME_LEG).with("lands", true);
+        let home = home.with("x", x).with("y", y).with("z", self.config.return_altitude_m);
         let mut verifier = Verifier::new(program)
             .inspect(Inspection::USUAL.into_iter().chain([Inspection::Unsettled]))
             .timers(Timers::AtRest)
             .most_states(self.most_states)
             .world(outside)
-            .every_bid(SAFETY_RULE, move |bthread, bid| blocks_safety(&me, bthread, bid))
+            .every_bid(SAFETY_RULE, move |bthread, bid| {
+                blocks_safety(&me, &home, bthread, bid)
+            })
             .always_within_reach("the ground", is_down);
         for (name, event) in self.held_by_scripts() {
             let goal = goal_of_script(&name, &event);
@@ -287,13 +295,16 @@ fn is_blocked_by(view: &View<'_>, bthread: &str, event: &Event) -> bool {
 }
 
 /// Whether a b-thread of the vehicle blocks what it must not.
-fn blocks_safety(me: &Me, bthread: &str, bid: &Bid) -> Result<(), String> {
+fn blocks_safety(me: &Me, home: &Event, bthread: &str, bid: &Bid) -> Result<(), String> {
     if bthread.starts_with(WORLD) || bid.blocks().is_none() {
         return Ok(());
     }
     let may = |verb: &str| {
         MAY_BLOCK.iter().any(|(named, bthreads)| *named == verb && bthreads.contains(&bthread))
     };
+    if bid.blocks().contains(home) && !may(GOTO) {
+        return Err(format!("`{bthread}` blocks the way home, {home}"));
+    }
     let blocked = |set: &EventSet, verb: &str| set.may_hold_named(me.event(verb).name());
     match OWN.into_iter().find(|verb| blocked(bid.blocks(), verb) && !may(verb)) {
         Some(verb) => Err(format!("`{bthread}` blocks `{}`", me.event(verb))),

@@ -4,7 +4,7 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, DUPLICATE_NAME, PEER_JOINED, PEER_LOST, STALLED};
 use skein_wire::vocabulary::{
-    ADVANCE, BATTERY_CRITICAL, BATTERY_LOW, CLEAR, COMPLETE, ENTER, FAILED, FENCE_BREACHED, FOUND_AIRBORNE,
+    ADVANCE, AIRBORNE, BATTERY_CRITICAL, BATTERY_LOW, CLEAR, COMMAND_FAILED, COMPLETE, ENTER, FAILED, FENCE_BREACHED, FOUND_AIRBORNE,
     GOTO, HAND_BACK, HOLD, HOMEWARD, LAND, LANDED, LEAVE, ORDER, PASSAGE, PATH_BLOCKED, PILOT, PLAN, PLANNED,
     READY, RETURN, SLEPT, STUCK, TAKEOFF, TOO_CLOSE, UNREADY,
 };
@@ -18,55 +18,68 @@ use crate::me::Me;
 pub struct Requirement {
     name: String,
     rule: Rule,
-    phase: Phase,
 }
 
 /// The forms of requirements, as in the patterns of Dwyer, Avrunin and Corbett 1999.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 enum Rule {
     /// Absence between: from an event of `from` to the next of `until`, none of `never` happens.
-    Absence { never: EventSet, from: EventSet, until: EventSet },
-    /// Response: after an event of `from` one of `answer` happens, unless the pilot has the vehicle, and for as long. It is
-    /// asked for anew after an event of `anew`.
-    Response { from: EventSet, answer: EventSet, anew: EventSet, taken: EventSet, given_back: EventSet },
+    Absence { never: EventSet, from: EventSet, until: EventSet, is_on: bool },
+    /// Response: after an event of `from` one of `answer` happens.
+    Response { from: EventSet, answer: EventSet, flight: Option<Flight>, pilot: Pilot, is_due: bool, is_answered: bool },
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
-enum Phase {
-    /// Nothing is asked.
-    Idle,
-    /// Absence is asked, or an answer is due.
-    Due,
-    /// An answer has been given.
-    Answered,
-    /// The pilot has the vehicle; what was the case before.
-    Taken { due: bool, answered: bool },
+/// A response that is asked for in the air only, and once in a flight: an answer that came before counts.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+struct Flight {
+    begins: EventSet,
+    ends: EventSet,
+    is_on: bool,
+}
+
+/// As long as a pilot has the vehicle, answers may wait.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+struct Pilot {
+    takes: EventSet,
+    gives_back: EventSet,
+    has_it: bool,
 }
 
 impl Requirement {
     /// None of `never` happens from an event of `from` to the next of `until`.
     #[must_use]
     pub fn absence(name: &str, never: EventSet, from: EventSet, until: EventSet) -> Self {
-        Self { name: name.to_owned(), rule: Rule::Absence { never, from, until }, phase: Phase::Idle }
+        Self { name: name.to_owned(), rule: Rule::Absence { never, from, until, is_on: false } }
     }
 
     /// The same, and it is asked from the start.
     #[must_use]
     pub fn absence_from_start(name: &str, never: EventSet, from: EventSet, until: EventSet) -> Self {
-        Self { phase: Phase::Due, ..Self::absence(name, never, from, until) }
+        Self { name: name.to_owned(), rule: Rule::Absence { never, from, until, is_on: true } }
     }
 
-    /// After an event of `from` one of `answer` happens before the vehicle `me` rests for good, unless a pilot has it.
+    /// After each event of `from` one of `answer` happens before the vehicle `me` rests for good, unless a pilot has it.
     #[must_use]
     pub fn response(name: &str, me: &Me, from: EventSet, answer: EventSet) -> Self {
-        let rule = Rule::Response {
-            from,
-            answer,
-            anew: me.any(LANDED),
-            taken: me.any_of(&[PILOT, SLEPT]),
-            given_back: me.any(HAND_BACK),
+        Self::answered(name, me, from, answer, None)
+    }
+
+    /// The same in the air, once in a flight: an answer that came before counts.
+    #[must_use]
+    pub fn response_in_flight(name: &str, me: &Me, from: EventSet, answer: EventSet) -> Self {
+        let flight = Flight {
+            begins: me.any_of(&[TAKEOFF, FOUND_AIRBORNE]),
+            ends: me.any_of(&[LANDED, COMMAND_FAILED]),
+            is_on: false,
         };
-        Self { name: name.to_owned(), rule, phase: Phase::Idle }
+        Self::answered(name, me, from, answer, Some(flight))
+    }
+
+    fn answered(name: &str, me: &Me, from: EventSet, answer: EventSet, flight: Option<Flight>) -> Self {
+        let pilot =
+            Pilot { takes: me.any_of(&[PILOT, SLEPT]), gives_back: me.any(HAND_BACK), has_it: false };
+        let rule = Rule::Response { from, answer, flight, pilot, is_due: false, is_answered: false };
+        Self { name: name.to_owned(), rule }
     }
 
     /// What must hold, in a few words.
@@ -74,67 +87,60 @@ impl Requirement {
     pub fn name(&self) -> &str {
         &self.name
     }
+}
 
-    /// The events that make it ask for something.
-    #[must_use]
-    pub fn begins_with(&self) -> &EventSet {
-        match &self.rule {
-            Rule::Absence { from, .. } | Rule::Response { from, .. } => from,
+impl Rule {
+    /// Takes in what happens; true if it must not.
+    fn is_broken_by(&mut self, event: &Event) -> bool {
+        match self {
+            Self::Absence { never, from, until, is_on } => {
+                let is_broken = *is_on && never.contains(event);
+                *is_on = (*is_on || from.contains(event)) && !until.contains(event);
+                is_broken
+            }
+            Self::Response { from, answer, flight, pilot, is_due, is_answered } => {
+                pilot.has_it = (pilot.has_it || pilot.takes.contains(event)) && !pilot.gives_back.contains(event);
+                if let Some(flight) = flight {
+                    let (begins, ends) = (flight.begins.contains(event), flight.ends.contains(event));
+                    flight.is_on = (flight.is_on || begins) && !ends;
+                    if begins || ends {
+                        (*is_due, *is_answered) = (false, false);
+                    }
+                }
+                let (is_asked, once) = flight.as_ref().map_or((true, false), |flight| (flight.is_on, true));
+                if answer.contains(event) {
+                    (*is_due, *is_answered) = (false, is_asked && once);
+                } else if from.contains(event) && is_asked && !*is_answered {
+                    *is_due = true;
+                }
+                false
+            }
         }
-    }
-
-    /// Whether it asks for something from the start.
-    #[must_use]
-    pub fn is_due_at_start(&self) -> bool {
-        self.phase == Phase::Due
-    }
-
-    fn bid_of_response(&self) -> Option<Bid> {
-        let Rule::Response { from, answer, anew, taken, given_back } = &self.rule else { return None };
-        let bid = Bid::new().wait_for(anew.clone());
-        Some(match self.phase {
-            Phase::Idle => bid.wait_for(from.clone()).wait_for(taken.clone()),
-            Phase::Due => bid.wait_for(answer.clone()).wait_for(taken.clone()).hot(),
-            Phase::Answered => bid.wait_for(taken.clone()),
-            Phase::Taken { .. } => bid.wait_for(from.clone()).wait_for(given_back.clone()),
-        })
     }
 }
 
 impl BThread for Requirement {
     fn bid(&self) -> Option<Bid> {
-        match &self.rule {
-            Rule::Absence { never, from, until } => Some(match self.phase {
-                Phase::Due => Bid::new().wait_for(never.clone()).wait_for(until.clone()),
-                _ => Bid::new().wait_for(from.clone()),
-            }),
-            Rule::Response { .. } => self.bid_of_response(),
-        }
+        Some(match &self.rule {
+            Rule::Absence { never, from, until, is_on } => {
+                let bid = Bid::new().wait_for(from.clone());
+                if *is_on { bid.wait_for(never.clone()).wait_for(until.clone()) } else { bid }
+            }
+            Rule::Response { from, answer, flight, pilot, is_due, .. } => {
+                let bid = Bid::new().wait_for(from.clone()).wait_for(answer.clone());
+                let bid = bid.wait_for(pilot.takes.clone()).wait_for(pilot.gives_back.clone());
+                let bid = flight.iter().fold(bid, |bid, flight| {
+                    bid.wait_for(flight.begins.clone()).wait_for(flight.ends.clone())
+                });
+                if *is_due && !pilot.has_it { bid.hot() } else { bid }
+            }
+        })
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        self.phase = match (&self.rule, self.phase) {
-            (Rule::Absence { never, .. }, Phase::Due) if never.contains(event) => {
-                return cx.fail(format!("{}: {event} happens", self.name));
-            }
-            (Rule::Absence { .. }, Phase::Due) => Phase::Idle,
-            (Rule::Absence { .. }, _) => Phase::Due,
-            (Rule::Response { anew, .. }, _) if anew.contains(event) => Phase::Idle,
-            (Rule::Response { taken, .. }, phase) if taken.contains(event) => {
-                Phase::Taken { due: phase == Phase::Due, answered: phase == Phase::Answered }
-            }
-            (Rule::Response { given_back, .. }, Phase::Taken { due, answered }) => {
-                match (given_back.contains(event), due, answered) {
-                    (true, true, _) => Phase::Due,
-                    (true, false, true) => Phase::Answered,
-                    (true, false, false) => Phase::Idle,
-                    (false, _, answered) => Phase::Taken { due: !answered, answered },
-                }
-            }
-            (Rule::Response { .. }, Phase::Idle) => Phase::Due,
-            (Rule::Response { .. }, Phase::Due) => Phase::Answered,
-            (Rule::Response { .. }, phase) => phase,
-        };
+        if self.rule.is_broken_by(event) {
+            cx.fail(format!("{event} happens"));
+        }
     }
 }
 
@@ -190,6 +196,12 @@ pub fn requirements(me: &Me, fence: &Fence) -> Vec<Requirement> {
             me.any(READY),
         ),
         Requirement::absence(
+            "no take-off in the air",
+            me.any(TAKEOFF),
+            me.any_of(&[TAKEOFF, AIRBORNE, FOUND_AIRBORNE]),
+            me.any_of(&[LANDED, COMMAND_FAILED]),
+        ),
+        Requirement::absence(
             "no take-off after the mission's end",
             me.any(TAKEOFF),
             me.any_of(&[COMPLETE, FAILED]),
@@ -237,20 +249,38 @@ pub fn requirements(me: &Me, fence: &Fence) -> Vec<Requirement> {
             me.any(BATTERY_LOW),
             home_or_down.clone(),
         ),
-        Requirement::absence("on the way home or down, nothing leads elsewhere", away, me.any_of(&[RETURN, LAND]), me.any(LANDED)),
-        Requirement::response(
+        Requirement::absence(
+            "on the way home or down, nothing leads elsewhere",
+            away,
+            me.any_of(&[RETURN, LAND]),
+            // What was ordered on the ground has no meaning in the air.
+            me.any_of(&[LANDED, TAKEOFF, FOUND_AIRBORNE]),
+        ),
+        Requirement::absence(
+            "on the way down, nothing leads up again",
+            me.any(GOTO),
+            me.any(LAND),
+            me.any_of(&[LANDED, TAKEOFF, FOUND_AIRBORNE, HAND_BACK]),
+        ),
+        Requirement::response_in_flight(
+            "whoever returns heads for home or lands",
+            me,
+            me.any(RETURN),
+            me.any(GOTO).and(leg(HOME_LEG)).or(me.any_of(&[LAND, LANDED])),
+        ),
+        Requirement::response_in_flight(
             "an empty battery lands the vehicle",
             me,
             me.any(BATTERY_CRITICAL),
             down.clone(),
         ),
-        Requirement::response(
+        Requirement::response_in_flight(
             "a low battery sends it home",
             me,
             me.any(BATTERY_LOW),
             home_or_down.clone(),
         ),
-        Requirement::response(
+        Requirement::response_in_flight(
             "outside the fence it turns home",
             me,
             me.any(FENCE_BREACHED),
@@ -288,8 +318,7 @@ mod tests {
         let mut cx = Context::at(Duration::ZERO);
         for event in events {
             let event = Event::new(*event);
-            let bid = requirement.bid().unwrap();
-            if bid.waits().contains(&event) {
+            if requirement.bid().unwrap().waits().contains(&event) {
                 requirement.resume(&event, &mut cx);
             }
         }
@@ -322,7 +351,22 @@ mod tests {
             (&["from", "uav/1/pilot", "uav/1/hand_back"], true),
             (&["uav/1/pilot", "from", "uav/1/hand_back"], true),
             (&["from", "answer", "uav/1/pilot", "uav/1/hand_back"], false),
-            (&["from", "uav/1/landed"], false),
+            (&["answer", "from"], true),
+        ] {
+            assert_eq!(after(rule.clone(), events).0.unwrap().is_hot(), due, "{events:?}");
+        }
+    }
+
+    #[test]
+    fn a_response_in_flight_is_due_once_and_in_the_air_only() {
+        let me = Me::new("uav/1");
+        let rule = Requirement::response_in_flight("test", &me, "from".into(), "answer".into());
+        for (events, due) in [
+            (&["from"][..], false),
+            (&["uav/1/takeoff", "from"], true),
+            (&["uav/1/takeoff", "from", "uav/1/landed"], false),
+            (&["uav/1/takeoff", "answer", "from"], false),
+            (&["uav/1/takeoff", "answer", "uav/1/landed", "uav/1/takeoff", "from"], true),
         ] {
             assert_eq!(after(rule.clone(), events).0.unwrap().is_hot(), due, "{events:?}");
         }

@@ -16,7 +16,7 @@ use skein_wire::vocabulary::{
 
 use super::part::{Part, Place};
 use crate::bthreads::{HOME_LEG, OPERATOR_LEG, RIGHT_OF_WAY};
-use crate::{AgentConfig, me::Me, precedence};
+use crate::{AgentConfig, core::safety_events, me::Me, precedence};
 
 /// The place of the part `flight` in which the vehicle stands on the ground.
 pub(super) const ON_THE_GROUND: &str = "on the ground";
@@ -150,11 +150,14 @@ pub(super) fn passage(me: &Me, other: Option<&str>) -> Part {
     Part::new(vec![Place::new("none").offers(at(me.event(PASSAGE)), "ahead"), ahead])
 }
 
-/// Preflight checks.
+/// Preflight checks. Once the vehicle is up, or another has armed it, they fail in the same tick.
 pub(super) fn checks(me: &Me) -> Part {
+    let up = me.any_of(&[AIRBORNE, PILOT, FOUND_AIRBORNE, SLEPT]);
+    let up_at_once = Place::new("failing, not yet told").rules_out(me.any(TAKEOFF));
     Part::new(vec![
         Place::new("failing").offers(me.event(READY), "passing"),
-        Place::new("passing").offers(me.event(UNREADY), "failing"),
+        Place::new("passing").offers(me.event(UNREADY), "failing").hears(up, "failing, not yet told"),
+        up_at_once.offers(me.event(UNREADY), "failing"),
     ])
 }
 
@@ -221,7 +224,8 @@ pub(super) fn ground_bids(me: &Me) -> [(String, Part); 3] {
         Place::new("silent").hears(set("launch"), "asking"),
         silent(Place::new("asking").offers(me.event(TAKEOFF), "silent")),
     ]);
-    let all = me.any_of(&[TAKEOFF, GOTO, ADVANCE, ENTER]);
+    // What the home honours of it.
+    let all = me.any_of(&[TAKEOFF, GOTO, ADVANCE, ENTER]).and(safety_events(me).not());
     let hold = Part::new(vec![
         Place::new("silent").hears(set("hold"), "holding").hears(set("hold all"), "holding all"),
         silent(Place::new("holding").rules_out(me.any(ADVANCE))),
