@@ -64,11 +64,17 @@ impl Requirement {
         Self::answered(name, me, from, answer, None)
     }
 
-    /// The same in the air, once in a flight: an answer that came before counts.
+    /// The same once in each flight that begins with one of `begins`: an answer that came before counts.
     #[must_use]
-    pub fn response_in_flight(name: &str, me: &Me, from: EventSet, answer: EventSet) -> Self {
+    pub fn response_in_flight(
+        name: &str,
+        me: &Me,
+        begins: &[&str],
+        from: EventSet,
+        answer: EventSet,
+    ) -> Self {
         let flight = Flight {
-            begins: me.any_of(&[TAKEOFF, FOUND_AIRBORNE]),
+            begins: me.any_of(begins),
             ends: me.any_of(&[LANDED, COMMAND_FAILED]),
             is_on: false,
         };
@@ -143,6 +149,9 @@ impl BThread for Requirement {
         }
     }
 }
+
+/// What a flight begins with.
+const IN_THE_AIR: [&str; 2] = [TAKEOFF, FOUND_AIRBORNE];
 
 /// What must hold of every vehicle, whatever its mission.
 #[must_use]
@@ -265,24 +274,29 @@ pub fn requirements(me: &Me, fence: &Fence) -> Vec<Requirement> {
         Requirement::response_in_flight(
             "whoever returns heads for home or lands",
             me,
+            // One that was found in the air waits for an order.
+            &[TAKEOFF],
             me.any(RETURN),
             me.any(GOTO).and(leg(HOME_LEG)).or(me.any_of(&[LAND, LANDED])),
         ),
         Requirement::response_in_flight(
             "an empty battery lands the vehicle",
             me,
+            &IN_THE_AIR,
             me.any(BATTERY_CRITICAL),
             down.clone(),
         ),
         Requirement::response_in_flight(
             "a low battery sends it home",
             me,
+            &IN_THE_AIR,
             me.any(BATTERY_LOW),
             home_or_down.clone(),
         ),
         Requirement::response_in_flight(
             "outside the fence it turns home",
             me,
+            &IN_THE_AIR,
             me.any(FENCE_BREACHED),
             home_or_down.clone(),
         ),
@@ -360,7 +374,7 @@ mod tests {
     #[test]
     fn a_response_in_flight_is_due_once_and_in_the_air_only() {
         let me = Me::new("uav/1");
-        let rule = Requirement::response_in_flight("test", &me, "from".into(), "answer".into());
+        let rule = Requirement::response_in_flight("test", &me, &IN_THE_AIR, "from".into(), "answer".into());
         for (events, due) in [
             (&["from"][..], false),
             (&["uav/1/takeoff", "from"], true),
