@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 use serde_json::{Value, json};
-use skein_agent::verify::{Scene, SceneReport, VehicleVerifier};
+use skein_agent::verify::{Scene, SceneReport, VehicleVerifier, check_script};
 use skein_agent::{AgentConfig, AgentError, Controller, Envelope, Fence, bthreads::LinkLossPolicy};
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_bp::verify::ViolationKind;
@@ -66,7 +66,8 @@ fn the_program_that_flies_holds_in_every_scene() {
     for scene in verifier.scenes() {
         let SceneReport { report, coverage, .. } = holds(&verifier, scene);
         assert!(report.states == MOST || report.is_complete(), "{scene}: {report}");
-        let flies = |verb: &str| coverage.happened.iter().any(|event| event.name() == format!("uav/1/{verb}"));
+        let flies =
+            |verb: &str| coverage.happened.iter().any(|event| event.name() == format!("uav/1/{verb}"));
         assert!(flies("takeoff"), "{scene}: nobody takes off");
     }
 }
@@ -179,7 +180,11 @@ fn a_script_that_waits_for_what_it_keeps_from_happening_is_found() {
 #[test]
 fn the_scripts_that_come_with_the_agent_hold() {
     for (file, text, with) in [
-        ("patrol.toml", include_str!("../scripts/patrol.toml"), json!({"route": [[1.0, 1.0, 2.0], [5.0, 1.0, 2.0]]})),
+        (
+            "patrol.toml",
+            include_str!("../scripts/patrol.toml"),
+            json!({"route": [[1.0, 1.0, 2.0], [5.0, 1.0, 2.0]]}),
+        ),
         (
             "curfew.toml",
             include_str!("../scripts/curfew.toml"),
@@ -194,6 +199,7 @@ fn the_scripts_that_come_with_the_agent_hold() {
     ] {
         let script = ScriptFile::parse(file, text).unwrap();
         let assignment = Assignment { script, with: serde_json::from_value(with).unwrap(), called: None };
+        check_script(&config(), &assignment, MOST).unwrap();
         holds(&with_scripts(vec![assignment]).unwrap(), Scene::Scripts);
     }
 }

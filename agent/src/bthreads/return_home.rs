@@ -24,9 +24,15 @@ enum Phase {
     /// On the ground, where `return` leads nowhere.
     Grounded,
     Away,
-    Turning { why: String },
-    Returning { why: String },
-    Landing { why: String },
+    Turning {
+        why: String,
+    },
+    Returning {
+        why: String,
+    },
+    Landing {
+        why: String,
+    },
     /// On the way down, from which no way leads home any more.
     Down,
 }

@@ -14,7 +14,7 @@ mod world;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use skein_bp::script::Script;
+use skein_bp::script::{Assignment, Script};
 use skein_bp::verify::{Coverage, Inspection, Progress, Report, Timers, Verifier, View};
 use skein_bp::{BThread, Bid, Event, EventSet, Program, ProgramConfig};
 use skein_dbp::facts;
@@ -62,6 +62,23 @@ pub struct VehicleVerifier {
     scripts: Vec<(Arc<str>, Script)>,
     most_states: usize,
     left_out: Vec<String>,
+}
+
+/// Looks for a fault of a script together with the vehicle's program, in no more than so many states around the vehicle's
+/// first flight.
+///
+/// # Errors
+/// What is wrong, with the run that shows it.
+pub fn check_script(config: &AgentConfig, script: &Assignment, most_states: usize) -> Result<(), String> {
+    let config = AgentConfig { scripts: vec![script.clone()], ..config.clone() };
+    let verifier = VehicleVerifier::new(&config).map_err(|error| match error {
+        AgentError::Script { why, .. } => why,
+        error => error.to_string(),
+    })?;
+    match verifier.most_states(most_states).verify(Scene::Scripts, |_| {}).report.verdict {
+        None => Ok(()),
+        Some(violation) => Err(format!("with the vehicle's program: {violation}")),
+    }
 }
 
 /// What came of one scene.
@@ -194,9 +211,7 @@ impl VehicleVerifier {
             .timers(Timers::AtRest)
             .most_states(self.most_states)
             .world(outside)
-            .every_bid(SAFETY_RULE, move |bthread, bid| {
-                blocks_safety(&me, &home, bthread, bid)
-            })
+            .every_bid(SAFETY_RULE, move |bthread, bid| blocks_safety(&me, &home, bthread, bid))
             .always_within_reach("the ground", is_down);
         for (name, event) in self.held_by_scripts() {
             let goal = goal_of_script(&name, &event);
@@ -216,11 +231,12 @@ impl VehicleVerifier {
         let names = verbs.map(|verb| self.me.event(verb).name().to_owned());
         let untold = names.filter(|name| !coverage.happened.iter().any(|event| event.name() == name));
         let never_told = untold.filter_map(|name| {
-            let waits = |bid: &Bid| bid.waits().may_hold_named(&name) || bid.interrupts().may_hold_named(&name);
+            let waits =
+                |bid: &Bid| bid.waits().may_hold_named(&name) || bid.interrupts().may_hold_named(&name);
             let is_requirement = |thread: &str| thread.contains(' ');
-            let waiting = threads.iter().filter(|(thread, seen)| {
-                !is_requirement(thread) && seen.bids.iter().any(waits)
-            });
+            let waiting = threads
+                .iter()
+                .filter(|(thread, seen)| !is_requirement(thread) && seen.bids.iter().any(waits));
             let waiting: Vec<Arc<str>> = waiting.map(|(thread, _)| (*thread).clone()).collect();
             (!waiting.is_empty()).then_some((name, waiting))
         });
@@ -252,9 +268,9 @@ impl VehicleVerifier {
 
     /// What a script may block, with its b-thread's name.
     fn held_by_scripts(&self) -> impl Iterator<Item = (Arc<str>, Event)> {
-        self.scripts.iter().flat_map(|(name, script)| {
-            script.blocked().into_iter().map(|event| (name.clone(), event))
-        })
+        self.scripts
+            .iter()
+            .flat_map(|(name, script)| script.blocked().into_iter().map(|event| (name.clone(), event)))
     }
 }
 
@@ -264,7 +280,10 @@ fn reduced(config: &AgentConfig, left_out: &mut Vec<String>) -> AgentConfig {
     let waypoints = config.waypoints.len();
     if waypoints > MOST_WAYPOINTS {
         config.waypoints.drain(1..waypoints - 1);
-        left_out.push(format!("waypoints 2 to {} of {waypoints}, which are flown to as the first", waypoints - 1));
+        left_out.push(format!(
+            "waypoints 2 to {} of {waypoints}, which are flown to as the first",
+            waypoints - 1
+        ));
     }
     let mut vehicles = 0;
     let before = config.roster.len();
@@ -299,9 +318,8 @@ fn blocks_safety(me: &Me, home: &Event, bthread: &str, bid: &Bid) -> Result<(), 
     if bthread.starts_with(WORLD) || bid.blocks().is_none() {
         return Ok(());
     }
-    let may = |verb: &str| {
-        MAY_BLOCK.iter().any(|(named, bthreads)| *named == verb && bthreads.contains(&bthread))
-    };
+    let may =
+        |verb: &str| MAY_BLOCK.iter().any(|(named, bthreads)| *named == verb && bthreads.contains(&bthread));
     if bid.blocks().contains(home) && !may(GOTO) {
         return Err(format!("`{bthread}` blocks the way home, {home}"));
     }

@@ -4,9 +4,9 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, DUPLICATE_NAME, PEER_JOINED, PEER_LOST, STALLED};
 use skein_wire::vocabulary::{
-    ADVANCE, AIRBORNE, BATTERY_CRITICAL, BATTERY_LOW, CLEAR, COMMAND_FAILED, COMPLETE, ENTER, FAILED, FENCE_BREACHED, FOUND_AIRBORNE,
-    GOTO, HAND_BACK, HOLD, HOMEWARD, LAND, LANDED, LEAVE, ORDER, PASSAGE, PATH_BLOCKED, PILOT, PLAN, PLANNED,
-    READY, RETURN, SLEPT, STUCK, TAKEOFF, TOO_CLOSE, UNREADY,
+    ADVANCE, AIRBORNE, BATTERY_CRITICAL, BATTERY_LOW, CLEAR, COMMAND_FAILED, COMPLETE, ENTER, FAILED,
+    FENCE_BREACHED, FOUND_AIRBORNE, GOTO, HAND_BACK, HOLD, HOMEWARD, LAND, LANDED, LEAVE, ORDER, PASSAGE,
+    PATH_BLOCKED, PILOT, PLAN, PLANNED, READY, RETURN, SLEPT, STUCK, TAKEOFF, TOO_CLOSE, UNREADY,
 };
 
 use crate::bthreads::{HOME_LEG, OPERATOR_LEG, RIGHT_OF_WAY};
@@ -26,7 +26,14 @@ enum Rule {
     /// Absence between: from an event of `from` to the next of `until`, none of `never` happens.
     Absence { never: EventSet, from: EventSet, until: EventSet, is_on: bool },
     /// Response: after an event of `from` one of `answer` happens.
-    Response { from: EventSet, answer: EventSet, flight: Option<Flight>, pilot: Pilot, is_due: bool, is_answered: bool },
+    Response {
+        from: EventSet,
+        answer: EventSet,
+        flight: Option<Flight>,
+        pilot: Pilot,
+        is_due: bool,
+        is_answered: bool,
+    },
 }
 
 /// A response that is asked for in the air only, and once in a flight: an answer that came before counts.
@@ -73,17 +80,13 @@ impl Requirement {
         from: EventSet,
         answer: EventSet,
     ) -> Self {
-        let flight = Flight {
-            begins: me.any_of(begins),
-            ends: me.any_of(&[LANDED, COMMAND_FAILED]),
-            is_on: false,
-        };
+        let flight =
+            Flight { begins: me.any_of(begins), ends: me.any_of(&[LANDED, COMMAND_FAILED]), is_on: false };
         Self::answered(name, me, from, answer, Some(flight))
     }
 
     fn answered(name: &str, me: &Me, from: EventSet, answer: EventSet, flight: Option<Flight>) -> Self {
-        let pilot =
-            Pilot { takes: me.any_of(&[PILOT, SLEPT]), gives_back: me.any(HAND_BACK), has_it: false };
+        let pilot = Pilot { takes: me.any_of(&[PILOT, SLEPT]), gives_back: me.any(HAND_BACK), has_it: false };
         let rule = Rule::Response { from, answer, flight, pilot, is_due: false, is_answered: false };
         Self { name: name.to_owned(), rule }
     }
@@ -105,7 +108,8 @@ impl Rule {
                 is_broken
             }
             Self::Response { from, answer, flight, pilot, is_due, is_answered } => {
-                pilot.has_it = (pilot.has_it || pilot.takes.contains(event)) && !pilot.gives_back.contains(event);
+                pilot.has_it =
+                    (pilot.has_it || pilot.takes.contains(event)) && !pilot.gives_back.contains(event);
                 if let Some(flight) = flight {
                     let (begins, ends) = (flight.begins.contains(event), flight.ends.contains(event));
                     flight.is_on = (flight.is_on || begins) && !ends;

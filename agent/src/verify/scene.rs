@@ -80,7 +80,9 @@ impl Scene {
     pub fn about(self) -> &'static str {
         match self {
             Self::Launch => "checks, refused commands, the ground's launch and hold, joint launch and abort",
-            Self::Flight => "blocked and missing paths, getting stuck, a neighbour too close, the ground's hold",
+            Self::Flight => {
+                "blocked and missing paths, getting stuck, a neighbour too close, the ground's hold"
+            }
             Self::Passage => "a narrow passage, claims against another vehicle, nodes lost and heard again",
             Self::Energy => "low and empty battery, fence, a neighbour too close",
             Self::Link => "ground station lost and heard again, low battery",

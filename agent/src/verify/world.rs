@@ -5,13 +5,11 @@
 //! perhaps more, with one or two values of data that b-threads tell apart.
 
 use skein_bp::{Event, EventSet};
-use skein_dbp::facts::{
-    BLOCK_LAPSED, CONFIRMED, DUPLICATE_NAME, IN_STEP, PEER_JOINED, PEER_LOST, STALLED,
-};
+use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, DUPLICATE_NAME, IN_STEP, PEER_JOINED, PEER_LOST, STALLED};
 use skein_wire::vocabulary::{
     self, ABORT, ADVANCE, AIRBORNE, ARRIVED, BATTERY_CRITICAL, BATTERY_LOW, CLEAR, COMMAND_FAILED, ENTER,
-    FENCE_BREACHED, FOUND_AIRBORNE, GOTO, HAND_BACK, LAND, LANDED, LAUNCH, LEAVE, ORDER, PASSAGE, PATH_BLOCKED,
-    PILOT, PLAN, PLANNED, READY, SLEPT, STUCK, SWARM, TAKEOFF, TOO_CLOSE, UNPLANNABLE, UNREADY,
+    FENCE_BREACHED, FOUND_AIRBORNE, GOTO, HAND_BACK, LAND, LANDED, LAUNCH, LEAVE, ORDER, PASSAGE,
+    PATH_BLOCKED, PILOT, PLAN, PLANNED, READY, SLEPT, STUCK, SWARM, TAKEOFF, TOO_CLOSE, UNPLANNABLE, UNREADY,
 };
 
 use super::part::{Part, Place};
@@ -51,9 +49,8 @@ pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
         true => taken(grounded(UNHEARD_OF)).offers(told(FOUND_AIRBORNE), "adopted"),
         false => grounded(UNHEARD_OF),
     };
-    let taking_off = lands(
-        Place::new("taking off").rules_out(me.any_of(&ON_THE_WAY)).offers(told(AIRBORNE), "flying"),
-    );
+    let taking_off =
+        lands(Place::new("taking off").rules_out(me.any_of(&ON_THE_WAY)).offers(told(AIRBORNE), "flying"));
     let taking_off = match disturbed.refusals {
         true => taking_off.offers(me.because(COMMAND_FAILED, "Arm: denied"), ON_THE_GROUND),
         false => taking_off,
@@ -63,7 +60,9 @@ pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
         unheard_of.hears(me.any(READY), ON_THE_GROUND),
         taken(grounded(ON_THE_GROUND)),
         taken_or_asleep(taking_off),
-        taken_or_asleep(lands(Place::new("flying").rules_out(me.any(READY)).offers(told(LANDED), ON_THE_GROUND))),
+        taken_or_asleep(lands(
+            Place::new("flying").rules_out(me.any(READY)).offers(told(LANDED), ON_THE_GROUND),
+        )),
         taken(Place::new("landing").rules_out(me.any(READY)).offers(told(LANDED), ON_THE_GROUND)),
         not_flying("taken").offers(told(LANDED), ON_THE_GROUND).hears(me.any(HAND_BACK), "engaging"),
         taken_or_asleep(lands(not_flying("engaging").offers(told(AIRBORNE), "flying"))),
@@ -100,7 +99,8 @@ pub(super) fn guidance(me: &Me, legs: &[i64], hard: bool) -> Part {
     ];
     for leg in legs {
         let [planning, following, blocked, arrived] =
-            ["planning for", "following to", "blocked on the way to", "arrived at"].map(|what| format!("{what} {leg}"));
+            ["planning for", "following to", "blocked on the way to", "arrived at"]
+                .map(|what| format!("{what} {leg}"));
         let place = |name: &str| new_leg(Place::new(name).hears(me.any(PLAN), planning.as_str()));
         let arrives = |place: Place| place.offers(me.event(ARRIVED).with("leg", *leg), arrived.as_str());
         let plans = Place::new(planning.as_str())

@@ -12,7 +12,11 @@ use clap::{Parser, Subcommand};
 
 /// Skein's agent: one vehicle's behavioural program, its navigation, and its autopilot's link.
 #[derive(Parser)]
-#[command(name = "skein-agent", version, after_help = "Exit codes: 0 done, 1 `verify` has found a violation, 2 wrong usage or input.")]
+#[command(
+    name = "skein-agent",
+    version,
+    after_help = "Exit codes: 0 done, 1 `verify` has found a violation, 2 wrong usage or input."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

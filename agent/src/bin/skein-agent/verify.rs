@@ -8,9 +8,9 @@ use std::time::Instant;
 
 use anyhow::{Context as _, bail, ensure};
 use serde_json::{Value, json};
-use skein_agent::{AgentConfig, AgentError};
 use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::verify::{NotCovered, Scene, SceneReport, VehicleVerifier};
+use skein_agent::{AgentConfig, AgentError};
 use skein_bp::script::{Argument, Assignment, ParameterKind, ScriptFile};
 use skein_bp::verify::{Progress, Report, Violation};
 use skein_dbp::verify::programs::{self, Network};
@@ -133,11 +133,14 @@ impl Verify {
             print_rules(&verifier);
             print_not_covered(&not_covered);
             let bounded = reports.iter().any(|scene| !scene.report.is_complete());
-            println!("\n{}", match (is_well, bounded) {
-                (true, false) => "verified: every run of every scene holds",
-                (true, true) => "no violation as far as was looked; see what was not covered",
-                (false, _) => "violated",
-            });
+            println!(
+                "\n{}",
+                match (is_well, bounded) {
+                    (true, false) => "verified: every run of every scene holds",
+                    (true, true) => "no violation as far as was looked; see what was not covered",
+                    (false, _) => "violated",
+                }
+            );
         }
         Ok(is_well)
     }
@@ -158,7 +161,10 @@ impl Verify {
         let (states, edges) = (graph.states.len(), graph.edges.len());
         let omitted: Vec<String> = graph.not_covered.iter().map(ToString::to_string).collect();
         if self.json {
-            println!("{}", json!({ "scene": scene.name(), "states": states, "edges": edges, "not_covered": omitted }));
+            println!(
+                "{}",
+                json!({ "scene": scene.name(), "states": states, "edges": edges, "not_covered": omitted })
+            );
         } else {
             println!("{}: {states} states, {edges} edges of the scene `{scene}`", file.display());
             omitted.iter().for_each(|what| println!("not covered: {what}"));
@@ -278,7 +284,8 @@ fn print_network(network: &Network, report: &Report, moves: &MoveCounts, seconds
 
 fn faults(faults: &Faults) -> Vec<String> {
     let Faults { delay, lapses, restarts, repeats, partitions, .. } = faults;
-    let counted = [(lapses, "lapse"), (restarts, "restart"), (repeats, "repetition"), (partitions, "partition")];
+    let counted =
+        [(lapses, "lapse"), (restarts, "restart"), (repeats, "repetition"), (partitions, "partition")];
     let counted = counted.into_iter().filter(|(count, _)| **count > 0);
     let delay = if *delay { "delay and loss of bids" } else { "loss of bids" };
     std::iter::once(delay.to_owned()).chain(counted.map(|(count, what)| format!("{count} {what}"))).collect()

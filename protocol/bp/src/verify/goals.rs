@@ -29,8 +29,7 @@ pub(super) fn out_of_reach<M: Model>(
     };
     let ways = Ways::into(model, store);
     goals.into_iter().enumerate().find_map(|(at, goal)| {
-        let met =
-            |number: &u32| *number >= first_unexplored || model.meets(at, store.state(*number));
+        let met = |number: &u32| *number >= first_unexplored || model.meets(at, store.state(*number));
         let lost = ways.first_without(store.len(), (0..store.len() as u32).filter(met))?;
         let trace = store.path(lost).into_iter().map(|label| model.event(label)).collect();
         let kind = ViolationKind::OutOfReach { goal };

@@ -414,7 +414,9 @@ impl Step {
         match self {
             Step::Begin(_) => "beginning",
             Step::Record { at: 1.., .. } => "loss of older bids",
-            Step::Record { .. } | Step::Ack { .. } | Step::Occurrence { .. } | Step::Presence { .. } => "arrival",
+            Step::Record { .. } | Step::Ack { .. } | Step::Occurrence { .. } | Step::Presence { .. } => {
+                "arrival"
+            }
             Step::Twice(_) => "repetition",
             Step::Cut(..) => "partition",
             Step::Heal(..) => "end of a partition",
@@ -517,7 +519,8 @@ impl Network {
         let pair = (from.clone(), to.clone());
         let Some(wire) = self.wires.get(&pair) else { return Vec::new() };
         let (from, to) = pair;
-        let records = (0..wire.records.len()).map(|at| Step::Record { from: from.clone(), to: to.clone(), at });
+        let records =
+            (0..wire.records.len()).map(|at| Step::Record { from: from.clone(), to: to.clone(), at });
         let mut arrivals: Vec<Step> = records.collect();
         arrivals.extend(wire.ack.as_ref().map(|_| Step::Ack { from: from.clone(), to: to.clone() }));
         let next = wire.occurrences.front();
@@ -530,7 +533,8 @@ impl Network {
     /// Puts what a step has delivered back on its way, as it was `before`: with what it had overtaken, and behind it what
     /// was sent since.
     fn put_again(&mut self, step: &Step, before: BTreeMap<(NodeName, NodeName), Rc<Wire>>) {
-        let (Step::Record { from, to, .. } | Step::Ack { from, to } | Step::Occurrence { from, to }) = step else {
+        let (Step::Record { from, to, .. } | Step::Ack { from, to } | Step::Occurrence { from, to }) = step
+        else {
             return;
         };
         let Some(before) = before.get(&(from.clone(), to.clone())) else { return };
@@ -540,7 +544,10 @@ impl Network {
                 let since = std::mem::take(&mut wire.records);
                 wire.records.clone_from(&before.records);
                 let is_new = |record: &BidRecord| {
-                    !before.records.iter().any(|old| old.epoch == record.epoch && old.incarnation == record.incarnation)
+                    !before
+                        .records
+                        .iter()
+                        .any(|old| old.epoch == record.epoch && old.incarnation == record.incarnation)
                 };
                 wire.records.extend(since.into_iter().filter(is_new));
             }
@@ -559,9 +566,10 @@ impl Network {
             wire.occurrences.front().is_some_and(|next| facts::all(from).contains(&next.event))
         };
         let has_begun = |name: &NodeName| self.nodes.get(name).is_some_and(|node| has_begun(node));
-        let next = self.wires.iter().find(|((from, to), wire)| {
-            is_fact(wire, from) && has_begun(to) && !self.are_cut_off(from, to)
-        });
+        let next = self
+            .wires
+            .iter()
+            .find(|((from, to), wire)| is_fact(wire, from) && has_begun(to) && !self.are_cut_off(from, to));
         next.map(|(pair, _)| pair.clone())
     }
 

@@ -227,7 +227,11 @@ pub fn hold() -> Result<Network, NetworkError> {
 /// # Errors
 /// None but for a mistake in this file.
 pub fn kept_hold() -> Result<Network, NetworkError> {
-    holding("kept hold", "a hold that is stated to outlive its holder stays through lapses and restarts", true)
+    holding(
+        "kept hold",
+        "a hold that is stated to outlive its holder stays through lapses and restarts",
+        true,
+    )
 }
 
 fn holding(name: &'static str, about: &'static str, outlives: bool) -> Result<Network, NetworkError> {
@@ -246,7 +250,9 @@ fn holding(name: &'static str, about: &'static str, outlives: bool) -> Result<Ne
     vehicle.config.durable = outlives;
     let holds = |view: &NetworkView<'_>| {
         let trusts = |ground: &Program| {
-            ground.bids().any(|(name, bid, _)| name == "trust" && bid.waits().may_hold_named("ground/main/block_lapsed"))
+            ground.bids().any(|(name, bid, _)| {
+                name == "trust" && bid.waits().may_hold_named("ground/main/block_lapsed")
+            })
         };
         let is_trusted = view.program("ground/main").is_some_and(trusts);
         let is_held = |uav: &Program| uav.blockers(&ADVANCE.into()).next().is_some();
