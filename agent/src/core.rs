@@ -22,7 +22,7 @@ use crate::{
     me::Me,
     neighbours::{Neighbour, Neighbours},
     pipeline::{
-        guidance::{Guidance, Motion, Surroundings},
+        guidance::{Guidance, Motion, Report, Surroundings},
         perception::{Perception, Pose, Scan},
         set_point::{FRESH_FOR, KeepAlive, SILENT_AFTER, keep_alive, oldest_age},
     },
@@ -188,6 +188,7 @@ impl AgentCore {
         let roster: Vec<_> =
             config.roster.iter().map(|node| name("roster", node)).collect::<Result<_, _>>()?;
         let own_name = name("node", &config.node)?;
+        let neighbours = Neighbours::new(own_name.clone(), config.incarnation);
         let node_config = NodeConfig {
             lease: config.lease,
             safety: safety_events(&me),
@@ -214,7 +215,7 @@ impl AgentCore {
                 None => NodeLink::new(Node::new(node_config, program), fleet),
             },
             name: own_name,
-            neighbours: Neighbours::default(),
+            neighbours,
             perception: Perception::new(&config.fence, home, heights(&config))?,
             watches: Watches::new(me.clone()),
             failsafes: Failsafes::default(),
@@ -286,6 +287,8 @@ impl AgentCore {
         let neighbours: Vec<Neighbour> = self.neighbours.at(now).collect();
         self.follow_autopilot(now);
         self.watch(now, &neighbours);
+        let report = self.guidance.go_on_planning(self.perception.map_mut());
+        self.hear_of_path(report);
         if now >= self.next_cycle {
             self.next_cycle = now + CYCLE_PERIOD;
             self.begin_cycle(now, &neighbours, link);
@@ -374,6 +377,14 @@ impl AgentCore {
         })
     }
 
+    /// Tells the program what came of a plan, if something did.
+    fn hear_of_path(&mut self, report: Option<Report>) {
+        if let Some(report) = report {
+            self.node.node_mut().enqueue(report.into_event(&self.me));
+            self.script_facts.forget_path();
+        }
+    }
+
     /// A navigation cycle: looks along the path, and tells the others where this vehicle is.
     fn begin_cycle(&mut self, now: Duration, neighbours: &[Neighbour], link: &mut dyn Link) {
         if let (FlightPhase::Flying, Some(motion)) = (self.flight.phase(), self.motion()) {
@@ -384,6 +395,7 @@ impl AgentCore {
             self.tell_scripts(&motion, neighbours);
         }
         if let Some(state) = self.state(now) {
+            let state = State { echo: self.neighbours.echo(now), ..state };
             self.node.put_state(&state, link);
         }
     }
@@ -438,8 +450,7 @@ impl AgentCore {
             Some(PLAN) => {
                 if let Some(motion) = self.motion() {
                     let report = self.guidance.plan(why, &motion, self.perception.map_mut(), neighbours);
-                    self.node.node_mut().enqueue(report.into_event(&self.me));
-                    self.script_facts.forget_path();
+                    self.hear_of_path(report);
                 }
             }
             Some(ADVANCE | HOMEWARD) => self.guidance.grant_leave(now),
@@ -525,6 +536,7 @@ impl AgentCore {
                     map: self.perception.map(),
                     obstacles: self.perception.obstacles(),
                     neighbours: &tracks,
+                    rank: self.rank(neighbours),
                 };
                 let set_point = self.guidance.steer(now, &motion, &surroundings);
                 self.set_points.commands += 1;
@@ -539,6 +551,12 @@ impl AgentCore {
             }
             KeepAlive::Silence => self.guidance.rest(),
         }
+    }
+
+    /// How many of the neighbours have names that come before this vehicle's.
+    fn rank(&self, neighbours: &[Neighbour]) -> u32 {
+        let before = neighbours.iter().filter(|neighbour| neighbour.node < self.name);
+        u32::try_from(before.count()).unwrap_or(u32::MAX)
     }
 
     fn motion(&self) -> Option<Motion> {
@@ -650,6 +668,12 @@ impl AgentCore {
     #[must_use]
     pub fn node(&self) -> &NodeLink {
         &self.node
+    }
+
+    /// Whether a path is being searched for that the last tick was not enough for.
+    #[must_use]
+    pub fn is_planning(&self) -> bool {
+        self.guidance.is_planning()
     }
 
     /// The vehicle's node name.

@@ -1,8 +1,12 @@
 //! Paths through the whole map.
 
+mod anytime;
 pub mod astar;
+mod dstar_lite;
 mod potential;
 mod simplify;
 
+pub use anytime::{Effort, Route, Search, Unsolved, cost_of};
+pub use dstar_lite::DStarLite;
 pub use potential::{Potential, PotentialObstacle, is_in_field};
-pub use simplify::{elide_collinear, simplify};
+pub use simplify::{elide_collinear, simplify, simplify_around};
