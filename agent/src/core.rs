@@ -28,6 +28,7 @@ use crate::{
     },
     precedence,
     scripts::{Circumstances, RunningScript, ScriptFacts, Scripts},
+    verify::check_script,
     watches::Watches,
 };
 
@@ -49,6 +50,9 @@ const CLIMB_S: f64 = 4.0;
 const MOST_UNSEEN_S: f64 = 4.0;
 /// After so long a silence, s, its failsafe has landed it, or its mission is over.
 const SURELY_DOWN_S: f64 = 45.0;
+/// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for between
+/// two ticks. `skein-agent verify --script` looks at all.
+const STATES_TRIED: usize = 500;
 /// A navigation cycle and a state message to the others begin this often.
 const CYCLE_PERIOD: Duration = Duration::from_millis(100);
 
@@ -178,6 +182,7 @@ impl AgentCore {
         for assignment in &config.scripts {
             scripts
                 .load(&mut program, assignment, "configuration")
+                .and_then(|()| check_script(&config, assignment, STATES_TRIED))
                 .map_err(|why| AgentError::Script { name: assignment.name().to_owned(), why })?;
         }
         let roster: Vec<_> =
@@ -450,7 +455,9 @@ impl AgentCore {
             }
             Some(ADVANCE | HOMEWARD) => self.guidance.grant_leave(now),
             Some(LAND) => self.task = format!("landing: {why}"),
-            Some(RETURN) => self.task = format!("returning: {why}"),
+            Some(RETURN) if self.flight.phase() != FlightPhase::Landing => {
+                self.task = format!("returning: {why}");
+            }
             Some(HOLD) => self.task = "holding".to_owned(),
             Some(LANDED) => self.guidance.forget(),
             Some(vocabulary::TAKEOFF) => self.task = "taking off".to_owned(),
@@ -493,6 +500,10 @@ impl AgentCore {
         let from = sender.map_or(self.name.as_str(), |(node, _)| node).to_owned();
         let outcome = if from.starts_with("uav/") && from != self.name.as_str() {
             Err(format!("{from} may not send scripts: that is for the ground station and its operators"))
+        } else if !self.scripts.runs(assignment.name())
+            && let Err(why) = check_script(&self.config, &assignment, STATES_TRIED)
+        {
+            Err(why)
         } else {
             self.script_facts.forget();
             self.scripts.load(self.node.node_mut().program_mut(), &assignment, &from)
@@ -681,7 +692,9 @@ fn heights(config: &AgentConfig) -> [f64; 2] {
     [lowest_m.max(home_m + LEAST_HEIGHT_M), heights().fold(0.0, f64::max) + ABOVE_WAYPOINTS_M]
 }
 
-/// What no remote b-thread can block, and only the operator's gateway can request.
-fn safety_events(me: &Me) -> EventSet {
-    me.any_of(&vocabulary::OWN)
+/// What no remote b-thread can block, and only the operator's gateway can request; the waypoint at home is part of it, for
+/// without it `return` would lead nowhere.
+pub(crate) fn safety_events(me: &Me) -> EventSet {
+    let home = me.any(GOTO).and(EventSet::field_is("leg", bthreads::HOME_LEG));
+    me.any_of(&vocabulary::OWN).or(home)
 }

@@ -170,6 +170,11 @@ impl Program {
         self.add_boxed(name.into(), Box::new(bthread))
     }
 
+    /// Takes a b-thread out of the program, wherever it is; `false` when none of this name runs.
+    pub fn remove(&mut self, name: &str) -> bool {
+        self.board.bthread(name).and_then(|place| self.end(place)).is_some()
+    }
+
     /// Puts `event` at the end of the external queue. One whose home is elsewhere stays there.
     pub fn enqueue(&mut self, event: impl Into<Event>) {
         self.externals.push_back(event.into());
