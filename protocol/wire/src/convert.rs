@@ -194,6 +194,7 @@ impl From<&RemoteBid> for proto::RemoteBid {
             sync: bid.sync,
             requests: bid.requests.iter().map(Into::into).collect(),
             block: (!bid.block.is_none()).then(|| (&bid.block).into()),
+            block_since: Some(bid.block_since),
             priority: bid.priority,
             on_loss: on_loss.into(),
         }
@@ -221,6 +222,7 @@ impl TryFrom<proto::RemoteBid> for RemoteBid {
             sync: number("RemoteBid.sync", bid.sync, 1)?,
             requests: bid.requests.into_iter().map(Event::try_from).collect::<Result<_>>()?,
             block: bid.block.map_or(Ok(EventSet::None), EventSet::try_from)?,
+            block_since: bid.block_since.map_or(bid.sync, |since| since.min(bid.sync)),
             priority: bid.priority,
             on_loss,
         })

@@ -51,11 +51,12 @@ fn event_set() -> impl Strategy<Value = EventSet> {
 prop_compose! {
     fn remote_bid()(
         bthread in "[a-z ]{0,9}", sync in 1..u64::MAX / 2, requests in prop::collection::vec(event(), 0..3),
-        block in event_set(), priority in any::<Option<i32>>(), hold in any::<bool>(),
+        block in event_set(), earlier in 0..u64::MAX, priority in any::<Option<i32>>(), hold in any::<bool>(),
     ) -> RemoteBid {
         // A set that surely holds nothing travels as none at all.
         let block = if block.is_none() { EventSet::None } else { block };
-        RemoteBid { bthread, sync, requests, block, priority, on_loss: if hold { OnLoss::Hold } else { OnLoss::Release } }
+        let block_since = sync.saturating_sub(earlier);
+        RemoteBid { bthread, sync, requests, block, block_since, priority, on_loss: if hold { OnLoss::Hold } else { OnLoss::Release } }
     }
 }
 
