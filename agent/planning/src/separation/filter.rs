@@ -6,6 +6,8 @@ use super::Neighbour;
 use super::halfspace::{HalfSpace, nearest_2d, nearest_3d};
 use crate::local::braking::stopping_speed;
 
+/// Violations smaller than this are rounding, m/s.
+const TOLERANCE_M_S: f64 = 1e-9;
 /// A vehicle that needs no time to stop is taken to need this, seconds.
 const LEAST_STOP_S: f64 = 0.05;
 
@@ -151,7 +153,7 @@ struct Limit {
 /// **Guarantee.** As long as `S_i + S_j <= g` for each two vehicles, all of them can brake at once and none comes nearer
 /// to another than `D`: `d` shrinks by no more than both stops, and `a` is needed in one direction only, so all
 /// limits are kept by the same braking. The reaches of two add up to the gap at most, so vehicles that follow the filter stay in
-/// such states. Zero velocity satisfies every bound with `g >= 0` against what stands or cooperates: there is a feasible
+/// such states; one that cannot take on what satisfies its limits within `t` brakes along its own velocity, by which every stop grows shorter by the way that it flies. Zero velocity satisfies every bound with `g >= 0` against what stands or cooperates: there is a feasible
 /// velocity as long as distances have been kept. What is flown beyond `t` of lag, below `a` of braking and outside
 /// the position errors is not covered.
 ///
@@ -268,7 +270,6 @@ fn neighbour_limit(motion: &Motion, neighbour: &Neighbour, stop: f64, config: &F
     } else {
         leads_away.min(0.0) + approach(gap, stop, config)
     };
-    let bound = led(bound, gradient.dot(&motion.velocity));
     Limit { space: HalfSpace { normal, bound: bound / steepness }, cause: Cause::Neighbour(neighbour.id) }
 }
 
@@ -308,7 +309,6 @@ fn obstacle_limit(
     let distance = squared.sqrt();
     let normal = offset.try_normalize(1e-6)?;
     let bound = approach(distance - config.obstacle_clearance_m, stop, config);
-    let bound = led(bound, normal.dot(&motion.velocity));
     Some(Limit { space: HalfSpace { normal, bound }, cause: Cause::Obstacle(at) })
 }
 
@@ -329,7 +329,8 @@ fn solve_planar(motion: &Motion, limits: &[Limit], config: &FilterConfig) -> Fil
         }
     }
     let wanted = Vector2::new(motion.desired.x, motion.desired.y);
-    let (velocity, outcome) = relax(wanted, &flat, config, nearest_2d);
+    let now = Vector2::new(motion.velocity.x, motion.velocity.y);
+    let (velocity, outcome) = choose(now, wanted, &flat, config, nearest_2d);
     Filtered { velocity: Vector3::new(velocity.x, velocity.y, motion.desired.z), outcome }
 }
 
@@ -342,11 +343,42 @@ fn solve(motion: &Motion, limits: &[Limit], config: &FilterConfig) -> Filtered {
             (HalfSpace { bound, ..limit.space }, limit.cause)
         })
         .collect();
-    let (velocity, outcome) = relax(motion.desired, &limits, config, nearest_3d);
+    let (velocity, outcome) = choose(motion.velocity, motion.desired, &limits, config, nearest_3d);
     Filtered { velocity, outcome }
 }
 
 type Vector<const D: usize> = nalgebra::SVector<f64, D>;
+
+/// The velocity to fly for one that is flying at `now`: what satisfies the limits, and braking where that cannot be had in
+/// time.
+fn choose<const D: usize>(
+    now: Vector<D>,
+    wanted: Vector<D>,
+    limits: &[(HalfSpace<D>, Cause)],
+    config: &FilterConfig,
+    nearest: impl Fn(Vector<D>, f64, &[HalfSpace<D>]) -> Option<Vector<D>>,
+) -> (Vector<D>, Outcome) {
+    let change_m_s = config.decel_m_s2 * config.latency_s;
+    let ahead: Vec<_> = limits
+        .iter()
+        .map(|(space, cause)| {
+            (HalfSpace { bound: led(space.bound, space.normal.dot(&now)), ..*space }, *cause)
+        })
+        .collect();
+    let (velocity, outcome) = relax(wanted, &ahead, config, nearest);
+    let reached = now + shortened(velocity - now, change_m_s);
+    match worst(limits, &reached) {
+        Some((excess, cause)) if excess > TOLERANCE_M_S && matches!(outcome, Outcome::Limited(_)) => {
+            (now - shortened(now, change_m_s), Outcome::Limited(cause))
+        }
+        _ => (velocity, outcome),
+    }
+}
+
+fn shortened<const D: usize>(vector: Vector<D>, length: f64) -> Vector<D> {
+    let norm = vector.norm();
+    if norm > length { vector * (length / norm) } else { vector }
+}
 
 /// Solves, and if there is no solution relaxes the neighbours' limits, then all.
 fn relax<const D: usize>(
@@ -368,7 +400,7 @@ fn relax<const D: usize>(
     };
     if let Some(velocity) = relaxed(0.0, 0.0) {
         let outcome = match worst(limits, &wanted) {
-            Some((excess, cause)) if excess > 1e-9 => Outcome::Limited(cause),
+            Some((excess, cause)) if excess > TOLERANCE_M_S => Outcome::Limited(cause),
             _ if wanted.norm() > radius => Outcome::Limited(Cause::Speed),
             _ => Outcome::Clear,
         };
