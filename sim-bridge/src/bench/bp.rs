@@ -14,6 +14,7 @@ use skein_bp::verify::{Inspection, Verifier};
 use skein_bp::{Bid, EventSet, Program, ProgramConfig};
 
 use super::quantile::median;
+use crate::cpu_time as thread_time;
 
 /// The same programs on BPpy, for a Python that has it.
 const PEER: &str = include_str!("bp_peer.py");
@@ -144,22 +145,18 @@ fn measure_peer(repetitions: usize, cpu_time: Duration) -> anyhow::Result<Figure
 
 fn events_per_s(mut program: Program, cpu_time: Duration) -> anyhow::Result<f64> {
     program.synchronise(Duration::ZERO)?;
-    let since = this_threads_cpu_time()?;
+    let since = thread_time::of_this_thread()?;
     let mut events = 0.0;
     loop {
         for _ in 0..BATCH {
             program.step(Duration::ZERO)?.context("the program has stopped")?;
         }
         events += f64::from(BATCH);
-        let taken = this_threads_cpu_time()? - since;
+        let taken = thread_time::of_this_thread()? - since;
         if taken >= cpu_time && !taken.is_zero() {
             return Ok(events / taken.as_secs_f64());
         }
     }
-}
-
-fn this_threads_cpu_time() -> anyhow::Result<Duration> {
-    Ok(clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID)?.into())
 }
 
 /// What the verifier did.

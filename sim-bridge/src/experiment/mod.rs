@@ -2,6 +2,7 @@
 //!
 //! An experiment is a file here, named in [`EXPERIMENTS`].
 
+mod dstar_grid;
 mod figure;
 mod report;
 
@@ -23,7 +24,11 @@ pub struct Experiment {
 }
 
 /// Every experiment.
-pub const EXPERIMENTS: &[Experiment] = &[];
+pub const EXPERIMENTS: &[Experiment] = &[Experiment {
+    name: "dstar-grid",
+    about: "D* with a collision factor on the marker grid, and re-planning by D* Lite (Zhang 2019)",
+    run: dstar_grid::run,
+}];
 
 /// What the command line says to an experiment. What is not given is the experiment's own.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -20,6 +20,9 @@ pub struct Effort {
 }
 
 impl Effort {
+    /// A budget that takes a few milliseconds with 26 neighbours, and less than ten on slow or busy processors.
+    pub const IN_A_TICK: usize = 10_000;
+
     /// A*: the path of least cost.
     pub const OPTIMAL: Effort = Effort { weight: 1.0, bound: 1.0, budget: usize::MAX };
 

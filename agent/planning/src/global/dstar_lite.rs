@@ -34,7 +34,7 @@ use crate::map::VoxelIndex;
 /// grid.cells.set_blocked(cell(2, 1), true);
 /// search.move_to(cell(1, 1));
 /// search.heed(&grid, &[cell(2, 1)]);
-/// assert_eq!(search.plan(&grid, usize::MAX)?.cells.len(), 6);
+/// assert_eq!(search.plan(&grid, usize::MAX)?.cells.len(), 5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
