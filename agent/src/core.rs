@@ -183,6 +183,7 @@ impl AgentCore {
         let roster: Vec<_> =
             config.roster.iter().map(|node| name("roster", node)).collect::<Result<_, _>>()?;
         let own_name = name("node", &config.node)?;
+        let neighbours = Neighbours::new(own_name.clone(), config.incarnation);
         let node_config = NodeConfig {
             lease: config.lease,
             safety: safety_events(&me),
@@ -209,7 +210,7 @@ impl AgentCore {
                 None => NodeLink::new(Node::new(node_config, program), fleet),
             },
             name: own_name,
-            neighbours: Neighbours::default(),
+            neighbours,
             perception: Perception::new(&config.fence, home, heights(&config))?,
             watches: Watches::new(me.clone()),
             failsafes: Failsafes::default(),
@@ -389,6 +390,7 @@ impl AgentCore {
             self.tell_scripts(&motion, neighbours);
         }
         if let Some(state) = self.state(now) {
+            let state = State { echo: self.neighbours.echo(now), ..state };
             self.node.put_state(&state, link);
         }
     }
@@ -523,6 +525,7 @@ impl AgentCore {
                     map: self.perception.map(),
                     obstacles: self.perception.obstacles(),
                     neighbours: &tracks,
+                    rank: self.rank(neighbours),
                 };
                 let set_point = self.guidance.steer(now, &motion, &surroundings);
                 self.set_points.commands += 1;
@@ -537,6 +540,12 @@ impl AgentCore {
             }
             KeepAlive::Silence => self.guidance.rest(),
         }
+    }
+
+    /// How many of the neighbours have names that come before this vehicle's.
+    fn rank(&self, neighbours: &[Neighbour]) -> u32 {
+        let before = neighbours.iter().filter(|neighbour| neighbour.node < self.name);
+        u32::try_from(before.count()).unwrap_or(u32::MAX)
     }
 
     fn motion(&self) -> Option<Motion> {

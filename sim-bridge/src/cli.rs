@@ -109,6 +109,8 @@ pub enum Campaign {
     /// Generated programs on 2 to 10 nodes in memory, in lockstep, under every fault a network and a process can have;
     /// every promise is checked at every step.
     Network(NetworkCampaign),
+    /// Whole swarms in lockstep whose vehicles hear one another late and not always: nobody may touch anything.
+    Separation(SeparationCampaign),
     /// A swarm as processes over Zenoh, in real time, with a fault at a random moment of each flight.
     #[cfg(feature = "zenoh")]
     Processes {
@@ -149,6 +151,32 @@ pub struct NetworkCampaign {
     #[arg(long = "break", value_name = "PROMISE", ignore_case = true,
         value_parser = ["G1", "G2", "G3", "G4", "G5", "G6", "G7", "G8", "G9"])]
     pub breaks: Option<String>,
+}
+
+/// Options of `campaign separation`.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct SeparationCampaign {
+    /// How many seeds of each scenario.
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    pub seeds: u64,
+    /// The first seed.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub from: u64,
+    /// Built-in scenarios.
+    #[arg(long = "scenario", value_name = "NAME", default_values_t = ["antipodal".to_owned(), "forest".to_owned()])]
+    pub scenarios: Vec<String>,
+    /// Size of the swarm.
+    #[arg(long, value_name = "N", default_value_t = 16)]
+    pub vehicles: usize,
+    /// Mean time that a message takes; each takes from half to one and a half of it.
+    #[arg(long, value_name = "MS", default_value_t = 300.0)]
+    pub latency_ms: f64,
+    /// Share of messages that are lost.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.3)]
+    pub loss: f64,
+    /// How many at once; as many as this computer has processors if not given.
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<usize>,
 }
 
 /// Options of `fly`.
@@ -234,6 +262,15 @@ pub enum Bench {
     },
     /// Searches on published maps, beside their published lengths.
     Plan(PlanBench),
+    /// One tick of a vehicle's navigation: map from a scan of 720 rays, local plan, safety filter with 20 neighbours.
+    Nav {
+        /// How many ticks.
+        #[arg(long, value_name = "N", default_value_t = 2000)]
+        ticks: usize,
+        /// What forest and neighbours come from.
+        #[arg(long, value_name = "S", default_value_t = 1)]
+        seed: u64,
+    },
     /// Memory and messages per node as a fleet grows, over the network in memory.
     Fleet {
         /// Sizes of the fleet, the ground station included.

@@ -1,23 +1,36 @@
-//! The processor's time that this thread has used: measures what it does, whoever else runs on this computer.
+//! CPU time used: what a computation costs, whatever else the computer does.
 
 use std::time::Duration;
 
+use anyhow::Context as _;
 use nix::time::{ClockId, clock_gettime};
 
-/// The processor's time that this thread has used since it began.
+/// What this thread has used so far.
 ///
 /// # Errors
-/// The system keeps no such clock.
-pub fn of_this_thread() -> anyhow::Result<Duration> {
-    Ok(clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID)?.into())
+/// What the operating system says.
+pub fn this_thread() -> anyhow::Result<Duration> {
+    read(ClockId::CLOCK_THREAD_CPUTIME_ID)
+}
+
+/// What this process has used so far, in all its threads.
+///
+/// # Errors
+/// What the operating system says.
+pub fn this_process() -> anyhow::Result<Duration> {
+    read(ClockId::CLOCK_PROCESS_CPUTIME_ID)
 }
 
 /// Does something, and tells how many milliseconds of this thread's time it took.
 ///
 /// # Errors
-/// As [`of_this_thread`].
-pub fn measured<T>(work: impl FnOnce() -> T) -> anyhow::Result<(T, f64)> {
-    let since = of_this_thread()?;
+/// What the operating system says.
+pub fn measured_ms<T>(work: impl FnOnce() -> T) -> anyhow::Result<(T, f64)> {
+    let since = this_thread()?;
     let done = work();
-    Ok((done, (of_this_thread()? - since).as_secs_f64() * 1000.0))
+    Ok((done, (this_thread()? - since).as_secs_f64() * 1000.0))
+}
+
+fn read(clock: ClockId) -> anyhow::Result<Duration> {
+    Ok(clock_gettime(clock).context("the CPU time cannot be read")?.into())
 }

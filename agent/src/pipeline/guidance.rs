@@ -10,7 +10,6 @@ use skein_planning::{
     global::{
         Potential, PotentialObstacle,
         astar::{self, Astar, AstarConfig, Disc, PlanError, Request},
-        simplify,
     },
     local::{
         apf::{self, ApfConfig},
@@ -23,6 +22,7 @@ use skein_planning::{
 };
 use skein_wire::vocabulary::{ARRIVED, LEAVE, PASSAGE, PATH_BLOCKED, PLANNED, STUCK, UNPLANNABLE};
 
+use super::evasion::{Evasion, Room, Way};
 use crate::{
     config::{Envelope, Fence},
     me::Me,
@@ -66,6 +66,9 @@ const GIVES_WAY_M: f64 = 1.0;
 const ROOM_AHEAD_M: f64 = 1.5;
 /// Speed at which a hovering vehicle goes back to its place, at most, m/s.
 const STATION_KEEPING_M_S: f64 = 0.5;
+
+/// A vehicle that is hemmed in leaves its height where it has this much room, m.
+const EVASION_M: f64 = 1.0;
 
 /// How the vehicle moves. World ENU.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -158,6 +161,7 @@ pub struct Guidance {
     braking: BrakingConfig,
     filter: FilterConfig,
     escape: EscapeDetector,
+    evasion: Evasion,
     routes: RouteSearch,
     /// What the search for a path may still do in this tick.
     allowance: usize,
@@ -193,6 +197,7 @@ impl Guidance {
                 ..FilterConfig::default()
             },
             escape: EscapeDetector::new(EscapeConfig::default()),
+            evasion: Evasion::default(),
             routes: RouteSearch::default(),
             allowance: ALLOWANCE,
         }
@@ -450,7 +455,17 @@ impl Guidance {
         };
         let obstacles: Vec<_> =
             surroundings.obstacles.iter().copied().chain(self.fence_ahead(motion.position)).collect();
-        let safe = filter(&request, surroundings.neighbours, &obstacles, &self.filter).velocity;
+        let filtered = filter(&request, surroundings.neighbours, &obstacles, &self.filter);
+        let clearance_m = self.filter.obstacle_clearance_m;
+        let room = || room(motion.position, surroundings.map, clearance_m);
+        if let Some(way) = self.evasion.decide(now, &filtered.outcome, surroundings.rank, room) {
+            let mut desired = filtered.velocity;
+            desired.z = way.sign() * self.envelope.climb_m_s;
+            let request = separation::Motion { desired, planar: false, ..request };
+            let velocity = filter(&request, surroundings.neighbours, &obstacles, &self.filter).velocity;
+            return SetPoint::Velocity { velocity, yaw: None };
+        }
+        let safe = filtered.velocity;
         if is_level {
             SetPoint::Planar { vx: safe.x, vy: safe.y, z: wish.height_m, yaw: None }
         } else {
@@ -512,6 +527,15 @@ impl Guidance {
     }
 }
 
+/// Whether a vehicle can leave its height, as far as the map reaches and tells.
+fn room(position: Vector3<f64>, map: &ClearanceMap, clearance_m: f64) -> Room {
+    let leads_free = |way: Way| {
+        let there = position + Vector3::z() * (way.sign() * EVASION_M);
+        map.voxels().index_of(&there).is_some() && map.is_segment_clear(&position, &there, clearance_m)
+    };
+    Room { up: leads_free(Way::Up), down: leads_free(Way::Down) }
+}
+
 /// The velocity wanted before others are considered (ENU, m/s), and the height it leads to (m).
 #[derive(Clone, Copy, Debug)]
 struct Wish {
@@ -528,4 +552,6 @@ pub struct Surroundings<'a> {
     pub obstacles: &'a [Vector3<f64>],
     /// The other vehicles in the air.
     pub neighbours: &'a [separation::Neighbour],
+    /// How many of them, and of those on the ground, have names that come before this vehicle's.
+    pub rank: u32,
 }

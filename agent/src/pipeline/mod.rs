@@ -3,6 +3,7 @@
 //! scan and pose -> [`perception`] -> map -> [`route_search`] -> [`guidance`] (velocity, repulsion, safety filter) ->
 //! [`set_point`] rule -> set-point.
 
+pub mod evasion;
 pub mod guidance;
 pub mod perception;
 pub mod route_search;

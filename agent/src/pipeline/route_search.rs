@@ -6,7 +6,7 @@ use skein_planning::{
     global::{
         Potential,
         astar::{Astar, AstarConfig, Disc, PlanError, Request},
-        simplify,
+        simplify_around,
     },
     map::{ClearanceMap, VoxelIndex},
 };
@@ -118,7 +118,10 @@ impl RouteSearch {
                     return None;
                 }
                 Some(Ok(plan)) => {
-                    break Ok(Found { path: simplify(map, &plan.path, clearance_m), clearance_m });
+                    break Ok(Found {
+                        path: simplify_around(map, &plan.path, clearance_m, discs),
+                        clearance_m,
+                    });
                 }
                 // Far away: begin with the part of the way that leads nearest to the goal.
                 Some(Err(PlanError::BudgetExhausted { partial, .. })) if config.planar_band_m > 0.0 => {

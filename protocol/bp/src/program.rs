@@ -207,6 +207,19 @@ impl Program {
         removed.is_some()
     }
 
+    /// Takes back what a b-thread requests at its present synchronisation point: there it waits for the same events, should
+    /// others request them.
+    pub fn withdraw_requests(&mut self, name: &str) {
+        let Some(place) = self.board.bthread(name) else { return };
+        let Some(entry) = self.board.get(place) else { return };
+        let (bid, sync) = (entry.bid.only_waiting(), entry.sync);
+        self.restate(place, bid);
+        if let Some(entry) = self.board.get_mut(place) {
+            entry.sync = sync;
+        }
+        self.revision += 1;
+    }
+
     /// Says whether the program stays when it has nothing to do; see [`Program::is_daemon`].
     pub fn set_daemon(&mut self, daemon: bool) {
         self.daemon = daemon;

@@ -105,7 +105,7 @@ fn measure(args: &PlanBench, grid: &Grid, problems: &[Problem]) -> anyhow::Resul
     let (mut proven, mut unproven) = (Vec::new(), Vec::new());
     for problem in problems {
         let (found, took_ms) =
-            cpu_time::measured(|| solve(args.planner, grid, problem, effort, &mut search))?;
+            cpu_time::measured_ms(|| solve(args.planner, grid, problem, effort, &mut search))?;
         ms.push(took_ms);
         expanded.push(match &found {
             Ok(route) => route.expanded,

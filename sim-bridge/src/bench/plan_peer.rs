@@ -93,8 +93,8 @@ fn both(
     goal: VoxelIndex,
     search: &mut Search,
 ) -> anyhow::Result<Option<[f64; 2]>> {
-    let (ours, our_ms) = cpu_time::measured(|| search.solve(grid, start, goal, Effort::OPTIMAL))?;
-    let (theirs, their_ms) = cpu_time::measured(|| peer(grid, start, goal))?;
+    let (ours, our_ms) = cpu_time::measured_ms(|| search.solve(grid, start, goal, Effort::OPTIMAL))?;
+    let (theirs, their_ms) = cpu_time::measured_ms(|| peer(grid, start, goal))?;
     match (ours, theirs) {
         (Ok(ours), Some(theirs)) => {
             let apart = (ours.cost - theirs).abs();

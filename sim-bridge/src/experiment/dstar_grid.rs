@@ -208,7 +208,7 @@ impl Flight {
         self.goal = goal;
         self.grid.cells.set_blocked(goal, false);
         self.incremental = DStarLite::new(&self.grid, self.at, goal);
-        let (_, ms) = cpu_time::measured(|| self.incremental.plan(&self.grid, usize::MAX))?;
+        let (_, ms) = cpu_time::measured_ms(|| self.incremental.plan(&self.grid, usize::MAX))?;
         self.times.first.push(ms);
         Ok(())
     }
@@ -220,12 +220,12 @@ impl Flight {
     /// Changes the map, plans again by both, compares, and moves on.
     fn step(&mut self, number: usize, route: &mut Vec<VoxelIndex>) -> anyhow::Result<()> {
         let changed = self.change(route);
-        let (again, again_ms) = cpu_time::measured(|| {
+        let (again, again_ms) = cpu_time::measured_ms(|| {
             self.incremental.move_to(self.at);
             self.incremental.heed(&self.grid, &changed);
             self.incremental.plan(&self.grid, usize::MAX)
         })?;
-        let (fresh, fresh_ms) = cpu_time::measured(|| self.fresh())?;
+        let (fresh, fresh_ms) = cpu_time::measured_ms(|| self.fresh())?;
         self.times.again.push(again_ms);
         self.times.fresh.push(fresh_ms);
         match (again, fresh) {

@@ -236,7 +236,8 @@ fn keep_own(selections: &mut Vec<Happened>, node: &NodeName) {
 }
 
 /// What the agent gets of a scan: all but the true pose, which it never learns.
-fn scan_for_agent(scan: &LidarScan) -> Scan {
+/// A scan of the world as a vehicle takes it in.
+pub(crate) fn scan_for_agent(scan: &LidarScan) -> Scan {
     Scan {
         stamp: scan.stamp,
         angle_min: scan.angle_min,

@@ -10,4 +10,4 @@ mod simplify;
 pub use anytime::{Effort, Route, Search, Unsolved, cost_of};
 pub use dstar_lite::DStarLite;
 pub use potential::{Potential, PotentialObstacle, is_in_field};
-pub use simplify::{elide_collinear, simplify};
+pub use simplify::{elide_collinear, simplify, simplify_around};

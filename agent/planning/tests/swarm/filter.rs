@@ -1,6 +1,8 @@
 //! The safety filter's answers, one velocity at a time.
 
 use nalgebra::Vector3;
+use proptest::prelude::*;
+use skein_planning::local::apf::limited;
 use skein_planning::separation::{FilterConfig, Motion, Neighbour, Outcome, filter};
 
 fn hovering(desired: Vector3<f64>) -> Motion {
@@ -108,4 +110,68 @@ fn nonsense_in_is_standstill_out() {
     assert_eq!((lost.velocity, lost.outcome), (Vector3::zeros(), Outcome::Unsound));
     let odd_point = filter(&hovering(Vector3::x()), &[], &[Vector3::new(f64::NAN, 0.0, 0.0)], &config);
     assert_eq!(odd_point.outcome, Outcome::Clear, "a lidar ray without return is no obstacle");
+}
+
+/// Where a vehicle is that flies on for the latency and then brakes along its own velocity.
+fn braking(
+    start: &Vector3<f64>,
+    velocity: &Vector3<f64>,
+    after_s: f64,
+    config: &FilterConfig,
+) -> Vector3<f64> {
+    let (a, speed) = (config.decel_m_s2, velocity.norm());
+    let brakes_s = (after_s - config.latency_s).clamp(0.0, speed / a);
+    let straight_s = after_s.min(config.latency_s);
+    let braked = if speed > 0.0 { brakes_s - a * brakes_s * brakes_s / (2.0 * speed) } else { 0.0 };
+    start + velocity * (straight_s + braked)
+}
+
+proptest! {
+    #[test]
+    fn whatever_the_filter_lets_through_all_can_brake_at_once_and_keep_their_distance(
+        places in prop::collection::vec(prop::array::uniform3(-2.5..2.5_f64), 2..5),
+        velocities in prop::collection::vec(prop::array::uniform3(-2.0..2.0_f64), 4),
+        wanted in prop::collection::vec(prop::array::uniform3(-3.0..3.0_f64), 4),
+    ) {
+        let config = FilterConfig { vertical_stretch: 1.0, latency_s: 0.3, ..FilterConfig::default() };
+        let places: Vec<Vector3<f64>> = places.into_iter().map(Vector3::from).collect();
+        let others = |at: usize, velocities: &[Vector3<f64>]| -> Vec<Neighbour> {
+            let all = places.iter().zip(velocities).enumerate();
+            let neighbour = |(_, (position, velocity)): (usize, (&Vector3<f64>, &Vector3<f64>))| Neighbour {
+                sigma_m: 0.0, position: *position, velocity: *velocity, ..neighbour([0.0; 3], 0.0)
+            };
+            all.filter(|(other, _)| *other != at).map(neighbour).collect()
+        };
+        let step = |velocities: &[Vector3<f64>], desired: &[Vector3<f64>]| -> Vec<_> {
+            let motion = |at: usize| Motion {
+                position: places[at], velocity: velocities[at], sigma_m: 0.0, desired: desired[at], planar: false,
+            };
+            (0..places.len()).map(|at| filter(&motion(at), &others(at, velocities), &[], &config)).collect()
+        };
+        let mut now: Vec<Vector3<f64>> = velocities.into_iter().map(Vector3::from).take(places.len()).collect();
+        let apart = |other: &Vector3<f64>, one: &Vector3<f64>| (other - one).norm() >= config.separation_m;
+        prop_assume!(places.iter().enumerate().all(|(at, one)| places[..at].iter().all(|other| apart(other, one))));
+        // Vehicles that have followed the filter: as fast as it lets them be.
+        for _ in 0..40 {
+            let slower: Vec<_> = step(&now, &now).iter().zip(&now).map(|(let_through, velocity)| {
+                if let_through.outcome == Outcome::Clear { *velocity } else { velocity * 0.8 }
+            }).collect();
+            now = slower;
+        }
+        prop_assume!(step(&now, &now).iter().all(|let_through| let_through.outcome == Outcome::Clear));
+
+        let wanted: Vec<Vector3<f64>> = wanted.into_iter().map(Vector3::from).collect();
+        let change = config.decel_m_s2 * config.latency_s;
+        let next: Vec<_> = step(&now, &wanted).iter().zip(&now)
+            .map(|(let_through, velocity)| velocity + limited(let_through.velocity - velocity, change)).collect();
+        for tick in 0..120 {
+            let at_s = 0.02 * f64::from(tick);
+            let there: Vec<_> = (0..places.len()).map(|at| braking(&places[at], &next[at], at_s, &config)).collect();
+            for (at, one) in there.iter().enumerate() {
+                for other in &there[..at] {
+                    prop_assert!((one - other).norm() >= config.separation_m - 1e-6, "{} m after {at_s} s", (one - other).norm());
+                }
+            }
+        }
+    }
 }
