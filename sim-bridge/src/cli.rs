@@ -260,6 +260,8 @@ pub enum Bench {
         #[arg(long, value_name = "N", default_value_t = 12)]
         philosophers: usize,
     },
+    /// Searches on published maps, beside their published lengths.
+    Plan(PlanBench),
     /// One tick of a vehicle's navigation: map from a scan of 720 rays, local plan, safety filter with 20 neighbours.
     Nav {
         /// How many ticks.
@@ -330,6 +332,58 @@ pub enum Bench {
         #[arg(long, value_name = "N", default_value_t = 2000)]
         port_offset: u16,
     },
+}
+
+/// Options of `bench plan`.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct PlanBench {
+    /// A map of the Moving AI lab's (.map), or a voxel map (.3dmap).
+    #[arg(long, value_name = "FILE", requires = "scen", required_unless_present = "peers")]
+    pub map: Option<PathBuf>,
+    /// Its problems, with their optimal lengths (.scen, .3dscen).
+    #[arg(long, value_name = "FILE", requires = "map")]
+    pub scen: Option<PathBuf>,
+    /// Which search.
+    #[arg(long, value_enum, default_value_t = Planner::Astar)]
+    pub planner: Planner,
+    /// Only the first so many problems.
+    #[arg(long, value_name = "N")]
+    pub limit: Option<usize>,
+    /// How many times the least a way of `weighted` or `budgeted` may cost.
+    #[arg(long, value_name = "X", default_value_t = 1.05, value_parser = at_least_one)]
+    pub bound: f64,
+    /// Most cells to expand for a problem; without end if not given, but for `budgeted`.
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
+    pub budget: Option<usize>,
+    /// Beside the `pathfinding` crate instead, on random grids and on the map if one is given (cargo feature `peers`).
+    #[arg(long)]
+    pub peers: bool,
+}
+
+/// Searches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Planner {
+    /// A*: the shortest way.
+    Astar,
+    /// Weighted A*: a way within the bound.
+    Weighted,
+    /// Anytime repairing A*: better ways until one is within the bound or the budget is spent.
+    Budgeted,
+    /// D* Lite: the shortest way, from scratch.
+    DstarLite,
+}
+
+impl Planner {
+    /// Its name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Astar => "astar",
+            Self::Weighted => "weighted",
+            Self::Budgeted => "budgeted",
+            Self::DstarLite => "dstar-lite",
+        }
+    }
 }
 
 /// Options of `serve`.
@@ -408,6 +462,13 @@ fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
         _ => Err("expected a number above 0".to_owned()),
+    }
+}
+
+fn at_least_one(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number >= 1.0 => Ok(number),
+        _ => Err("expected a number, 1 or more".to_owned()),
     }
 }
 

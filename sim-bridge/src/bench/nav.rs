@@ -149,7 +149,11 @@ impl<'a> Flight<'a> {
 
     fn plan(&mut self, times: &mut Times) -> anyhow::Result<()> {
         let since = cpu_time::this_thread()?;
-        self.guidance.plan("waypoint", &self.motion, self.perception.map_mut(), &[]);
+        let map = self.perception.map_mut();
+        let mut report = self.guidance.plan("waypoint", &self.motion, map, &[]);
+        while report.is_none() {
+            report = self.guidance.go_on_planning(map);
+        }
         times.plan.push(ms_since(since)?);
         Ok(())
     }

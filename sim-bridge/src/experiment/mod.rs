@@ -2,6 +2,7 @@
 //!
 //! An experiment is a file here, named in [`EXPERIMENTS`].
 
+mod dstar_grid;
 mod figure;
 mod report;
 mod sphere;
@@ -24,11 +25,18 @@ pub struct Experiment {
 }
 
 /// Every experiment.
-pub const EXPERIMENTS: &[Experiment] = &[Experiment {
-    name: "sphere",
-    about: "a hundred vehicles through the middle of a sphere, beside ORCA",
-    run: sphere::run,
-}];
+pub const EXPERIMENTS: &[Experiment] = &[
+    Experiment {
+        name: "sphere",
+        about: "a hundred vehicles through the middle of a sphere, beside ORCA",
+        run: sphere::run,
+    },
+    Experiment {
+        name: "dstar-grid",
+        about: "D* with a collision factor on the marker grid, and re-planning by D* Lite (Zhang 2019)",
+        run: dstar_grid::run,
+    },
+];
 
 /// What the command line says to an experiment. What is not given is the experiment's own.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -1,9 +1,7 @@
 //! A*, weighted A*, and the search that is best when it is stopped: anytime repairing A* (Likhachev, Gordon and Thrun
 //! 2003), of which the other two are special cases.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
-
+use super::open_list::{Open, OpenList};
 use crate::grid::{Bricks, Lattice, MOVES, Packed, moved, octile};
 use crate::map::VoxelIndex;
 
@@ -20,6 +18,9 @@ pub struct Effort {
 }
 
 impl Effort {
+    /// A budget that takes a few milliseconds with 26 neighbours, and less than ten on slow or busy processors.
+    pub const IN_A_TICK: usize = 10_000;
+
     /// A*: the path of least cost.
     pub const OPTIMAL: Effort = Effort { weight: 1.0, bound: 1.0, budget: usize::MAX };
 
@@ -77,7 +78,7 @@ pub enum Unsolved {
 /// A search over a [`Lattice`], and the memory that searches reuse, so that the next one allocates little and clears
 /// nothing.
 ///
-/// With weight 1 this is A*: cells are expanded by least `f = g + h`, `h` being the octile distance, which is consistent, so
+/// With weight 1 this is A*: cells are expanded by least `f = g + h`, of equal ones by greatest `g`, `h` being the octile distance, which is consistent, so
 /// that no cell is expanded twice and the first path found is the best. With a greater weight `f = g + w h`; a path so found
 /// costs at most `w` times the least (Pohl 1970). Between rounds the weight falls, what was found is kept, and only cells
 /// whose cost has improved since they were expanded are expanded again. The bound told is the lesser of the weight and the
@@ -92,7 +93,7 @@ pub struct Search {
     generation: u32,
     /// Number of the round within the search: rounds differ by weight.
     round: u8,
-    open: BinaryHeap<Open>,
+    open: OpenList,
     /// Cells whose cost improved after they were expanded in this round.
     inconsistent: Vec<VoxelIndex>,
     least_costs: [f64; 3],
@@ -124,37 +125,6 @@ const ROOT: u8 = u8::MAX;
 /// The excess weight is beneath rounding after fewer.
 const LAST_ROUND: u8 = 60;
 
-/// An entry of the open list: least `f` first, then greatest `g`, then lowest cell, so that ties have one answer.
-#[derive(Clone, Copy, Debug)]
-struct Open {
-    f: f64,
-    g: f64,
-    cell: Packed,
-}
-
-impl Ord for Open {
-    #[inline]
-    fn cmp(&self, other: &Self) -> Ordering {
-        let by_f = other.f.total_cmp(&self.f);
-        by_f.then_with(|| self.g.total_cmp(&other.g)).then_with(|| other.cell.cmp(&self.cell))
-    }
-}
-
-impl PartialOrd for Open {
-    #[inline]
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Open {}
-
 impl Default for Search {
     fn default() -> Self {
         let origin = VoxelIndex::default();
@@ -162,7 +132,7 @@ impl Default for Search {
             nodes: Bricks::default(),
             generation: 0,
             round: 1,
-            open: BinaryHeap::new(),
+            open: OpenList::default(),
             inconsistent: Vec::new(),
             least_costs: [1.0; 3],
             start: origin,
@@ -212,7 +182,6 @@ impl Search {
 
     /// Begins a search, in place of any before. [`Search::advance`] does the work.
     pub fn begin(&mut self, lattice: &impl Lattice, start: VoxelIndex, goal: VoxelIndex, effort: Effort) {
-        self.open.clear();
         self.inconsistent.clear();
         self.least_costs = lattice.least_costs();
         self.nodes.fit(lattice.size());
@@ -230,7 +199,8 @@ impl Search {
         self.nearest = (start, h);
         *self.nodes.slot(start) =
             Node { g: 0.0, generation: self.generation, arrived_by: ROOT, closed_in: 0 };
-        self.open.push(Open { f: self.weight * h, g: 0.0, cell: Packed::of(start) });
+        self.open.reset(self.weight * h, self.least_costs[0]);
+        self.open.push(Open { key: self.weight * h, tie: 0.0, cell: Packed::of(start) });
     }
 
     /// Goes on with a search, for at most `expansions` cells. `None` if there is no answer yet.
@@ -269,12 +239,12 @@ impl Search {
     /// Expands cells until no open one promises a better path at this weight, or `limit` cells have been expanded in all.
     /// Whether the former came first.
     fn improve(&mut self, lattice: &impl Lattice, limit: usize) -> bool {
-        while let Some(next) = self.open.peek().copied() {
-            if self.goal_g <= next.f {
+        while let Some(next) = self.open.peek() {
+            if self.goal_g <= next.key {
                 return true;
             }
             let node = self.nodes.slot(next.cell.unpacked());
-            if node.closed_in == self.round || next.g > node.g {
+            if node.closed_in == self.round || -next.tie > node.g {
                 self.open.pop();
                 continue;
             }
@@ -293,7 +263,7 @@ impl Search {
         let here = next.cell.unpacked();
         lattice.steps_from(here, |number, cost| {
             let there = moved(here, MOVES[number].by);
-            let g = next.g + cost;
+            let g = cost - next.tie;
             let node = self.nodes.slot(there);
             if node.generation != self.generation {
                 *node =
@@ -309,7 +279,7 @@ impl Search {
                 return;
             }
             let h = octile(there, self.goal, self.least_costs);
-            self.open.push(Open { f: g + self.weight * h, g, cell: Packed::of(there) });
+            self.open.push(Open { key: g + self.weight * h, tie: -g, cell: Packed::of(there) });
             if h < self.nearest.1 {
                 self.nearest = (there, h);
             }
@@ -335,12 +305,12 @@ impl Search {
     fn tighten(&mut self) {
         let weight = 1.0 + (self.weight - 1.0) * TIGHTENED;
         self.weight = weight.max(self.effort.bound.max(1.0)).min(self.bound);
-        let weight = self.weight;
-        let open = self
-            .unfinished()
-            .map(|(cell, g, h)| Open { f: g + weight * h, g, cell: Packed::of(cell) })
-            .collect();
-        self.open = open;
+        let unfinished: Vec<_> = self.unfinished().collect();
+        let keys = unfinished.iter().map(|(_, g, h)| g + self.weight * h);
+        self.open.reset(keys.fold(f64::INFINITY, f64::min), self.least_costs[0]);
+        for (cell, g, h) in unfinished {
+            self.open.push(Open { key: g + self.weight * h, tie: -g, cell: Packed::of(cell) });
+        }
         self.inconsistent.clear();
         self.round += 1;
     }
@@ -349,7 +319,7 @@ impl Search {
     fn unfinished(&self) -> impl Iterator<Item = (VoxelIndex, f64, f64)> + '_ {
         let open = self.open.iter().filter(|entry| {
             let node = self.nodes.get(entry.cell.unpacked());
-            node.closed_in != self.round && entry.g == node.g
+            node.closed_in != self.round && -entry.tie == node.g
         });
         let cells = open.map(|entry| entry.cell.unpacked()).chain(self.inconsistent.iter().copied());
         cells.map(|cell| (cell, self.nodes.get(cell).g, self.heuristic(cell)))

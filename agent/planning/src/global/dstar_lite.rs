@@ -1,8 +1,6 @@
 //! D* Lite (Koenig and Likhachev 2002): the shortest way again, cheaply, after the grid has changed or the vehicle moved.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
-
+use super::open_list::{Open, OpenList};
 use super::{Route, Unsolved};
 use crate::grid::{Bricks, Lattice, MOVES, Packed, moved, octile};
 use crate::map::VoxelIndex;
@@ -34,13 +32,14 @@ use crate::map::VoxelIndex;
 /// grid.cells.set_blocked(cell(2, 1), true);
 /// search.move_to(cell(1, 1));
 /// search.heed(&grid, &[cell(2, 1)]);
-/// assert_eq!(search.plan(&grid, usize::MAX)?.cells.len(), 6);
+/// assert_eq!(search.plan(&grid, usize::MAX)?.cells.len(), 5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct DStarLite {
     nodes: Bricks<Node>,
-    open: BinaryHeap<Open>,
+    /// A tie is the key's second part, `min(g, rhs)`: if that has changed, the entry is outdated.
+    open: OpenList,
     /// Entries that the open list may have before outdated ones are looked for.
     most_open: usize,
     size: [usize; 3],
@@ -74,38 +73,6 @@ impl Node {
     }
 }
 
-/// An entry of the open list: least key first, then lowest cell.
-#[derive(Clone, Copy, Debug)]
-struct Open {
-    key: f64,
-    /// The key's second part, `min(g, rhs)`: if that has changed, the entry is outdated.
-    least: f64,
-    cell: Packed,
-}
-
-impl Ord for Open {
-    #[inline]
-    fn cmp(&self, other: &Self) -> Ordering {
-        let by_key = other.key.total_cmp(&self.key);
-        by_key.then_with(|| other.least.total_cmp(&self.least)).then_with(|| other.cell.cmp(&self.cell))
-    }
-}
-
-impl PartialOrd for Open {
-    #[inline]
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Open {}
-
 /// Sums that differ by less than this share are the same but for rounding.
 const ROUNDING: f64 = 1e-10;
 /// Outdated entries are looked for when the open list is longer than this, and than twice what was left the last time.
@@ -117,7 +84,7 @@ impl DStarLite {
     pub fn new(lattice: &impl Lattice, start: VoxelIndex, goal: VoxelIndex) -> DStarLite {
         let mut search = DStarLite {
             nodes: Bricks::default(),
-            open: BinaryHeap::new(),
+            open: OpenList::default(),
             most_open: OPEN_AT_LEAST,
             size: lattice.size(),
             least_costs: lattice.least_costs(),
@@ -128,6 +95,7 @@ impl DStarLite {
         };
         search.nodes.fit(search.size);
         search.nodes.slot(goal).rhs = 0.0;
+        search.open.reset(search.key(goal), search.least_costs[0]);
         search.push(goal);
         search
     }
@@ -186,16 +154,16 @@ impl DStarLite {
     }
 
     /// The first entry of the open list, if it may matter to the way from the start.
-    fn next(&self) -> Option<Open> {
+    fn next(&mut self) -> Option<Open> {
         let reached = self.nodes.get(self.start).least() + self.km;
-        self.open.peek().copied().filter(|next| next.key <= reached + ROUNDING * (1.0 + reached))
+        self.open.peek().filter(|next| next.key <= reached + ROUNDING * (1.0 + reached))
     }
 
     /// Takes an entry of the open list; whether its cell was expanded.
     fn settle(&mut self, lattice: &impl Lattice, next: Open) -> bool {
         let cell = next.cell.unpacked();
         let node = self.nodes.get(cell);
-        if node.is_consistent() || node.least() != next.least {
+        if node.is_consistent() || node.least() != next.tie {
             return false;
         }
         let key = self.key(cell);
@@ -257,7 +225,7 @@ impl DStarLite {
     fn push(&mut self, cell: VoxelIndex) {
         let node = self.nodes.get(cell);
         if !node.is_consistent() {
-            self.open.push(Open { key: self.key(cell), least: node.least(), cell: Packed::of(cell) });
+            self.open.push(Open { key: self.key(cell), tie: node.least(), cell: Packed::of(cell) });
         }
     }
 
@@ -270,9 +238,10 @@ impl DStarLite {
         if self.open.len() <= self.most_open {
             return;
         }
-        let mut cells: Vec<Packed> = self.open.drain().map(|entry| entry.cell).collect();
+        let mut cells: Vec<Packed> = self.open.iter().map(|entry| entry.cell).collect();
         cells.sort_unstable();
         cells.dedup();
+        self.open.reset(self.key(self.goal).min(self.key(self.start)), self.least_costs[0]);
         cells.into_iter().for_each(|cell| self.push(cell.unpacked()));
         self.most_open = OPEN_AT_LEAST.max(2 * self.open.len());
     }

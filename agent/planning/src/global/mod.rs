@@ -3,6 +3,7 @@
 mod anytime;
 pub mod astar;
 mod dstar_lite;
+mod open_list;
 mod potential;
 mod simplify;
 

@@ -7,6 +7,9 @@ use crate::map::VoxelIndex;
 const DEEP: [u32; 3] = [3, 3, 3];
 /// The same for a grid of one layer.
 const FLAT: [u32; 3] = [5, 5, 0];
+/// Memory kept from one search to the next, at most, in bytes: searches of a huge map that each look elsewhere would in the
+/// end fill memory with all of it.
+const KEPT: usize = 128 << 20;
 
 /// A value for each cell of a grid that takes memory only near those that were written to: a search of a map of many
 /// millions of cells looks at few of them.
@@ -17,11 +20,17 @@ pub(crate) struct Bricks<T> {
     /// Bricks along x and y.
     count: [usize; 2],
     bricks: Vec<Box<[T]>>,
+    /// Values in the bricks that were made.
+    made: usize,
 }
 
 impl<T: Copy + Default> Bricks<T> {
-    /// Fits it to a grid of so many cells along x, y and z. What was there is kept if the size is the same, else lost.
+    /// Fits it to a grid of so many cells along x, y and z. What was there is lost, unless the size is the same and it takes
+    /// little memory.
     pub fn fit(&mut self, size: [usize; 3]) {
+        if self.made * size_of::<T>() > KEPT {
+            self.clear();
+        }
         if self.size == size {
             return;
         }
@@ -29,12 +38,14 @@ impl<T: Copy + Default> Bricks<T> {
         self.bits = if size[2] == 1 { FLAT } else { DEEP };
         let count = [0, 1, 2].map(|axis: usize| size[axis].div_ceil(1 << self.bits[axis]));
         self.count = [count[0], count[1]];
+        self.made = 0;
         self.bricks.clear();
         self.bricks.resize_with(count.iter().product(), Box::default);
     }
 
     /// Forgets all values, and frees their memory.
     pub fn clear(&mut self) {
+        self.made = 0;
         self.bricks.fill_with(Box::default);
     }
 
@@ -52,6 +63,7 @@ impl<T: Copy + Default> Bricks<T> {
         let brick = &mut self.bricks[brick];
         if brick.is_empty() {
             *brick = vec![T::default(); 1 << self.bits.iter().sum::<u32>()].into_boxed_slice();
+            self.made += brick.len();
         }
         &mut brick[place]
     }
@@ -88,6 +100,19 @@ mod tests {
             bricks.clear();
             assert!(all().all(|(_, cell)| bricks.get(cell) == 0));
         }
+    }
+
+    #[test]
+    fn much_memory_is_not_kept_for_the_next_search() {
+        let mut bricks = Bricks::<[u64; 64]>::default();
+        bricks.fit([500, 500, 1]);
+        let all = || (0..250_000).map(|n| cell(n % 500, n / 500, 0));
+        all().take(10_000).for_each(|cell| bricks.slot(cell)[0] = 1);
+        bricks.fit([500, 500, 1]);
+        assert_eq!(bricks.get(cell(1, 0, 0))[0], 1);
+        all().for_each(|cell| bricks.slot(cell)[0] = 1);
+        bricks.fit([500, 500, 1]);
+        assert_eq!((bricks.get(cell(1, 0, 0))[0], bricks.made), (0, 0));
     }
 
     #[test]
