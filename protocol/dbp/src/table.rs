@@ -245,9 +245,11 @@ impl BidTable {
         bidder.lifted.retain(|bthread, _| taken.contains_key(bthread));
         for (bthread, orphan) in bidder.bids.iter().filter(|(_, bid)| bid.orphaned) {
             let heir = taken.entry(bthread.clone()).or_insert_with(|| orphan.clone());
-            // The b-thread's new life takes the block over if it states all of it, and then may withdraw it.
-            if !(heir.keep && orphan.block.is_within(&heir.block)) {
-                heir.block = std::mem::take(&mut heir.block).or(orphan.block.clone());
+            // The b-thread's new life takes the block over if it states all of it, and then may withdraw it. What this home
+            // honours of the two may differ, when it has become the coordinator between them, or is it no more.
+            if !(heir.keep && orphan.asked_block.is_within(&heir.asked_block)) {
+                heir.block = joined(&heir.block, &orphan.block);
+                heir.asked_block = joined(&heir.asked_block, &orphan.asked_block);
                 heir.keep = true;
                 heir.orphaned = true;
             }
@@ -544,6 +546,11 @@ impl TakenBid {
             None => bid,
         }
     }
+}
+
+/// The events of both sets; no larger a tree each time that the same ones are joined.
+fn joined(more: &EventSet, set: &EventSet) -> EventSet {
+    if more.is_within(set) { set.clone() } else { more.clone().or(set.clone()) }
 }
 
 /// What of these bids must outlive this home's life.

@@ -111,23 +111,25 @@ fn a_new_life_that_does_not_state_it_does_not_end_it_but_an_authority_does() {
 }
 
 #[test]
-fn a_new_life_withdraws_it_also_from_a_home_that_has_become_the_coordinator_meanwhile() {
-    let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
-    let mut home = program(1);
-    home.add("steps", Requester::new("uav/1/step", i64::MAX, TICK));
-    let joint = Some(Roster::first(name("ground/spare"), [name("uav/1")]));
-    let config = NodeConfig { durable: true, joint, ..swarm.config("uav/1", 1) };
-    swarm.start_with(config, home);
-    start_holder(&mut swarm, 1, Bid::new().hold_when_lost(), NEVER);
-    swarm.run(2 * LEASE);
-    swarm.crash("ground/main");
-    let lead = Roster { term: 2, ..Roster::first(name("uav/1"), []) };
-    swarm.node("uav/1").enqueue(lead.order(&name("uav/1")));
-    swarm.run(LEASE);
-    let until = swarm.now + 2 * LEASE;
-    start_holder(&mut swarm, 2, Bid::new().hold_when_lost(), until);
-    swarm.run(4 * LEASE);
-    assert!(steps_since(&swarm, until) > 0, "it was withdrawn in vain");
+fn a_new_life_withdraws_it_whether_the_home_has_become_the_coordinator_meanwhile_or_is_it_no_more() {
+    for (first, second) in [("ground/spare", "uav/1"), ("uav/1", "ground/spare")] {
+        let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
+        let mut home = program(1);
+        home.add("steps", Requester::new("uav/1/step", i64::MAX, TICK));
+        let led_by = |coordinator: &str| Roster::first(name(coordinator), [name("uav/1")]);
+        let config = NodeConfig { durable: true, joint: Some(led_by(first)), ..swarm.config("uav/1", 1) };
+        swarm.start_with(config, home);
+        start_holder(&mut swarm, 1, Bid::new().hold_when_lost(), NEVER);
+        swarm.run(2 * LEASE);
+        swarm.crash("ground/main");
+        let order = Roster { term: 2, ..led_by(second) }.order(&name("uav/1"));
+        swarm.node("uav/1").enqueue(order);
+        swarm.run(LEASE);
+        let until = swarm.now + 2 * LEASE;
+        start_holder(&mut swarm, 2, Bid::new().hold_when_lost(), until);
+        swarm.run(4 * LEASE);
+        assert!(steps_since(&swarm, until) > 0, "it was withdrawn in vain from {second}'s member");
+    }
 }
 
 #[test]
