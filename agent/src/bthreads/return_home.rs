@@ -33,7 +33,7 @@ enum Phase {
     Landing {
         why: String,
     },
-    /// On the way down, from which no way leads home any more.
+    /// On the way down, from which no way leads home any more, but for who takes off again.
     Down,
 }
 
@@ -59,7 +59,7 @@ impl BThread for ReturnHome {
             Phase::Turning { .. } => bid.request(self.home.clone()).wait_for(over),
             Phase::Returning { .. } => bid.wait_for(me.any(ARRIVED)).wait_for(over),
             Phase::Landing { why } => bid.request(me.because(LAND, why)).wait_for(grounded),
-            Phase::Down => bid.wait_for(me.any(HAND_BACK)).wait_for(grounded),
+            Phase::Down => bid.wait_for(me.any_of(&[HAND_BACK, TAKEOFF])).wait_for(grounded),
         })
     }
 
