@@ -698,3 +698,17 @@ pub(crate) fn safety_events(me: &Me) -> EventSet {
     let home = me.any(GOTO).and(EventSet::field_is("leg", bthreads::HOME_LEG));
     me.any_of(&vocabulary::OWN).or(home)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn from_afar_nobody_blocks_the_way_home_and_anybody_with_a_say_any_other() {
+        let me = Me::new("uav/1");
+        let goto = |leg: i64| me.event(GOTO).with("leg", leg);
+        let safety = safety_events(&me);
+        assert!(safety.contains(&goto(bthreads::HOME_LEG)) && safety.contains(&me.event(HOMEWARD)));
+        assert!(!safety.contains(&goto(bthreads::OPERATOR_LEG)) && !safety.contains(&goto(0)));
+    }
+}
