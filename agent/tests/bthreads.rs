@@ -700,6 +700,17 @@ mod return_home {
     }
 
     #[test]
+    fn an_order_to_land_on_the_ground_does_not_count_in_the_air() {
+        let mut vehicle = Vehicle::new(&config());
+        vehicle.reports(READY);
+        vehicle.is_ordered("hand_back");
+        vehicle.is_ordered("land");
+        vehicle.reports(TAKEOFF);
+        let happened = vehicle.reports(BATTERY_LOW);
+        assert!(happened.contains(&"goto -1".into()), "{happened:?}");
+    }
+
+    #[test]
     fn who_turned_home_while_climbing_is_led_nowhere_else_once_it_is_up() {
         let mut vehicle = Vehicle::new(&config());
         vehicle.reports(READY);

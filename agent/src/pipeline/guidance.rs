@@ -7,10 +7,7 @@ use skein_bp::Event;
 use skein_mav::SetPoint;
 use skein_planning::{
     Path,
-    global::{
-        Potential, PotentialObstacle,
-        astar::{self, Astar, AstarConfig, Disc, PlanError, Request},
-    },
+    global::{Potential, PotentialObstacle, astar::Disc},
     local::{
         apf::{self, ApfConfig},
         braking::{self, BrakingConfig},

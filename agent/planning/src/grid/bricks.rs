@@ -104,15 +104,15 @@ mod tests {
 
     #[test]
     fn much_memory_is_not_kept_for_the_next_search() {
-        let mut bricks = Bricks::<[u64; 64]>::default();
-        bricks.fit([500, 500, 1]);
-        let all = || (0..250_000).map(|n| cell(n % 500, n / 500, 0));
-        all().take(10_000).for_each(|cell| bricks.slot(cell)[0] = 1);
-        bricks.fit([500, 500, 1]);
-        assert_eq!(bricks.get(cell(1, 0, 0))[0], 1);
-        all().for_each(|cell| bricks.slot(cell)[0] = 1);
-        bricks.fit([500, 500, 1]);
-        assert_eq!((bricks.get(cell(1, 0, 0))[0], bricks.made), (0, 0));
+        let mut bricks = Bricks::<[[u64; 8]; 8]>::default();
+        bricks.fit([520, 520, 1]);
+        let all = || (0..270_400).map(|n| cell(n % 520, n / 520, 0));
+        all().take(10_000).for_each(|cell| bricks.slot(cell)[0][0] = 1);
+        bricks.fit([520, 520, 1]);
+        assert_eq!(bricks.get(cell(1, 0, 0))[0][0], 1);
+        all().for_each(|cell| bricks.slot(cell)[0][0] = 1);
+        bricks.fit([520, 520, 1]);
+        assert_eq!((bricks.get(cell(1, 0, 0))[0][0], bricks.made), (0, 0));
     }
 
     #[test]

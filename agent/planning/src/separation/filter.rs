@@ -138,8 +138,8 @@ struct Limit {
 /// A vehicle that is told to brake flies on for the latency `t` and then stops along its own velocity `v` with
 /// the deceleration `a`. On the way it comes nearer to what lies in the unit direction `n` by its *stop*, `S = n . v (t
 /// + |v| / 2a)`, at most. Since it is no faster than `s = min(v_max, |v| + a t)` when it brakes, its stop stays
-/// within the reach `h` if `n . v <= h / (t + s / 2a)`: a half-space. Nor is it told to fly faster than it could stop straight on, `n . v
-/// <= sqrt((a t)^2 + 2 a h) - a t`. With `g` for the gap:
+/// within the reach `h` if `n . v <= h / (t + s / 2a)`: a half-space. Nor is it told to fly faster than it could stop straight on,
+/// `n . v <= sqrt((a t)^2 + 2 a h) - a t`. With `g` for the gap:
 ///
 /// | what, at distance `d` | gap | reach `h` for `g >= 0` |
 /// |---|---|---|
