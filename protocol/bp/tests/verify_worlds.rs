@@ -51,7 +51,10 @@ fn a_burst_is_counted_and_one_without_end_is_found() {
     let report = Verifier::new(lamp()).world(["hand"]).inspect([settles.clone()]).run();
     assert_eq!((report.verdict, report.longest_burst), (None, Some(2)));
     let endless = plain([
-        ("lamp", json!([{"sync": {"wait": ["switch"]}}, {"repeat": "forever", "do": [{"sync": {"request": ["blink"]}}]}])),
+        (
+            "lamp",
+            json!([{"sync": {"wait": ["switch"]}}, {"repeat": "forever", "do": [{"sync": {"request": ["blink"]}}]}]),
+        ),
         ("hand", repeat(json!([{"sync": {"request": ["switch"]}}]))),
     ]);
     let violation = Verifier::new(endless).world(["hand"]).inspect([settles]).run().verdict.unwrap();
@@ -73,7 +76,8 @@ fn what_comes_out_of_reach_is_found_with_the_way_there() {
     assert_eq!(traces_of(&report), ["open", "shut", "open", "shut"], "{report}");
     assert_eq!(report.verdict.unwrap().kind, ViolationKind::OutOfReach { goal: "an open door".to_owned() });
     // What was not looked at might lead there.
-    let bounded = Verifier::new(program).inspect([]).always_within_reach("an open door", open).most_states(4).run();
+    let bounded =
+        Verifier::new(program).inspect([]).always_within_reach("an open door", open).most_states(4).run();
     assert_eq!(bounded.verdict, None, "{bounded}");
 }
 
@@ -100,7 +104,8 @@ fn deadlines_at_rest_wait_until_nothing_else_can_happen() {
     ]);
     let hand = json!([{"sync": {"request": ["switch"]}}]);
     let traces = |timers| {
-        let graph = Verifier::new(plain([("lamp", timed.clone()), ("hand", hand.clone())])).timers(timers).graph();
+        let graph =
+            Verifier::new(plain([("lamp", timed.clone()), ("hand", hand.clone())])).timers(timers).graph();
         graph.edges.into_iter().filter(|edge| edge.event.name() == "timeout").count()
     };
     assert_eq!((traces(Timers::AtRest), traces(Timers::AnyTime)), (0, 1));

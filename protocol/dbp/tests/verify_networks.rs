@@ -150,7 +150,6 @@ fn a_hold_that_is_counted_on_holds_through_a_partition_and_a_repetition() {
     for network in [programs::hold().unwrap(), programs::kept_hold().unwrap()] {
         holds(&network, Faults { partitions: 1, ..NONE });
         holds(&network, Faults { repeats: 1, delay: true, ..NONE });
-        holds(&network, Faults { restarts: 1, ..NONE });
     }
 }
 
