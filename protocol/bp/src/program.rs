@@ -460,7 +460,10 @@ impl Program {
     }
 
     fn restate(&mut self, place: Place, bid: Bid) {
-        if let Some(old) = self.board.restate(place, bid) {
+        let entry = self.board.get(place).filter(|_| self.ties.owes());
+        let old = entry.map(|entry| entry.bid.clone());
+        self.board.restate(place, bid);
+        if let Some(old) = old {
             self.forget_ties(&old);
         }
     }
