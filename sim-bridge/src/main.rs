@@ -51,6 +51,10 @@ fn run(cli: &Cli) -> anyhow::Result<Exit> {
             let sound = skein_sim::campaign::run(what, cli.json)?;
             Ok(if sound { Exit::Done } else { Exit::Failed })
         }
+        Command::Experiment(args) => {
+            let reached = skein_sim::experiment::run(args, cli.json)?;
+            Ok(if reached { Exit::Done } else { Exit::Failed })
+        }
         Command::Bench { what } => skein_sim::bench::run(what, cli.json).map(|()| Exit::Done),
         #[cfg(not(feature = "zenoh"))]
         Command::Serve(_) | Command::Configure(_) => {

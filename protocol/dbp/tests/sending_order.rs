@@ -20,6 +20,7 @@ fn an_occurrence_goes_before_the_acknowledgement_of_the_bid_that_led_to_it() {
         sync: 1,
         requests: vec![Event::new("uav/1/ping")],
         block: EventSet::None,
+        block_since: 1,
         priority: None,
         on_loss: OnLoss::Release,
     };
