@@ -88,13 +88,13 @@ impl Board {
         Some(entry)
     }
 
-    /// Replaces the bid at `place`.
-    pub(crate) fn restate(&mut self, place: Place, bid: Bid) {
-        let Some(Some(entry)) = self.entries.get_mut(place as usize) else { return };
+    /// Replaces the bid at `place` and gives back the old one.
+    pub(crate) fn restate(&mut self, place: Place, bid: Bid) -> Option<Bid> {
+        let entry = self.entries.get_mut(place as usize)?.as_mut()?;
         entry.rank = rank(self.strategy, &entry.owner, &bid);
         entry.sync += 1;
-        let old = std::mem::replace(&mut entry.bid, bid);
-        self.indexes.replace(place, old, &entry.bid);
+        self.indexes.replace(place, &entry.bid, &bid);
+        Some(std::mem::replace(&mut entry.bid, bid))
     }
 
     pub(crate) fn get(&self, place: Place) -> Option<&Entry> {
@@ -279,22 +279,22 @@ impl Indexes {
         self.restate_deadline(place, bid.given_deadline(), None);
     }
 
-    fn replace(&mut self, place: Place, old: Bid, new: &Bid) {
-        self.restate_deadline(place, old.given_deadline(), new.given_deadline());
+    fn replace(&mut self, place: Place, old: &Bid, new: &Bid) {
         if !old.concerns_as(new) {
-            self.restate_requests(place, !old.requests().is_empty(), !new.requests().is_empty());
             let filed = self.left_filed.iter_mut().find(|(of, bid)| *of == place && bid.concerns_as(new));
             match filed {
-                Some((_, bid)) => *bid = old,
+                Some((_, bid)) => *bid = old.clone(),
                 None => {
                     self.file(place, new);
-                    self.left_filed.push_back((place, old));
+                    self.left_filed.push_back((place, old.clone()));
                     if self.left_filed.len() > BIDS_LEFT_FILED {
                         self.unfile_left(0);
                     }
                 }
             }
+            self.restate_requests(place, !old.requests().is_empty(), !new.requests().is_empty());
         }
+        self.restate_deadline(place, old.given_deadline(), new.given_deadline());
     }
 
     fn file(&mut self, place: Place, bid: &Bid) {

@@ -31,8 +31,6 @@ struct Body {
     data: Vec<(Arc<str>, Value)>,
 }
 
-static TIMEOUT: LazyLock<Event> = LazyLock::new(|| Event::new("timeout"));
-
 impl Event {
     /// An event without data.
     pub fn new(name: impl Into<Arc<str>>) -> Self {
@@ -43,11 +41,8 @@ impl Event {
 
     /// What a b-thread gets when the deadline of its bid passes; see [`Bid::deadline`](crate::Bid::deadline).
     pub fn timeout() -> Self {
+        static TIMEOUT: LazyLock<Event> = LazyLock::new(|| Event::new("timeout"));
         TIMEOUT.clone()
-    }
-
-    pub(crate) fn is_timeout(&self) -> bool {
-        *self == *TIMEOUT
     }
 
     /// The same event with one more datum; a datum already under `key` is replaced.

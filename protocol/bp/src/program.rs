@@ -478,10 +478,7 @@ impl Program {
     }
 
     fn restate(&mut self, place: Place, bid: Bid) {
-        let entry = self.board.get(place).filter(|_| self.ties.owes());
-        let old = entry.map(|entry| entry.bid.clone());
-        self.board.restate(place, bid);
-        if let Some(old) = old {
+        if let Some(old) = self.board.restate(place, bid) {
             self.forget_ties(&old);
         }
     }

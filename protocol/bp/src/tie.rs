@@ -36,14 +36,9 @@ impl TieBreak {
         self.passed_over.remove(event);
     }
 
-    /// Whether any event has lost a tie and still waits.
-    pub(crate) fn owes(&self) -> bool {
-        !self.passed_over.is_empty()
-    }
-
     /// Whether `event` has lost a tie and still waits.
     pub(crate) fn is_owed(&self, event: &Event) -> bool {
-        self.owes() && self.passed_over.contains_key(event)
+        !self.passed_over.is_empty() && self.passed_over.contains_key(event)
     }
 
     /// The event passed over most often, if that is often enough.

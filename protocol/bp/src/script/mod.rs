@@ -213,7 +213,7 @@ impl Script {
     fn ended_by(&self, event: &Event, now: Duration) -> Option<usize> {
         let Some(Step::Sync { scopes, .. }) = self.code.steps.get(self.at) else { return None };
         let deadline = |scope: &usize| self.deadlines.get(*scope).copied().flatten();
-        if event.is_timeout() {
+        if *event == Event::timeout() {
             let due = scopes.iter().find(|scope| deadline(scope).is_some_and(|at| at <= now));
             // Whoever lets a timer fire before its time means the one that fires first.
             let first =
