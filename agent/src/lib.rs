@@ -15,6 +15,7 @@ pub mod pipeline;
 pub mod precedence;
 pub mod scripts;
 pub mod sequential;
+pub mod verify;
 mod watches;
 
 pub use self::{

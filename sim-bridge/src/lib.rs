@@ -9,7 +9,7 @@ pub mod check;
 pub mod cli;
 #[cfg(feature = "zenoh")]
 pub mod configure;
-pub mod cpu_time;
+mod cpu_time;
 pub mod experiment;
 pub mod fly;
 #[cfg(feature = "zenoh")]

@@ -7,18 +7,10 @@ use skein_bp::Event;
 use skein_mav::SetPoint;
 use skein_planning::{
     Path,
-    global::{
-        Potential, PotentialObstacle,
-        astar::{self, AstarConfig, AstarScratch, Disc, PlanError, Request},
-        simplify,
-    },
+    global::{Potential, PotentialObstacle, astar::Disc},
     local::{
-        apf::{self, ApfConfig},
-        braking::{self, BrakingConfig},
+        apf,
         escape::{EscapeConfig, EscapeDetector, Verdict},
-        moving::{MovingConfig, Tracker},
-        speed::SpeedConfig,
-        vfh::{Follower, VfhConfig},
     },
     map::ClearanceMap,
     passage::{Passage, PassageConfig, first_passage},
@@ -26,16 +18,19 @@ use skein_planning::{
 };
 use skein_wire::vocabulary::{ARRIVED, LEAVE, PASSAGE, PATH_BLOCKED, PLANNED, STUCK, UNPLANNABLE};
 
+use super::evasion::{Evasion, Room, Way};
 use crate::{
-    config::{Envelope, Fence, Layer, LocalPlanner, Planners},
+    config::{Envelope, Fence, Layer, Planners},
     me::Me,
     neighbours::Neighbour,
+    pipeline::{
+        local::Local,
+        route_search::{ALLOWANCE, Found, RouteSearch, Task},
+    },
 };
 
 /// Leave to move lasts for so long after an `advance`: a little more than two navigation cycles.
 const LEAVE_LASTS: Duration = Duration::from_millis(250);
-/// The set-point loop's period.
-const TICK_S: f64 = 0.02;
 /// The last waypoint is reached within this distance, m.
 const ARRIVAL_M: f64 = 0.35;
 /// Other waypoints are reached within this distance, m.
@@ -56,16 +51,6 @@ const AROUND_NEIGHBOURS_M: f64 = 8.0;
 const PLANAR_BAND_M: f64 = 0.4;
 /// Clearance that the safety filter keeps between hull and obstacles, m: less than paths do, so that it does not fight them.
 const OBSTACLE_MARGIN_M: f64 = 0.1;
-/// Margins between hull and obstacles that are tried in turn when there is no path with the envelope's own, m.
-const TIGHT_MARGINS_M: [f64; 2] = [0.1, 0.03];
-/// Most voxels that a search at one height expands, so that no plan holds up the set-points for long.
-const LEVEL_BUDGET: usize = 100_000;
-/// Most voxels that a search at all heights expands; each costs more.
-const CLIMBING_BUDGET: usize = 40_000;
-/// As the height band of a level search: search all heights.
-const ALL_HEIGHTS: f64 = -1.0;
-/// How far ahead the way is looked at for the speed cap, m.
-const SENSED_AHEAD_M: f64 = 9.0;
 /// Standard deviation of the vehicle's own position, m.
 const POSITION_SIGMA_M: f64 = 0.05;
 /// How far outside the ghost of a silent neighbour a path leads, m.
@@ -74,10 +59,11 @@ const GHOST_SLACK_M: f64 = 0.3;
 const GIVES_WAY_M: f64 = 1.0;
 /// From where a vehicle that is held stops to the place that it was held from, at least, m.
 const ROOM_AHEAD_M: f64 = 1.5;
-/// The cosine of a path's slope below which what is free ahead does not limit its speed: a planar lidar sees nothing of it.
-const LEVEL_SHARE: f64 = 0.05;
 /// Speed at which a hovering vehicle goes back to its place, at most, m/s.
 const STATION_KEEPING_M_S: f64 = 0.5;
+
+/// A vehicle that is hemmed in leaves its height where it has this much room, m.
+const EVASION_M: f64 = 1.0;
 
 /// How the vehicle moves. World ENU.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -167,26 +153,20 @@ pub struct Guidance {
     passage: Option<Passage>,
     /// Where to hover while there is no leave to move.
     hover_at: Option<Vector3<f64>>,
-    speed_m_s: f64,
-    braking: BrakingConfig,
-    apf: ApfConfig,
-    /// In place of the potential field.
-    vfh: Option<Follower>,
-    /// What moves and tells nobody where it is.
-    moving: Tracker,
+    local: Local,
     filter: FilterConfig,
     escape: EscapeDetector,
-    scratch: AstarScratch,
+    evasion: Evasion,
+    routes: RouteSearch,
+    /// What the search for a path may still do in this tick.
+    allowance: usize,
 }
 
 impl Guidance {
     /// Guidance for a vehicle of this envelope inside this fence, by these planners.
     #[must_use]
     pub fn new(envelope: Envelope, fence: Fence, planners: Planners) -> Self {
-        let avoids = planners.without != Some(Layer::LocalAvoidance);
-        let vfh = (avoids && planners.local == LocalPlanner::Vfh).then(|| gentle_follower(&envelope));
-        let brake_m_s2 = if vfh.is_some() { env("GENTLE", 0.6) } else { envelope.brake_m_s2 };
-        let repulsive_gain = if avoids { ApfConfig::default().repulsive_gain } else { 0.0 };
+        let obstacle_clearance_m = envelope.hull_m + OBSTACLE_MARGIN_M;
         Self {
             envelope,
             fence,
@@ -196,20 +176,10 @@ impl Guidance {
             leave_until: Duration::ZERO,
             passage: None,
             hover_at: None,
-            speed_m_s: 0.0,
-            braking: BrakingConfig {
-                cruise_m_s: envelope.cruise_m_s,
-                decel_m_s2: brake_m_s2,
-                accel_m_s2: brake_m_s2,
-                latency_s: envelope.latency_s,
-                ..BrakingConfig::default()
-            },
-            apf: ApfConfig { repulsive_gain, ..ApfConfig::default() },
-            vfh,
-            moving: Tracker::new(MovingConfig::default()),
+            local: Local::new(&envelope, planners, obstacle_clearance_m),
             filter: FilterConfig {
                 separation_m: envelope.separation_m,
-                obstacle_clearance_m: envelope.hull_m + OBSTACLE_MARGIN_M,
+                obstacle_clearance_m,
                 max_speed_m_s: envelope.cruise_m_s,
                 decel_m_s2: envelope.brake_m_s2,
                 latency_s: envelope.latency_s,
@@ -217,7 +187,9 @@ impl Guidance {
                 ..FilterConfig::default()
             },
             escape: EscapeDetector::new(EscapeConfig::default()),
-            scratch: AstarScratch::default(),
+            evasion: Evasion::default(),
+            routes: RouteSearch::default(),
+            allowance: ALLOWANCE,
         }
     }
 
@@ -232,6 +204,7 @@ impl Guidance {
         let lands = goto.bool("lands").unwrap_or(true);
         self.leg = Some(Leg { number, target: Vector3::new(x, y, z), lands, arrived: false });
         self.following = None;
+        self.routes.abandon();
     }
 
     /// Gives leave to move for one navigation cycle.
@@ -242,18 +215,12 @@ impl Guidance {
     /// Somebody else moves the vehicle, or nobody: whatever place it hovered at is not its place any more.
     pub fn rest(&mut self) {
         self.hover_at = None;
-        self.speed_m_s = 0.0;
-        if let Some(vfh) = &mut self.vfh {
-            vfh.rest();
-        }
+        self.local.rest();
     }
 
     /// Takes in the obstacle points of a scan of `rays` rays that was taken at `stamp` and `origin`; metres ENU.
     pub fn look(&mut self, stamp: Duration, origin: &Vector3<f64>, returns: &[Vector3<f64>], rays: usize) {
-        if let Some(vfh) = &mut self.vfh {
-            vfh.look(origin, returns, rays);
-            self.moving.look(stamp, returns);
-        }
+        self.local.look(stamp, origin, returns, rays);
     }
 
     /// The flight is over.
@@ -262,6 +229,7 @@ impl Guidance {
         self.leg = None;
         self.following = None;
         self.passage = None;
+        self.routes.abandon();
     }
 
     /// The path ahead, from the vehicle's place on it to its end.
@@ -290,22 +258,28 @@ impl Guidance {
         Some(following.path.point_at((following.station_m + reach_m).min(following.path.length_m())))
     }
 
-    /// Plans a path to the waypoint. `why` is `stuck` when the vehicle made no way: neighbours that stand around are then
-    /// obstacles too. One that has fallen silent always is, as large as its ghost will be.
+    /// Begins to plan a path to the waypoint. `why` is `stuck` when the vehicle made no way: neighbours that stand around are
+    /// then obstacles too. One that has fallen silent always is, as large as its ghost will be. The answer comes at once if
+    /// this tick's allowance is enough for it, else from [`Guidance::go_on_planning`].
     pub fn plan(
         &mut self,
         why: &str,
         motion: &Motion,
         map: &mut ClearanceMap,
         neighbours: &[Neighbour],
-    ) -> Report {
+    ) -> Option<Report> {
         let Some(leg) = self.leg else {
-            return Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() };
+            return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() });
         };
         let target = map.voxels().clamp(&leg.target);
         // Outside the map, as beyond the fence, the way begins where the map does.
         let is_inside = map.voxels().index_of(&motion.position).is_some();
         let start = if is_inside { motion.position } else { map.voxels().clamp(&motion.position) };
+        if self.planners.without == Some(Layer::GlobalPath)
+            && let Some(path) = Path::new(vec![start, target])
+        {
+            return Some(self.take_up(leg.number, Found { path, clearance_m: 0.0 }));
+        }
         let standing: Vec<Vector3<f64>> = neighbours
             .iter()
             .filter(|neighbour| neighbour.armed && neighbour.track.cooperative)
@@ -337,59 +311,40 @@ impl Guidance {
             (radius_m > 0.0).then_some(Disc { centre, radius_m })
         });
         let discs: Vec<Disc> = standing.chain(ghosts).collect();
-        let request = Request { start, goal: target, potential: &potential, discs: &discs };
-        let mut found = self.search(map, &request);
-        if found.is_err() && !discs.is_empty() {
-            found = self.search(map, &Request { discs: &[], ..request });
-        }
-        match found {
-            Ok((path, clearance_m)) => {
-                let length_m = path.length_m();
-                self.following = Some(Following { path, clearance_m, station_m: 0.0, blocked: false });
-                self.escape.reset();
-                Report::Planned { leg: leg.number, length_m }
-            }
-            Err(error) => {
-                self.following = None;
-                Report::Unplannable { leg: leg.number, why: error.to_string() }
-            }
-        }
+        let Envelope { hull_m, margin_m, .. } = self.envelope;
+        let task = Task { leg: leg.number, start, goal: target, potential, discs, hull_m, margin_m };
+        self.routes.begin(task, map);
+        self.search(map)
     }
 
-    /// The path with the widest of the margins that allow one, and the clearance it keeps: level if there is such a path, else
-    /// over or under what is in the way.
-    fn search(&mut self, map: &mut ClearanceMap, request: &Request<'_>) -> Result<(Path, f64), PlanError> {
-        if self.planners.without == Some(Layer::GlobalPath)
-            && let Some(straight) = Path::new(vec![request.start, request.goal])
-        {
-            return Ok((straight, 0.0));
-        }
-        let level = AstarConfig { budget: LEVEL_BUDGET, ..AstarConfig::default() };
-        let climbing =
-            AstarConfig { planar_band_m: ALL_HEIGHTS, budget: CLIMBING_BUDGET, ..AstarConfig::default() };
-        let [tight_m, tightest_m] = TIGHT_MARGINS_M;
-        let wide_m = self.envelope.margin_m;
-        let tries = [
-            (level, wide_m),
-            (level, tight_m),
-            (level, tightest_m),
-            (climbing, wide_m),
-            (climbing, tightest_m),
-        ];
-        let mut first_error = None;
-        for (config, margin_m) in tries {
-            let clearance_m = self.envelope.hull_m + margin_m;
-            let config = AstarConfig { clearance_m, ..config };
-            match astar::plan(map, request, &config, &mut self.scratch) {
-                Ok(plan) => return Ok((simplify(map, &plan.path, clearance_m), clearance_m)),
-                // Far away: begin with the part of the way that leads nearest to the goal.
-                Err(PlanError::BudgetExhausted { partial, .. }) if config.planar_band_m > 0.0 => {
-                    return Ok((partial, clearance_m));
-                }
-                Err(error) => first_error = first_error.or(Some(error)),
+    /// Goes on with a plan that the ticks before were not enough for. Once in each tick, before anything else is planned.
+    pub fn go_on_planning(&mut self, map: &mut ClearanceMap) -> Option<Report> {
+        self.allowance = ALLOWANCE;
+        self.search(map)
+    }
+
+    /// Whether a plan has been begun that has no answer yet.
+    #[must_use]
+    pub fn is_planning(&self) -> bool {
+        self.routes.is_under_way()
+    }
+
+    fn search(&mut self, map: &mut ClearanceMap) -> Option<Report> {
+        let (leg, found) = self.routes.advance(map, &mut self.allowance)?;
+        Some(match found {
+            Ok(found) => self.take_up(leg, found),
+            Err(error) => {
+                self.following = None;
+                Report::Unplannable { leg, why: error.to_string() }
             }
-        }
-        Err(first_error.unwrap_or(PlanError::Unreachable { expanded: 0 }))
+        })
+    }
+
+    fn take_up(&mut self, leg: i64, Found { path, clearance_m }: Found) -> Report {
+        let length_m = path.length_m();
+        self.following = Some(Following { path, clearance_m, station_m: 0.0, blocked: false });
+        self.escape.reset();
+        Report::Planned { leg, length_m }
     }
 
     /// Looks along the path; once in each navigation cycle.
@@ -489,11 +444,10 @@ impl Guidance {
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles either way.
     pub fn steer(&mut self, now: Duration, motion: &Motion, surroundings: &Surroundings<'_>) -> SetPoint {
-        let along = self.along_path(now, motion, surroundings);
-        let goes = along.is_some();
-        let wish = along.unwrap_or_else(|| self.keep_station(motion));
-        let others: Vec<_> =
-            surroundings.neighbours.iter().copied().chain(self.moving.moving(now, surroundings.map)).collect();
+        let wish =
+            self.along_path(now, motion, surroundings.map).unwrap_or_else(|| self.keep_station(motion));
+        let unheard = self.local.moving(now, surroundings.map);
+        let others: Vec<_> = surroundings.neighbours.iter().copied().chain(unheard).collect();
         let push = match self.planners.without {
             Some(Layer::Repulsion) => Vector3::zeros(),
             _ => repulsion(&motion.position, &wish.velocity, &others, &RepulsionConfig::default()),
@@ -502,74 +456,68 @@ impl Guidance {
         let mut desired = apf::limited(wish.velocity + push, self.envelope.cruise_m_s);
         desired.z =
             if is_level { 0.0 } else { desired.z.clamp(-self.envelope.climb_m_s, self.envelope.climb_m_s) };
-        if let Some(vfh) = self.vfh.as_ref().filter(|_| goes) {
-            desired = vfh.ease(&desired, TICK_S);
-        }
+        let has_leave = now <= self.leave_until;
         let request = separation::Motion {
             position: motion.position,
             velocity: motion.velocity,
             sigma_m: POSITION_SIGMA_M,
-            desired,
+            desired: if has_leave { self.local.ease(desired) } else { desired },
             planar: is_level,
         };
-        let obstacles: Vec<_> =
-            surroundings.obstacles.iter().copied().chain(self.fence_ahead(motion.position)).collect();
-        let safe = match self.planners.without {
-            Some(Layer::SafetyFilter) => desired,
-            _ => filter(&request, &others, &obstacles, &self.filter).velocity,
-        };
-        if let Some(vfh) = &mut self.vfh {
-            vfh.flew(&safe);
-        }
-        if is_level {
-            SetPoint::Planar { vx: safe.x, vy: safe.y, z: wish.height_m, yaw: None }
+        let Kept { velocity, evades } = self.keep_apart(now, request, &others, surroundings);
+        self.local.flew(&velocity);
+        if is_level && !evades {
+            SetPoint::Planar { vx: velocity.x, vy: velocity.y, z: wish.height_m, yaw: None }
         } else {
-            SetPoint::Velocity { velocity: safe, yaw: None }
+            SetPoint::Velocity { velocity, yaw: None }
         }
     }
 
-    /// Along the path; `None` without path or leave.
-    fn along_path(&mut self, now: Duration, motion: &Motion, surroundings: &Surroundings<'_>) -> Option<Wish> {
-        let map = surroundings.map;
-        let following = self.following.as_mut().filter(|_| now <= self.leave_until)?;
-        self.hover_at = None;
-        let ahead = following.path.direction_at(following.station_m);
-        let sensed_free_m = if ahead.xy().norm() < LEVEL_SHARE {
-            SENSED_AHEAD_M
-        } else {
-            map.voxels().sensed_free_m(&motion.position, &ahead, SENSED_AHEAD_M)
-        };
-        let (cap, _) = braking::speed_cap(&following.path, following.station_m, sensed_free_m, &self.braking);
-        if let Some(vfh) = &mut self.vfh {
-            let step = vfh.follow(&following.path, following.station_m, &motion.position, cap, map);
-            following.station_m = step.station_m;
-            return Some(Wish { velocity: step.velocity, height_m: step.carrot.z });
+    /// The velocity nearest to the one desired that keeps all distances, or the way out of where none does.
+    fn keep_apart(
+        &mut self,
+        now: Duration,
+        request: separation::Motion,
+        others: &[separation::Neighbour],
+        surroundings: &Surroundings<'_>,
+    ) -> Kept {
+        if self.planners.without == Some(Layer::SafetyFilter) {
+            return Kept { velocity: request.desired, evades: false };
         }
-        self.speed_m_s = braking::ramp(self.speed_m_s, cap, TICK_S, &self.braking);
+        let obstacles: Vec<_> =
+            surroundings.obstacles.iter().copied().chain(self.fence_ahead(request.position)).collect();
+        let filtered = filter(&request, others, &obstacles, &self.filter);
+        let clearance_m = self.filter.obstacle_clearance_m;
+        let room = || room(request.position, surroundings.map, clearance_m);
+        let Some(way) = self.evasion.decide(now, &filtered.outcome, surroundings.rank, room) else {
+            return Kept { velocity: filtered.velocity, evades: false };
+        };
+        let mut desired = filtered.velocity;
+        desired.z = way.sign() * self.envelope.climb_m_s;
+        let request = separation::Motion { desired, planar: false, ..request };
+        Kept { velocity: filter(&request, others, &obstacles, &self.filter).velocity, evades: true }
+    }
+
+    /// Along the path; `None` without path or leave.
+    fn along_path(&mut self, now: Duration, motion: &Motion, map: &ClearanceMap) -> Option<Wish> {
+        // Until there is a new path, a blocked one is not flown.
+        let following =
+            self.following.as_mut().filter(|following| now <= self.leave_until && !following.blocked)?;
+        self.hover_at = None;
         let attraction = self.escape.attraction();
-        let step = apf::follow(
-            map,
-            &following.path,
-            following.station_m,
-            &motion.position,
-            self.speed_m_s,
-            attraction,
-            &self.apf,
-        );
+        let step =
+            self.local.follow(&following.path, following.station_m, &motion.position, attraction, map);
         following.station_m = step.station_m;
         Some(Wish { velocity: step.velocity, height_m: step.carrot.z })
     }
 
     /// At the place where the vehicle came to a stop, or to where others have pushed it.
     fn keep_station(&mut self, motion: &Motion) -> Wish {
-        self.speed_m_s = 0.0;
+        self.local.pause();
         let place = self
             .hover_at
             .filter(|place| (place - motion.position).norm() < GIVES_WAY_M)
-            .unwrap_or_else(|| {
-                let speed = motion.velocity.norm();
-                motion.position + motion.velocity * (speed / (2.0 * self.braking.decel_m_s2)).min(1.0)
-            });
+            .unwrap_or_else(|| self.local.stop(&motion.position, &motion.velocity));
         self.hover_at = Some(place);
         let back = apf::limited(place - motion.position, STATION_KEEPING_M_S);
         Wish { velocity: back, height_m: place.z }
@@ -590,22 +538,13 @@ impl Guidance {
     }
 }
 
-fn env(name: &str, d: f64) -> f64 { std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(d) }
-
-/// A follower by the vector field histogram for a vehicle of this envelope.
-fn gentle_follower(envelope: &Envelope) -> Follower {
-    // A little more than the filter keeps, so that it need not act.
-    let clearance_m = envelope.hull_m + OBSTACLE_MARGIN_M + env("CLR", 0.05);
-    let speed = SpeedConfig {
-        hard_m_s2: envelope.brake_m_s2 * env("HARD", 1.0),
-        latency_s: envelope.latency_s + env("LAT", 0.0),
-        gentle_m_s2: env("GENTLE", 0.6),
-        clearance_m,
-        corridor_m: clearance_m + env("COR", 0.05),
-        ..SpeedConfig::default().cruising_at(envelope.cruise_m_s)
+/// Whether a vehicle can leave its height, as far as the map reaches and tells.
+fn room(position: Vector3<f64>, map: &ClearanceMap, clearance_m: f64) -> Room {
+    let leads_free = |way: Way| {
+        let there = position + Vector3::z() * (way.sign() * EVASION_M);
+        map.voxels().index_of(&there).is_some() && map.is_segment_clear(&position, &there, clearance_m)
     };
-    let safety_radius_m = envelope.hull_m + envelope.margin_m;
-    Follower::new(VfhConfig { safety_radius_m, comfort_radius_m: env("COMFORT", 0.8), ..VfhConfig::default() }, speed)
+    Room { up: leads_free(Way::Up), down: leads_free(Way::Down) }
 }
 
 /// The velocity wanted before others are considered (ENU, m/s), and the height it leads to (m).
@@ -613,6 +552,13 @@ fn gentle_follower(envelope: &Envelope) -> Follower {
 struct Wish {
     velocity: Vector3<f64>,
     height_m: f64,
+}
+
+/// The velocity that is flown (ENU, m/s), and whether it leads off the height out of where no distance can be kept.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    velocity: Vector3<f64>,
+    evades: bool,
 }
 
 /// What is around the vehicle now.
@@ -624,4 +570,6 @@ pub struct Surroundings<'a> {
     pub obstacles: &'a [Vector3<f64>],
     /// The other vehicles in the air.
     pub neighbours: &'a [separation::Neighbour],
+    /// How many of them, and of those on the ground, have names that come before this vehicle's.
+    pub rank: u32,
 }

@@ -144,14 +144,14 @@ fn measure_peer(repetitions: usize, cpu_time: Duration) -> anyhow::Result<Figure
 
 fn events_per_s(mut program: Program, cpu_time: Duration) -> anyhow::Result<f64> {
     program.synchronise(Duration::ZERO)?;
-    let since = cpu_time::of_this_thread()?;
+    let since = cpu_time::this_thread()?;
     let mut events = 0.0;
     loop {
         for _ in 0..BATCH {
             program.step(Duration::ZERO)?.context("the program has stopped")?;
         }
         events += f64::from(BATCH);
-        let taken = cpu_time::of_this_thread()? - since;
+        let taken = cpu_time::this_thread()? - since;
         if taken >= cpu_time && !taken.is_zero() {
             return Ok(events / taken.as_secs_f64());
         }
@@ -168,9 +168,9 @@ struct Verified {
 /// Looks for a deadlock at a table that has none, so at every state.
 fn verify(philosophers: usize) -> anyhow::Result<Verified> {
     let verifier = Verifier::new(dinner(philosophers)?).inspect([Inspection::Deadlock]);
-    let (since, cpu_since) = (Instant::now(), cpu_time::of_this_process()?);
+    let (since, cpu_since) = (Instant::now(), cpu_time::this_process()?);
     let report = verifier.run();
-    let (time, cpu_time) = (since.elapsed(), cpu_time::of_this_process()? - cpu_since);
+    let (time, cpu_time) = (since.elapsed(), cpu_time::this_process()? - cpu_since);
     anyhow::ensure!(report.verdict.is_none() && report.is_complete(), "the verifier is wrong: {report}");
     Ok(Verified { states: report.states, time_s: time.as_secs_f64(), cpu_time_s: cpu_time.as_secs_f64() })
 }

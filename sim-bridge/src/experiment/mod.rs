@@ -4,11 +4,13 @@
 
 mod ablation;
 mod circle;
+mod dstar_grid;
 mod feasibility;
 mod figure;
 mod performance;
 mod report;
 mod runs;
+mod sphere;
 mod statistics;
 mod vfh;
 
@@ -55,6 +57,16 @@ pub const EXPERIMENTS: &[Experiment] = &[
         name: "ablation",
         about: "what each layer of the pipeline contributes: 50 forests without it",
         run: ablation::run,
+    },
+    Experiment {
+        name: "sphere",
+        about: "a hundred vehicles through the middle of a sphere, beside ORCA",
+        run: sphere::run,
+    },
+    Experiment {
+        name: "dstar-grid",
+        about: "D* with a collision factor on the marker grid, and re-planning by D* Lite (Zhang 2019)",
+        run: dstar_grid::run,
     },
 ];
 

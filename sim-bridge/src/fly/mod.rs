@@ -22,6 +22,7 @@ use skein_agent::AgentConfig;
 use skein_ground::{Order, Who};
 use skein_wire::{Fleet, Network, NetworkConfig};
 
+pub(crate) use self::swarm::scan_for_agent;
 pub use self::{
     recording::Recording,
     setup::{FLEET, GROUND, agent_configs, ground_config, simulation_config, vehicle_name},
@@ -65,10 +66,8 @@ pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
     );
     let summary = match args.clock {
         Clock::Lockstep => {
-            let network = memory_network(&scenario);
-            let links = memory_links(&network, &scenario);
-            let flight = Flight::new(&scenario, args, links, recording(&out)?, table)?;
-            flight.fly(&mut Lockstep(network))?
+            let table = (!args.headless).then_some(table);
+            in_lockstep(&scenario, args.controller, Some(recording(&out)?), table)?
         }
         #[cfg(feature = "zenoh")]
         Clock::Real if args.processes => apart::fly(&scenario, args, &out, table)?,
@@ -82,6 +81,26 @@ pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
     let path = out.join("summary.json");
     summary.write(&path).with_context(|| format!("{}: cannot be written", path.display()))?;
     Ok(summary)
+}
+
+/// Flies a scenario as fast as the processor allows, shows nothing and writes no file.
+///
+/// # Errors
+/// What is wrong with the scenario.
+pub(crate) fn in_memory(scenario: &Scenario) -> anyhow::Result<Summary> {
+    in_lockstep(scenario, cli::Controller::Bp, None, None)
+}
+
+fn in_lockstep(
+    scenario: &Scenario,
+    controller: cli::Controller,
+    recording: Option<Recording>,
+    table: Option<LiveTable<std::io::Stderr>>,
+) -> anyhow::Result<Summary> {
+    let network = memory_network(scenario);
+    let links = memory_links(&network, scenario);
+    let agents = agent_configs(scenario, controller);
+    Flight::new(scenario, controller, agents, links, recording, table)?.fly(&mut Lockstep(network))
 }
 
 /// `out/<scenario>-<seed>`, under the current folder.
@@ -169,31 +188,21 @@ struct CalledOff {
 impl<'a> Flight<'a> {
     fn new(
         scenario: &'a Scenario,
-        args: &cli::Fly,
-        links: Links,
-        recording: Recording,
-        table: LiveTable<std::io::Stderr>,
-    ) -> anyhow::Result<Self> {
-        let agents = agent_configs(scenario, args.controller);
-        let flight = Self::unseen(scenario, args.controller, agents, links)?;
-        Ok(Self { recording: Some(recording), table: (!args.headless).then_some(table), ..flight })
-    }
-
-    /// A flight that is neither recorded nor shown.
-    fn unseen(
-        scenario: &'a Scenario,
         controller: cli::Controller,
         agents: Vec<AgentConfig>,
         links: Links,
+        recording: Option<Recording>,
+        table: Option<LiveTable<std::io::Stderr>>,
     ) -> anyhow::Result<Self> {
         LazyLock::force(&INTERRUPTIONS);
         let simulation = skein_world::Simulation::new(simulation_config(scenario));
         let ground = ground_config(scenario, Fleet::new(setup::FLEET)?, controller);
+        let swarm = Swarm::new(simulation, agents, ground, links)?;
         Ok(Self {
             scenario,
-            swarm: Swarm::new(simulation, agents, ground, links)?,
-            recording: None,
-            table: None,
+            swarm,
+            recording,
+            table,
             began: Instant::now(),
             called_off: None,
             network_messages: 0,
@@ -206,7 +215,6 @@ impl<'a> Flight<'a> {
             host.before_step(&mut self.swarm);
             let happenings = self.swarm.step();
             host.after_step(&self.swarm, &happenings);
-            if std::env::var("DBG").is_ok() { for s in &happenings.selections { if !s.event.name().ends_with("advance") { eprintln!("{:.2} {} {:?}", self.swarm.now().as_secs_f64(), s.event, self.swarm.simulation().vehicle(0).map(|v| v.motion.position)); } } }
             if let Some(recording) = &mut self.recording {
                 recording.take_in(&self.swarm, &happenings)?;
             }
@@ -216,7 +224,7 @@ impl<'a> Flight<'a> {
                 self.draw()?;
             }
         }
-        self.recording.map_or(Ok(()), Recording::finish)?;
+        self.recording.map(Recording::finish).transpose()?;
         let why = self.called_off.map(|called_off| called_off.why);
         let account = self.swarm.account(host.traffic());
         let summary = report::summary(self.scenario, &account, self.began.elapsed(), why);

@@ -15,6 +15,7 @@ use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohSession};
 
 use super::{
     Flight, Happenings, Host, Links, Recording, Swarm,
+    agent_configs,
     setup::{FLEET, GROUND, vehicle_name},
 };
 use crate::{
@@ -68,7 +69,9 @@ pub fn fly(
         // Two swarms on one computer fly all the same.
         Err(error) => table.note(&format!("no MAVLink for other programs: {error:#}"))?,
     }
-    let flight = Flight::new(scenario, args, links, recording, table)?;
+    let table = (!args.headless).then_some(table);
+    let agents = agent_configs(scenario, args.controller);
+    let flight = Flight::new(scenario, args.controller, agents, links, Some(recording), table)?;
     flight.fly(&mut RealTime {
         began: Instant::now(),
         speed: args.speed,

@@ -122,7 +122,7 @@ impl Swarm {
             vehicle.agent.tick(now, vehicle.link.as_mut());
             self.agents_cpu += cpu_time().saturating_sub(cpu_began);
             let mut heard = vehicle.agent.take_selections();
-            self.plan_times.take_in(began, &heard);
+            self.plan_times.take_in(index, began, &heard, vehicle.agent.is_planning());
             self.simulation.send(index, &vehicle.agent.take_mavlink());
             keep_own(&mut heard, vehicle.agent.name());
             selections.append(&mut heard);
@@ -246,7 +246,7 @@ pub struct Links {
 
 /// What this thread has used so far; a system that does not tell makes all cost nothing.
 fn cpu_time() -> Duration {
-    cpu_time::of_this_thread().unwrap_or_default()
+    cpu_time::this_thread().unwrap_or_default()
 }
 
 /// Remote b-threads are named `node#bthread`.
@@ -260,7 +260,8 @@ fn keep_own(selections: &mut Vec<Happened>, node: &NodeName) {
 }
 
 /// What the agent gets of a scan: all but the true pose, which it never learns.
-fn scan_for_agent(scan: &LidarScan) -> Scan {
+/// A scan of the world as a vehicle takes it in.
+pub(crate) fn scan_for_agent(scan: &LidarScan) -> Scan {
     Scan {
         stamp: scan.stamp,
         angle_min: scan.angle_min,

@@ -49,10 +49,10 @@ impl<'a> Trial<'a> {
     /// # Errors
     /// What is wrong with an agent's configuration; or the user has interrupted it.
     pub fn fly(self, watch: &mut dyn FnMut(&Swarm)) -> anyhow::Result<Flown> {
-        let began = cpu_time::of_this_thread()?;
+        let began = cpu_time::this_thread()?;
         let network = memory_network(self.scenario);
         let links = memory_links(&network, self.scenario);
-        let flight = Flight::unseen(self.scenario, self.controller, self.agents, links)?;
+        let flight = Flight::new(self.scenario, self.controller, self.agents, links, None, None)?;
         let mut agents_cpu = Duration::ZERO;
         let mut watch = |swarm: &Swarm| {
             agents_cpu = swarm.agents_cpu();
@@ -60,7 +60,7 @@ impl<'a> Trial<'a> {
         };
         let summary = flight.fly(&mut Watched { lockstep: Lockstep(network), watch: &mut watch })?;
         anyhow::ensure!(interruptions() == 0, "interrupted");
-        Ok(Flown { summary, agents_cpu, whole_cpu: cpu_time::of_this_thread()?.saturating_sub(began) })
+        Ok(Flown { summary, agents_cpu, whole_cpu: cpu_time::this_thread()?.saturating_sub(began) })
     }
 }
 
