@@ -18,7 +18,7 @@ pub mod verify;
 mod watches;
 
 pub use self::{
-    config::{AgentConfig, Controller, Envelope, Fence},
+    config::{AgentConfig, Controller, Envelope, Fence, PassageRule},
     core::{AgentCore, AgentError, Outcome, SetPointRecord, Status},
     flight::FlightPhase,
     me::Me,

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use skein_agent::{
-    AgentConfig, Controller, Envelope, Fence, Me,
+    AgentConfig, Controller, Envelope, Fence, Me, PassageRule,
     bthreads::{self, LinkLossPolicy},
     scripts::{Runner, Scripts},
 };
@@ -42,6 +42,7 @@ fn config() -> AgentConfig {
         envelope: Envelope::default(),
         link_loss: LinkLossPolicy::Continue,
         controller: Controller::Bp,
+        passage_rule: PassageRule::Confirmed,
         scripts: Vec::new(),
         lease: Duration::from_secs(1),
         authority: skein_wire::standard_authority(),

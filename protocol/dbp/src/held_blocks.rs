@@ -70,6 +70,12 @@ impl HeldBlocks {
         self.0.get(bthread).map(|held| (held.sync, &*held.block.homes))
     }
 
+    /// Whether `bthread` was told that its block holds, and `set` is what it blocked then, or a part of it.
+    pub(crate) fn is_relied_on(&self, bthread: &str, set: &EventSet) -> bool {
+        let relied_on = self.0.get(bthread).filter(|held| held.standing != Standing::Unsure);
+        relied_on.is_some_and(|held| !set.is_none() && set.is_within(&held.block.set))
+    }
+
     /// Forgets all b-threads but these, at these synchronisation points.
     pub(crate) fn retain(&mut self, stated: &BTreeMap<String, u64>) {
         self.0.retain(|bthread, held| stated.get(bthread) == Some(&held.sync));

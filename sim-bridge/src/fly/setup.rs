@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AgentConfig, Controller, Envelope, Fence};
+use skein_agent::{AgentConfig, Controller, Envelope, Fence, PassageRule};
 use skein_bp::script::Assignment;
 use skein_dbp::{Kept, NodeName};
 use skein_ground::{GroundConfig, Order, Who};
@@ -100,6 +100,7 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
                 ..Envelope::default()
             },
             link_loss: LinkLossPolicy::default(),
+            passage_rule: PassageRule::Confirmed,
             controller: match controller {
                 cli::Controller::Bp => Controller::Bp,
                 cli::Controller::None => Controller::None,
