@@ -25,11 +25,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod airspace;
+pub mod assignment;
 pub mod global;
 pub mod local;
 pub mod map;
+pub mod particle_swarm;
 pub mod passage;
 mod path;
+pub mod route;
 pub mod separation;
 
 pub use path::{Corner, Path, Projection};
