@@ -8,7 +8,7 @@ mod hold;
 mod link;
 #[cfg(feature = "zenoh")]
 pub mod link_peer;
-mod quantile;
+pub(crate) mod quantile;
 
 use std::time::Duration;
 

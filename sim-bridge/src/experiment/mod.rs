@@ -4,6 +4,8 @@
 
 mod figure;
 mod report;
+mod runs;
+mod swarm_planning;
 
 use std::path::PathBuf;
 
@@ -23,7 +25,11 @@ pub struct Experiment {
 }
 
 /// Every experiment.
-pub const EXPERIMENTS: &[Experiment] = &[];
+pub const EXPERIMENTS: &[Experiment] = &[Experiment {
+    name: "swarm-planning",
+    about: "twenty vehicles plan to ten targets among mountains and threats: particle swarms compared (P3)",
+    run: swarm_planning::run,
+}];
 
 /// What the command line says to an experiment. What is not given is the experiment's own.
 #[derive(Debug, Clone, Default, PartialEq)]

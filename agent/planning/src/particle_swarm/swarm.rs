@@ -214,6 +214,12 @@ impl<M: Motion> Swarm<M> {
         &self.best
     }
 
+    /// How its particles move.
+    #[must_use]
+    pub fn motion(&self) -> &M {
+        &self.motion
+    }
+
     /// How many particles there are.
     #[must_use]
     pub fn size(&self) -> usize {

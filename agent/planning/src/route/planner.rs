@@ -52,30 +52,37 @@ impl Planner {
     /// Searches for a route. The same seed gives the same one.
     #[must_use]
     pub fn plan(self, problem: &mut RouteProblem<'_>, effort: Effort, seed: u64) -> Plan {
+        let space = problem.space();
         match self {
             Planner::Onboard => {
-                let motion = Improved::new(problem.space(), ImprovedConfig::default());
-                Plan::by_swarm(problem, motion, effort, seed)
+                let motion = Improved::new(space, ImprovedConfig::default());
+                Plan::by_swarm(problem, Swarm::new(space, motion, effort.particles, seed), effort)
             }
             Planner::Ground => {
-                let mut swarm =
-                    TabuSwarm::new(problem.space(), TabuConfig::default(), effort.particles, seed);
+                let mut swarm = TabuSwarm::new(space, TabuConfig::default(), effort.particles, seed);
                 Plan::by(problem, effort, |problem, evaluations| {
                     swarm.run(problem, evaluations);
                     swarm.best().clone()
                 })
             }
-            Planner::Standard => Plan::by_swarm(problem, Standard::default(), effort, seed),
-            Planner::Constriction => Plan::by_swarm(problem, Constriction::default(), effort, seed),
+            Planner::Standard => Plan::by_swarm(
+                problem,
+                Swarm::new(space, Standard::default(), effort.particles, seed),
+                effort,
+            ),
+            Planner::Constriction => Plan::by_swarm(
+                problem,
+                Swarm::new(space, Constriction::default(), effort.particles, seed),
+                effort,
+            ),
         }
     }
 }
 
 impl Plan {
-    /// Lets a swarm that moves in any way search for a route.
+    /// Lets a swarm in the problem's space search for a route.
     #[must_use]
-    pub fn by_swarm<M: Motion>(problem: &mut RouteProblem<'_>, motion: M, effort: Effort, seed: u64) -> Plan {
-        let mut swarm = Swarm::new(problem.space(), motion, effort.particles, seed);
+    pub fn by_swarm<M: Motion>(problem: &mut RouteProblem<'_>, mut swarm: Swarm<M>, effort: Effort) -> Plan {
         Plan::by(problem, effort, |problem, evaluations| {
             swarm.run(problem, evaluations);
             swarm.best().clone()

@@ -69,6 +69,12 @@ impl<'a> RouteProblem<'a> {
         Ok(RouteProblem { airspace, traffic, cost, space, route: direct })
     }
 
+    /// The same with other weights.
+    #[must_use]
+    pub fn weighed(&self, cost: RouteCost) -> RouteProblem<'a> {
+        RouteProblem { cost, ..self.clone() }
+    }
+
     /// The airspace.
     #[must_use]
     pub fn airspace(&self) -> &Airspace {
