@@ -70,8 +70,8 @@ fn repulsion_is_the_papers_and_counts_at_equal_times_only() {
     let against = points([[2000.0, 1040.0, 500.0], [1100.0, 1040.0, 500.0]]);
     let among = |other: &[Vector3<f64>]| {
         let mut traffic = Traffic::default();
-        traffic.add(other);
-        (cost.assess(&eastward, &empty(), &traffic), traffic.separation_m(&eastward))
+        traffic.add(other, &cost);
+        (cost.assess(&eastward, &empty(), &traffic), traffic.separation_m(&eastward, &cost))
     };
     let (found, separation_m) = among(&aside(1040.0));
     let closeness = 1.0 / 40.0 - 1.0 / 60.0;

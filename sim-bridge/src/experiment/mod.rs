@@ -2,9 +2,11 @@
 //!
 //! An experiment is a file here, named in [`EXPERIMENTS`].
 
+mod dstar_grid;
 mod figure;
 mod report;
 mod runs;
+mod sphere;
 mod swarm_planning;
 
 use std::path::PathBuf;
@@ -25,11 +27,23 @@ pub struct Experiment {
 }
 
 /// Every experiment.
-pub const EXPERIMENTS: &[Experiment] = &[Experiment {
-    name: "swarm-planning",
-    about: "twenty vehicles plan to ten targets among mountains and threats: particle swarms compared (P3)",
-    run: swarm_planning::run,
-}];
+pub const EXPERIMENTS: &[Experiment] = &[
+    Experiment {
+        name: "sphere",
+        about: "a hundred vehicles through the middle of a sphere, beside ORCA",
+        run: sphere::run,
+    },
+    Experiment {
+        name: "dstar-grid",
+        about: "D* with a collision factor on the marker grid, and re-planning by D* Lite (Zhang 2019)",
+        run: dstar_grid::run,
+    },
+    Experiment {
+        name: "swarm-planning",
+        about: "twenty vehicles plan to ten targets among mountains and threats: particle swarms compared (P3)",
+        run: swarm_planning::run,
+    },
+];
 
 /// What the command line says to an experiment. What is not given is the experiment's own.
 #[derive(Debug, Clone, Default, PartialEq)]

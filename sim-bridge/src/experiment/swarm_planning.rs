@@ -24,8 +24,8 @@ const RUNS: usize = 150;
 const VEHICLES: usize = 20;
 /// Inner waypoints of a route: in 2000 m one every 182 m, so that it can bend around the smallest zone, 200 m.
 const WAYPOINTS: usize = 10;
-/// Slowest and fastest speeds at which vehicles may fly to arrive together, m/s.
-const SPEEDS_M_S: (f64, f64) = (10.0, 25.0);
+/// How much slower than at cruise a vehicle may fly to arrive together with others.
+const SLOWEST: f64 = 2.0;
 /// Feasibility is judged by samples of the terrain this far apart, metres.
 const FINE_M: f64 = 2.0;
 /// Runs of each variant of the baseline.
@@ -102,9 +102,9 @@ fn plan_fleet(
     let fine = RouteCost { sample_m: FINE_M, ..cost };
     let (mut is_feasible, mut plan_ms) = (Vec::new(), Vec::new());
     let plans = plan_in_turn(airspace, cost, &ends, waypoints, |vehicle, problem| {
-        let since = cpu_time::this_thread()?;
-        let plan = plan(problem, 1000 * seed + vehicle as u64).context("there is no feasible route")?;
-        plan_ms.push((cpu_time::this_thread()? - since).as_secs_f64() * 1e3);
+        let (plan, taken_ms) = cpu_time::measured_ms(|| plan(problem, 1000 * seed + vehicle as u64))?;
+        let plan = plan.context("there is no feasible route")?;
+        plan_ms.push(taken_ms);
         is_feasible.push(problem.weighed(fine).judge(&plan.route).is_feasible());
         anyhow::Ok(plan)
     })?;
@@ -209,12 +209,10 @@ fn arrivals(done: &[Run], report: &mut Report) {
     let mut at_cruise_s = Vec::new();
     for run in done {
         let plans = &run.by_planner[ONBOARD].plans;
-        let routes: Vec<_> = plans.iter().map(|plan| plan.route.as_slice()).collect();
-        let cost = RouteCost::default();
-        spreads_s.push(arrive_together(&routes, SPEEDS_M_S, cost.climb_m_s).spread_s);
-        let times_s = plans.iter().map(|plan| plan.assessment.time_s);
-        let last = times_s.clone().fold(0.0, f64::max);
-        at_cruise_s.push(last - times_s.fold(last, f64::min));
+        let times_s: Vec<f64> = plans.iter().map(|plan| plan.assessment.time_s).collect();
+        let arrival = arrive_together(&times_s, SLOWEST);
+        spreads_s.push(arrival.spread_s);
+        at_cruise_s.push(arrival.time_s - times_s.into_iter().fold(arrival.time_s, f64::min));
     }
     let most_s = spreads_s.iter().copied().fold(0.0, f64::max);
     report.number(

@@ -1,12 +1,12 @@
 //! Routes by A* on a lattice, pulled taut and refined: slow, and near the best there is.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
-
 use nalgebra::Vector3;
 
 use super::{Plan, RouteCost, RouteProblem};
 use crate::airspace::Airspace;
+use crate::global::{Effort, Search};
+use crate::grid::{Lattice, MOVES, moved};
+use crate::map::VoxelIndex;
 
 /// How [`any_angle`] searches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,8 +27,7 @@ impl Default for AnyAngleConfig {
 
 /// The feasible route of least cost that this can find. `None` if no way of the lattice is feasible.
 ///
-/// 1. A* on a cubic lattice, 26 neighbours, by the cost of each leg without the other vehicles. The heuristic is what the
-///    straight way would cost in empty air: the lattice's best way is found.
+/// 1. A* on a cubic lattice, 26 neighbours, by the cost of each leg without the other vehicles: its best way is found.
 /// 2. Pulled taut: of all routes through some of that way's points in order, the best, by dynamic programming.
 /// 3. Refined, now by the whole cost, others included: legs are divided until none is longer than asked, then waypoints are
 ///    moved, alone and together with their neighbours, as long as that makes the route cheaper, with steps that get finer.
@@ -37,61 +36,31 @@ impl Default for AnyAngleConfig {
 /// evaluations of the cost.
 #[must_use]
 pub fn any_angle(problem: &RouteProblem<'_>, config: &AnyAngleConfig) -> Option<Plan> {
-    let lattice = Lattice::new(problem, config.pitch_m);
+    let lattice = LegLattice::new(problem, config.pitch_m);
     let taut = lattice.pull_taut(&lattice.search()?);
     let route = refine(subdivide(&taut, config.longest_leg_m), problem, config);
     Some(Plan { assessment: problem.judge(&route), route, convergence_m: vec![] })
 }
 
-struct Lattice<'a> {
+/// Points of the airspace at equal distances, with the legs between neighbours that violate nothing.
+struct LegLattice<'a> {
     airspace: &'a Airspace,
     cost: &'a RouteCost,
-    start: Vector3<f64>,
-    goal: Vector3<f64>,
+    ends: (Vector3<f64>, Vector3<f64>),
     pitch_m: f64,
     size: [usize; 3],
 }
 
-/// An entry of the open list: the least `f` first, and of equals the first node.
-#[derive(PartialEq)]
-struct Open {
-    f: f64,
-    node: usize,
-}
-
-impl Eq for Open {}
-
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.f.total_cmp(&self.f).then(other.node.cmp(&self.node))
-    }
-}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl<'a> Lattice<'a> {
+impl<'a> LegLattice<'a> {
     fn new(problem: &'a RouteProblem<'_>, pitch_m: f64) -> Self {
-        let (airspace, (start, goal)) = (problem.airspace(), problem.ends());
+        let airspace = problem.airspace();
         let extent = airspace.upper - airspace.lower;
         let size = [0, 1, 2].map(|axis| (extent[axis] / pitch_m + 1e-9).floor() as usize + 1);
-        Lattice { airspace, cost: problem.weights(), start, goal, pitch_m, size }
+        LegLattice { airspace, cost: problem.weights(), ends: problem.ends(), pitch_m, size }
     }
 
-    /// Lattice points, then start, then goal.
-    fn point(&self, node: usize) -> Vector3<f64> {
-        let [wide, deep, high] = self.size;
-        match node.checked_sub(wide * deep * high) {
-            Some(0) => self.start,
-            Some(_) => self.goal,
-            None => {
-                let cell = [node % wide, node / wide % deep, node / (wide * deep)];
-                self.airspace.lower + Vector3::from(cell.map(|k| k as f64 * self.pitch_m))
-            }
-        }
+    fn point(&self, cell: VoxelIndex) -> Vector3<f64> {
+        self.airspace.lower + Vector3::new(cell.x as f64, cell.y as f64, cell.z as f64) * self.pitch_m
     }
 
     /// What a leg costs; `None` if it violates something.
@@ -100,78 +69,35 @@ impl<'a> Lattice<'a> {
         leg.is_feasible().then_some(leg.cost_m)
     }
 
-    /// Never more than the best way costs.
-    fn heuristic_m(&self, from: &Vector3<f64>) -> f64 {
-        self.cost.least_m(from, &self.goal)
+    /// The moves to neighbours, by number, and where these are.
+    fn neighbours(&self, cell: VoxelIndex) -> impl Iterator<Item = (usize, Vector3<f64>)> {
+        MOVES.iter().enumerate().filter_map(move |(number, step)| {
+            let next = moved(cell, step.by);
+            let [wide, deep, high] = self.size;
+            (next.x < wide && next.y < deep && next.z < high).then(|| (number, self.point(next)))
+        })
     }
 
-    /// Calls `with` for the nodes next to one.
-    fn neighbours(&self, node: usize, mut with: impl FnMut(usize)) {
-        let lattice_points: usize = self.size.iter().product();
-        let here = self.point(node);
-        if (here - self.goal).amax() <= self.pitch_m && node != lattice_points + 1 {
-            with(lattice_points + 1);
-        }
-        let range = |axis: usize| {
-            let at = (here[axis] - self.airspace.lower[axis]) / self.pitch_m;
-            let low = (at - 1.0 - 1e-9).ceil().max(0.0) as usize;
-            let high = (at + 1.0 + 1e-9).floor().min(self.size[axis] as f64 - 1.0) as usize;
-            low..=high
+    /// The nearest lattice point that can be flown to from an end of the route.
+    fn beside(&self, end: &Vector3<f64>) -> Option<VoxelIndex> {
+        let near = |axis: usize| {
+            let at = ((end[axis] - self.airspace.lower[axis]) / self.pitch_m).floor() as usize;
+            (at..=at + 1).filter(move |k| *k < self.size[axis])
         };
-        for z in range(2) {
-            for y in range(1) {
-                for x in range(0) {
-                    let next = x + self.size[0] * (y + self.size[1] * z);
-                    if next != node {
-                        with(next);
-                    }
-                }
-            }
-        }
+        let cells = near(2).flat_map(|z| near(1).flat_map(move |y| near(0).map(move |x| VoxelIndex { x, y, z })));
+        let distance_m = |cell: &VoxelIndex| (self.point(*cell) - end).norm();
+        cells
+            .filter(|cell| self.leg_m(end, &self.point(*cell)).is_some())
+            .min_by(|one, other| distance_m(one).total_cmp(&distance_m(other)))
     }
 
+    /// The way of least cost along the lattice, with the route's own ends.
     fn search(&self) -> Option<Vec<Vector3<f64>>> {
-        let lattice_points: usize = self.size.iter().product();
-        let (start, goal) = (lattice_points, lattice_points + 1);
-        let mut costs_m = vec![f64::INFINITY; lattice_points + 2];
-        let mut parents = vec![start; lattice_points + 2];
-        let mut closed = vec![false; lattice_points + 2];
-        let mut open = BinaryHeap::from([Open { f: 0.0, node: start }]);
-        costs_m[start] = 0.0;
-        while let Some(Open { node, .. }) = open.pop() {
-            if node == goal {
-                return Some(self.way_back(goal, start, &parents));
-            }
-            if std::mem::replace(&mut closed[node], true) {
-                continue;
-            }
-            let here = self.point(node);
-            self.neighbours(node, |next| {
-                let there = self.point(next);
-                if closed[next] {
-                    return;
-                }
-                let Some(leg_m) = self.leg_m(&here, &there) else { return };
-                let cost_m = costs_m[node] + leg_m;
-                if cost_m < costs_m[next] {
-                    costs_m[next] = cost_m;
-                    parents[next] = node;
-                    open.push(Open { f: cost_m + self.heuristic_m(&there), node: next });
-                }
-            });
-        }
-        None
-    }
-
-    fn way_back(&self, goal: usize, start: usize, parents: &[usize]) -> Vec<Vector3<f64>> {
-        let mut way = vec![self.goal];
-        let mut node = goal;
-        while node != start {
-            node = parents[node];
-            way.push(self.point(node));
-        }
-        way.reverse();
-        way
+        let (start, goal) = self.ends;
+        let (first, last) = (self.beside(&start)?, self.beside(&goal)?);
+        let route = Search::default().solve(self, first, last, Effort::OPTIMAL).ok()?;
+        let between = route.cells.iter().map(|cell| self.point(*cell));
+        Some(std::iter::once(start).chain(between).chain([goal]).collect())
     }
 
     /// Of all routes through some of the points in order, with the first and the last, the one of least cost.
@@ -197,6 +123,35 @@ impl<'a> Lattice<'a> {
         taut.push(way[0]);
         taut.reverse();
         taut
+    }
+}
+
+impl Lattice for LegLattice<'_> {
+    fn size(&self) -> [usize; 3] {
+        self.size
+    }
+
+    fn least_costs(&self) -> [f64; 3] {
+        let metre = self.cost.length_weight + self.cost.time_weight_m_s / self.cost.cruise_m_s;
+        [1.0, 2.0, 3.0].map(|axes: f64| metre * self.pitch_m * axes.sqrt())
+    }
+
+    fn steps_from(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
+        let here = self.point(cell);
+        for (number, there) in self.neighbours(cell) {
+            if let Some(leg_m) = self.leg_m(&here, &there) {
+                visit(number, leg_m);
+            }
+        }
+    }
+
+    fn steps_into(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
+        let here = self.point(cell);
+        for (number, there) in self.neighbours(cell) {
+            if let Some(leg_m) = self.leg_m(&there, &here) {
+                visit(MOVES.len() - 1 - number, leg_m);
+            }
+        }
     }
 }
 

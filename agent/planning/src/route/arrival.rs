@@ -9,36 +9,24 @@ use crate::airspace::Airspace;
 pub struct Arrival {
     /// When the last one arrives, seconds after all set out.
     pub time_s: f64,
-    /// The constant speed of each, m/s.
-    pub speeds_m_s: Vec<f64>,
+    /// How much slower than at cruise each flies its route: 1 is cruise, 2 half as fast.
+    pub slowed: Vec<f64>,
     /// How long before the last one the first one arrives, seconds.
     pub spread_s: f64,
 }
 
-/// The speeds at which vehicles arrive together as soon as possible.
+/// Lets vehicles arrive together as soon as possible. `times_s` has what each route takes at cruise
+/// ([`super::Assessment::time_s`]).
 ///
-/// The last one flies as fast as its route allows: `speeds_m_s.1`, or less where a leg climbs or sinks so steeply that it
-/// would exceed `climb_m_s`. The others fly as much slower as their routes are shorter, but none slower than
-/// `speeds_m_s.0`: who would have to arrives early, and the spread says by how much.
+/// The last one flies at cruise. The others fly as much slower as their routes take less time, but at most `slowest` times
+/// slower: who would have to arrives early, and the spread says by how much.
 #[must_use]
-pub fn arrive_together(routes: &[&[Vector3<f64>]], speeds_m_s: (f64, f64), climb_m_s: f64) -> Arrival {
-    let (slowest_m_s, fastest_m_s) = speeds_m_s;
-    let length_m =
-        |route: &[Vector3<f64>]| -> f64 { route.windows(2).map(|leg| (leg[1] - leg[0]).norm()).sum() };
-    let most_m_s = |route: &[Vector3<f64>]| {
-        route.windows(2).fold(fastest_m_s, |most, leg| {
-            let way = leg[1] - leg[0];
-            if way.z.abs() > 0.0 { most.min(climb_m_s * way.norm() / way.z.abs()) } else { most }
-        })
-    };
-    let time_s = routes.iter().map(|route| length_m(route) / most_m_s(route)).fold(0.0, f64::max);
-    let speeds_m_s: Vec<f64> = routes
-        .iter()
-        .map(|route| if time_s > 0.0 { (length_m(route) / time_s).max(slowest_m_s) } else { 0.0 })
-        .collect();
-    let arrivals = routes.iter().zip(&speeds_m_s).map(|(route, speed)| length_m(route) / speed);
-    let first_s = arrivals.fold(time_s, f64::min);
-    Arrival { time_s, speeds_m_s, spread_s: time_s - first_s }
+pub fn arrive_together(times_s: &[f64], slowest: f64) -> Arrival {
+    let time_s = times_s.iter().copied().fold(0.0, f64::max);
+    let slow = |own_s: &f64| if *own_s > 0.0 { (time_s / own_s).min(slowest) } else { slowest };
+    let slowed: Vec<f64> = times_s.iter().map(slow).collect();
+    let first_s = times_s.iter().zip(&slowed).map(|(own_s, slowed)| own_s * slowed).fold(time_s, f64::min);
+    Arrival { time_s, slowed, spread_s: time_s - first_s }
 }
 
 /// Places around a target for so many vehicles to arrive at, in a line across the way to it, `spacing_m` apart. The line is
@@ -65,26 +53,12 @@ mod tests {
 
     use super::*;
 
-    fn straight(length_m: f64, climb_m: f64) -> Vec<Vector3<f64>> {
-        vec![Vector3::zeros(), Vector3::new(length_m, 0.0, climb_m)]
-    }
-
     #[test]
-    fn the_longest_route_is_flown_fastest_and_the_shortest_no_slower_than_allowed() {
-        let routes = [straight(2000.0, 0.0), straight(1600.0, 0.0), straight(500.0, 0.0)];
-        let routes: Vec<&[_]> = routes.iter().map(Vec::as_slice).collect();
-        let arrival = arrive_together(&routes[..2], (10.0, 25.0), 8.0);
-        assert_eq!(arrival, Arrival { time_s: 80.0, speeds_m_s: vec![25.0, 20.0], spread_s: 0.0 });
-        let arrival = arrive_together(&routes, (10.0, 25.0), 8.0);
-        assert_eq!((arrival.speeds_m_s[2], arrival.spread_s), (10.0, 30.0));
-    }
-
-    #[test]
-    fn a_steep_leg_slows_everybody() {
-        let routes = [straight(300.0, 400.0), straight(500.0, 0.0)];
-        let routes: Vec<&[_]> = routes.iter().map(Vec::as_slice).collect();
-        let arrival = arrive_together(&routes, (5.0, 25.0), 8.0);
-        assert_eq!(arrival.speeds_m_s, vec![10.0, 10.0], "8 m/s up are 10 m/s along 3, 4, 5");
+    fn the_last_flies_at_cruise_and_nobody_slower_than_allowed() {
+        let arrival = arrive_together(&[100.0, 80.0], 2.0);
+        assert_eq!(arrival, Arrival { time_s: 100.0, slowed: vec![1.0, 1.25], spread_s: 0.0 });
+        let arrival = arrive_together(&[100.0, 80.0, 40.0], 2.0);
+        assert_eq!((arrival.slowed[2], arrival.spread_s), (2.0, 20.0));
     }
 
     proptest! {

@@ -113,7 +113,7 @@ impl RouteCost {
         for leg in route.windows(2) {
             self.add_leg(&leg[0], &leg[1], airspace, &mut sum);
         }
-        self.add_encounters(&Track::along(route), traffic, &mut sum);
+        self.add_encounters(&Track::along(route, self), traffic, &mut sum);
         self.add_endurance(&mut sum);
         self.weigh(&mut sum);
         sum
@@ -133,15 +133,8 @@ impl RouteCost {
         sum
     }
 
-    /// What the straight way between two points costs high in empty air, metres: no route between them costs less.
-    #[must_use]
-    pub(super) fn least_m(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
-        let way = to - from;
-        self.length_weight * way.norm() + self.time_weight_m_s * self.leg_s(&way)
-    }
-
-    /// How long a leg takes.
-    fn leg_s(&self, way: &Vector3<f64>) -> f64 {
+    /// How long a leg takes, seconds.
+    pub(super) fn leg_s(&self, way: &Vector3<f64>) -> f64 {
         (way.norm() / self.cruise_m_s).max(way.z.abs() / self.climb_m_s)
     }
 
@@ -161,13 +154,17 @@ impl RouteCost {
         sum.time_s += self.leg_s(&way);
         sum.violation_m += airspace.intrusion_m(from, to);
         let terrain_m = airspace.terrain_bound_m(from, to);
-        if from.z.min(to.z) >= self.comfortable_clearance_m + terrain_m {
+        let high_m = self.comfortable_clearance_m.max(self.least_clearance_m) + terrain_m;
+        if from.z.min(to.z) >= high_m {
             return;
         }
         let samples = (length_m / self.sample_m).ceil().max(1.0);
         let part_m = length_m / samples;
         for k in 0..samples as usize {
             let point = from + way * ((k as f64 + 0.5) / samples);
+            if point.z >= high_m {
+                continue;
+            }
             let clearance_m = if terrain_m > 0.0 { airspace.clearance_m(&point) } else { point.z };
             let lack = (1.0 - clearance_m / self.comfortable_clearance_m).max(0.0);
             sum.height_m += lack * lack * part_m;

@@ -123,7 +123,7 @@ pub fn plan_in_turn<E: From<RouteError>>(
     let mut plans = Vec::with_capacity(ends.len());
     for (vehicle, ends) in ends.iter().enumerate() {
         let next = plan(vehicle, &mut RouteProblem::new(airspace, &traffic, cost, *ends, waypoints)?)?;
-        traffic.add(&next.route);
+        traffic.add(&next.route, &cost);
         plans.push(next);
     }
     Ok(plans)

@@ -2,19 +2,30 @@
 
 use nalgebra::Vector3;
 
+use super::RouteCost;
+
 /// Parts into which flights are cut to compare vehicles at equal times.
 pub const PARTS: usize = 32;
+
+/// Parts of a flight that are looked at together: where these are far from one another, their parts are.
+const STRETCH: usize = 8;
 
 /// Where a vehicle is at the `PARTS + 1` cuts of its flight.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Track {
     cuts: [Vector3<f64>; PARTS + 1],
+    stretches: [Extent; PARTS / STRETCH],
+}
+
+/// The box around a stretch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Extent {
     lower: Vector3<f64>,
     upper: Vector3<f64>,
 }
 
-/// The routes of vehicles that set out and arrive together, each at a constant speed of its own: at any moment all have
-/// flown the same share of their routes.
+/// The routes of vehicles that set out and arrive together ([`super::arrive_together`]): at any moment all have spent the
+/// same share of the time that their routes take.
 ///
 /// Between the cuts vehicles are taken to move straight, so that their least distance there is known exactly.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -24,8 +35,8 @@ pub struct Traffic {
 
 impl Traffic {
     /// Adds a vehicle that flies along these points (ENU, metres).
-    pub fn add(&mut self, route: &[Vector3<f64>]) {
-        self.tracks.push(Track::along(route));
+    pub fn add(&mut self, route: &[Vector3<f64>], cost: &RouteCost) {
+        self.tracks.push(Track::along(route, cost));
     }
 
     /// How many vehicles there are.
@@ -42,55 +53,67 @@ impl Traffic {
 
     /// Least distance from any of the vehicles while flying along these points with them, metres; infinite without any.
     #[must_use]
-    pub fn separation_m(&self, route: &[Vector3<f64>]) -> f64 {
+    pub fn separation_m(&self, route: &[Vector3<f64>], cost: &RouteCost) -> f64 {
         let mut least = f64::INFINITY;
-        self.encounters(&Track::along(route), f64::INFINITY, |distance_m| least = least.min(distance_m));
+        self.encounters(&Track::along(route, cost), f64::INFINITY, |distance_m| least = least.min(distance_m));
         least
     }
 
     /// Tells, for every part of the flight and every vehicle that comes nearer than `reach_m` in it, the least distance in
     /// that part, metres.
     pub(super) fn encounters(&self, own: &Track, reach_m: f64, mut tell: impl FnMut(f64)) {
-        for other in self.tracks.iter().filter(|other| own.is_near(other, reach_m)) {
-            let mut before = Vector3::zeros();
-            for (part, (theirs, ours)) in other.cuts.iter().zip(&own.cuts).enumerate() {
-                let offset = theirs - ours;
-                if part > 0 && !is_beyond(&before, &offset, reach_m) {
-                    let distance_m = distance_from_origin(&before, &offset);
+        for other in &self.tracks {
+            for stretch in 0..own.stretches.len() {
+                if !own.stretches[stretch].is_near(&other.stretches[stretch], reach_m) {
+                    continue;
+                }
+                for part in stretch * STRETCH..(stretch + 1) * STRETCH {
+                    let before = other.cuts[part] - own.cuts[part];
+                    let after = other.cuts[part + 1] - own.cuts[part + 1];
+                    if is_beyond(&before, &after, reach_m) {
+                        continue;
+                    }
+                    let distance_m = distance_from_origin(&before, &after);
                     if distance_m < reach_m {
                         tell(distance_m);
                     }
                 }
-                before = offset;
             }
         }
     }
 }
 
 impl Track {
-    /// The points at equal shares of a route's length; all at its start if it has no length.
-    pub(super) fn along(route: &[Vector3<f64>]) -> Track {
-        let start = route.first().copied().unwrap_or_default();
+    /// Where one who flies along a route is at equal times; always at its start if that takes no time.
+    pub(super) fn along(route: &[Vector3<f64>], cost: &RouteCost) -> Track {
+        let time_s: f64 = route.windows(2).map(|leg| cost.leg_s(&(leg[1] - leg[0]))).sum();
+        let step_s = time_s / PARTS as f64;
         let mut cuts = [route.last().copied().unwrap_or_default(); PARTS + 1];
-        let length_m: f64 = route.windows(2).map(|leg| (leg[1] - leg[0]).norm()).sum();
-        let step_m = length_m / PARTS as f64;
-        let (mut next, mut flown_m) = (1, 0.0);
-        cuts[0] = start;
+        cuts[0] = route.first().copied().unwrap_or_default();
+        let (mut next, mut flown_s) = (1, 0.0);
         for leg in route.windows(2) {
             let way = leg[1] - leg[0];
-            let leg_m = way.norm();
-            while next < PARTS && (next as f64) * step_m < flown_m + leg_m {
-                cuts[next] = leg[0] + way * ((next as f64 * step_m - flown_m) / leg_m);
+            let leg_s = cost.leg_s(&way);
+            while next < PARTS && next as f64 * step_s < flown_s + leg_s {
+                cuts[next] = leg[0] + way * ((next as f64 * step_s - flown_s) / leg_s);
                 next += 1;
             }
-            flown_m += leg_m;
+            flown_s += leg_s;
         }
+        let stretches = std::array::from_fn(|k| Extent::of(&cuts[k * STRETCH..=(k + 1) * STRETCH]));
+        Track { cuts, stretches }
+    }
+}
+
+impl Extent {
+    fn of(points: &[Vector3<f64>]) -> Extent {
+        let nothing = Vector3::repeat(f64::INFINITY);
         let (lower, upper) =
-            cuts.iter().fold((start, start), |(lower, upper), at| (lower.inf(at), upper.sup(at)));
-        Track { cuts, lower, upper }
+            points.iter().fold((nothing, -nothing), |(lower, upper), at| (lower.inf(at), upper.sup(at)));
+        Extent { lower, upper }
     }
 
-    fn is_near(&self, other: &Track, reach_m: f64) -> bool {
+    fn is_near(&self, other: &Extent, reach_m: f64) -> bool {
         (0..3).all(|axis| {
             self.lower[axis] - other.upper[axis] < reach_m && other.lower[axis] - self.upper[axis] < reach_m
         })
