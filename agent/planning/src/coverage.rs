@@ -9,7 +9,9 @@ const SAME_CORNER_M: f64 = 1e-6;
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum CoverageError {
     /// The corners enclose nothing.
-    #[error("an area of {corners} corners encloses nothing; give at least three, not in a line and all finite")]
+    #[error(
+        "an area of {corners} corners encloses nothing; give at least three, not in a line and all finite"
+    )]
     NoArea {
         /// How many corners there are.
         corners: usize,

@@ -77,7 +77,10 @@ mod tests {
         let wedge = Formation { shape: Shape::Wedge, spacing_m: 2.0_f64.sqrt() };
         let places = wedge.places(&Vector3::new(10.0, 0.0, 5.0), std::f64::consts::FRAC_PI_2, 3);
         let expected = [[10.0, 0.0, 5.0], [9.0, -1.0, 5.0], [11.0, -1.0, 5.0]].map(Vector3::from);
-        assert!(places.iter().zip(expected).all(|(place, expected)| (place - expected).norm() < 1e-9), "{places:?}");
+        assert!(
+            places.iter().zip(expected).all(|(place, expected)| (place - expected).norm() < 1e-9),
+            "{places:?}"
+        );
     }
 
     #[test]

@@ -6,8 +6,8 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use skein_planning::particle_swarm::{
-    Best, Constriction, Improved, ImprovedConfig, Motion, Mover, Objective, SearchSpace, SearchSpaceError, Standard,
-    Swarm, TabuConfig, TabuSwarm,
+    Best, Constriction, Improved, ImprovedConfig, Motion, Mover, Objective, SearchSpace, SearchSpaceError,
+    Standard, Swarm, TabuConfig, TabuSwarm,
 };
 
 /// A function with a known least value, and what it was asked.
@@ -21,7 +21,8 @@ struct Function {
 impl Function {
     /// The sum of `of` over all dimensions, least, 0, where all are `least_at`; searched 10 to each side of `origin`.
     fn new(dimensions: usize, origin: f64, least_at: f64, of: fn(f64) -> f64) -> Function {
-        let space = SearchSpace::new(vec![origin - 10.0; dimensions], vec![origin + 10.0; dimensions]).unwrap();
+        let space =
+            SearchSpace::new(vec![origin - 10.0; dimensions], vec![origin + 10.0; dimensions]).unwrap();
         Function { space, of, least_at: origin + least_at, asked: vec![] }
     }
 }
@@ -33,7 +34,10 @@ impl Objective for Function {
 
     fn cost(&mut self, position: &[f64]) -> f64 {
         for (dimension, value) in position.iter().enumerate() {
-            assert!((self.space.lower()[dimension]..=self.space.upper()[dimension]).contains(value), "{value}");
+            assert!(
+                (self.space.lower()[dimension]..=self.space.upper()[dimension]).contains(value),
+                "{value}"
+            );
         }
         let cost = position.iter().map(|value| (self.of)(value - self.least_at)).sum();
         self.asked.push(cost);
@@ -78,20 +82,23 @@ fn best(algorithm: usize, function: &mut Function, seed: u64, pieces: &[usize]) 
     }
 }
 
+/// The improved swarm does not settle: it escapes as long as it hardly moves. Tabu search settles for it.
 #[test]
-fn those_that_settle_find_the_least_value_of_a_bowl() {
-    for algorithm in [1, 2, 3] {
-        let mut bowl = Function::new(5, 0.0, 3.0, square);
-        let best = best(algorithm, &mut bowl, 1, &[4000]);
-        assert!(best.cost < 1e-3, "algorithm {algorithm}: {}", best.cost);
-        assert!(best.position.iter().all(|value| (value - 3.0).abs() < 0.05), "algorithm {algorithm}");
+fn the_least_value_of_a_bowl_is_found() {
+    for (algorithm, within) in [(1, 1e-3), (2, 0.5), (3, 1e-3)] {
+        for seed in 0..5 {
+            let found = best(algorithm, &mut Function::new(5, 0.0, 3.0, square), seed, &[4000]);
+            assert!(found.cost < within, "algorithm {algorithm}, seed {seed}: {}", found.cost);
+            assert!(found.position.iter().all(|value| (value - 3.0).abs() < 0.7), "algorithm {algorithm}");
+        }
     }
 }
 
 #[test]
 fn tabu_search_leaves_local_minima() {
     let mean = |algorithm| {
-        let costs = (0..20).map(|seed| best(algorithm, &mut Function::new(4, 0.0, 2.3, rastrigin), seed, &[1500]).cost);
+        let costs = (0..20)
+            .map(|seed| best(algorithm, &mut Function::new(4, 0.0, 2.3, rastrigin), seed, &[1500]).cost);
         costs.sum::<f64>() / 20.0
     };
     let (with, without) = (mean(3), mean(2));
@@ -113,7 +120,10 @@ fn the_equation_of_motion_is_the_papers() {
             .attract(0.9, 2.0, 3.0, &mut rng);
         (low, high) = (low.min(velocity[0]), high.max(velocity[0]));
     }
-    assert!((0.0..1.0).contains(&low) && (31.0..32.0).contains(&high), "0 to 2 x 1 + 3 x 10: {low} to {high}");
+    assert!(
+        (0.0..1.0).contains(&low) && (31.0..32.0).contains(&high),
+        "0 to 2 x 1 + 3 x 10: {low} to {high}"
+    );
 }
 
 #[test]

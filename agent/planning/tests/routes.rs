@@ -6,7 +6,8 @@ use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
 use skein_planning::airspace::{Airspace, Mountain, NoFlyZone, ThreatZone};
 use skein_planning::route::{
-    AnyAngleConfig, Effort, Plan, Planner, RouteCost, RouteError, RouteProblem, Traffic, any_angle, plan_in_turn,
+    AnyAngleConfig, Effort, Plan, Planner, RouteCost, RouteError, RouteProblem, Traffic, any_angle,
+    plan_in_turn,
 };
 
 const UPPER: Vector3<f64> = Vector3::new(2000.0, 2000.0, 1000.0);
@@ -17,15 +18,16 @@ fn empty() -> Airspace {
 }
 
 fn mountains() -> Airspace {
-    let mountain = |x, y, height_m| Mountain {
-        centre: Vector2::new(x, y),
-        height_m,
-        slope_m: Vector2::repeat(200.0),
-    };
+    let mountain =
+        |x, y, height_m| Mountain { centre: Vector2::new(x, y), height_m, slope_m: Vector2::repeat(200.0) };
     let threat = |x, y, radius_m| ThreatZone { centre: Vector2::new(x, y), radius_m };
     Airspace {
         mountains: vec![mountain(500.0, 1500.0, 400.0), mountain(500.0, 500.0, 200.0)],
-        threats: vec![threat(1000.0, 1000.0, 400.0), threat(500.0, 1200.0, 200.0), threat(1500.0, 500.0, 200.0)],
+        threats: vec![
+            threat(1000.0, 1000.0, 400.0),
+            threat(500.0, 1200.0, 200.0),
+            threat(1500.0, 500.0, 200.0),
+        ],
         ..empty()
     }
 }
@@ -55,7 +57,9 @@ fn a_climb_takes_as_long_as_the_rate_of_climb_allows() {
 #[test]
 fn low_flight_costs_by_the_square_of_what_the_clearance_lacks() {
     let cost = RouteCost::default();
-    let at = |height| cost.assess(&points([[0.0, 0.0, height], [1000.0, 0.0, height]]), &empty(), &Traffic::default());
+    let at = |height| {
+        cost.assess(&points([[0.0, 0.0, height], [1000.0, 0.0, height]]), &empty(), &Traffic::default())
+    };
     assert_eq!(at(100.0).height_m, 0.0);
     assert!((at(50.0).height_m - 250.0).abs() < 1e-9);
     assert!(at(50.0).is_feasible() && at(30.0).is_feasible());
@@ -113,7 +117,11 @@ fn a_way_around_a_cylinder_is_nearly_as_short_as_it_can_be() {
     for planner in [Planner::Onboard, Planner::Ground] {
         let plan = planner.plan(&mut problem, Effort::default(), 4);
         assert!(plan.assessment.is_feasible(), "{planner:?}");
-        assert!((shortest_m..1.04 * shortest_m).contains(&plan.assessment.length_m), "{planner:?}: {:?}", plan.assessment);
+        assert!(
+            (shortest_m..1.04 * shortest_m).contains(&plan.assessment.length_m),
+            "{planner:?}: {:?}",
+            plan.assessment
+        );
     }
 }
 
@@ -158,7 +166,8 @@ fn fleet(planner: impl Fn(&mut RouteProblem<'_>, u64) -> Plan) -> Vec<Plan> {
         (Vector3::new(0.0, y, 100.0), Vector3::new(2000.0, 500.0 + 60.0 * k as f64, 400.0))
     };
     let ends: Vec<_> = (0..6).map(lane).collect();
-    let plan = |vehicle, problem: &mut RouteProblem<'_>| Ok::<_, RouteError>(planner(problem, vehicle as u64));
+    let plan =
+        |vehicle, problem: &mut RouteProblem<'_>| Ok::<_, RouteError>(planner(problem, vehicle as u64));
     plan_in_turn(&mountains(), RouteCost::default(), &ends, WAYPOINTS, plan).unwrap()
 }
 
@@ -180,7 +189,11 @@ fn the_improved_swarms_beat_the_others_and_come_near_the_reference() {
 
 #[test]
 fn plans_converge_and_a_seed_gives_one_plan() {
-    let by = |seed| fleet(move |problem, _| Planner::Onboard.plan(problem, Effort { particles: 10, generations: 9 }, seed));
+    let by = |seed| {
+        fleet(move |problem, _| {
+            Planner::Onboard.plan(problem, Effort { particles: 10, generations: 9 }, seed)
+        })
+    };
     let plans = by(5);
     assert_eq!(plans, by(5));
     assert_ne!(plans, by(6));

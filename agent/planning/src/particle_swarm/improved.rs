@@ -2,10 +2,10 @@
 
 use std::collections::VecDeque;
 
-use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::modes::Modes;
+use super::swarm::unit;
 use super::{Flock, Motion, Mover, SearchSpace};
 
 /// How the improved swarm moves.
@@ -141,12 +141,12 @@ impl Motion for Improved {
                 let mode = (dimension % space.chain() + 1) as f64;
                 let shift = kick * space.width(dimension) / (mode * mode);
                 let mut perturb = |value: f64| {
-                    let (rand, sway): (f64, f64) = (rng.random(), rng.random());
+                    let (rand, sway) = (unit(rng), unit(rng));
                     rand * value + (2.0 * sway - 1.0) * shift
                 };
                 (own, leader) = (perturb(own), perturb(leader));
             }
-            let (r1, r2): (f64, f64) = (rng.random(), rng.random());
+            let (r1, r2) = (unit(rng), unit(rng));
             *at = c * r1 * (own - *at) + c * r2 * (leader - *at);
         }
         self.modes.transform(&self.position, &mut self.offset);

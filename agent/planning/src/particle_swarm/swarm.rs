@@ -1,7 +1,7 @@
 //! The swarm that all algorithms share.
 
-use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::{Objective, SearchSpace};
 
@@ -63,13 +63,18 @@ pub struct Swarm<M> {
     evaluations: usize,
 }
 
+/// A number in 0..1, of 32 random bits: no search needs more, and half of its time would go into them.
+pub(super) fn unit(rng: &mut ChaCha8Rng) -> f64 {
+    f64::from(rng.next_u32()) / 4_294_967_296.0
+}
+
 impl Mover<'_> {
     /// The equation of motion, `v = w v + c1 r1 (pbest - x) + c2 r2 (gbest - x)` (P3), with random numbers `r1` and
     /// `r2` in 0..1 of their own for each dimension.
     pub fn attract(self, inertia: f64, c1: f64, c2: f64, rng: &mut ChaCha8Rng) {
         let places = self.position.iter().zip(self.own_best).zip(self.leader);
         for (velocity, ((at, own), leader)) in self.velocity.iter_mut().zip(places) {
-            let (r1, r2): (f64, f64) = (rng.random(), rng.random());
+            let (r1, r2) = (unit(rng), unit(rng));
             *velocity = inertia * *velocity + c1 * r1 * (own - at) + c2 * r2 * (leader - at);
         }
     }
@@ -114,7 +119,7 @@ impl<M: Motion> Swarm<M> {
         let size = size.max(1);
         let positions = (0..size * dimensions)
             .map(|k| {
-                let share: f64 = rng.random();
+                let share = unit(&mut rng);
                 space.lower()[k % dimensions] + share * space.width(k % dimensions)
             })
             .collect();

@@ -6,6 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::modes::Modes;
+use super::swarm::unit;
 use super::{Best, Improved, ImprovedConfig, Objective, SearchSpace, Swarm};
 
 /// How swarm and tabu search take turns.
@@ -146,7 +147,7 @@ impl TabuSwarm {
     fn draw(&mut self, space: &SearchSpace) -> Feature {
         let dimension = self.rng.random_range(0..space.dimensions());
         let is_rising: bool = self.rng.random();
-        let share: f64 = self.rng.random();
+        let share = unit(&mut self.rng);
         let (longest, shortest) = self.config.reach;
         let mode = (dimension % space.chain() + 1) as f64;
         let length =

@@ -84,7 +84,8 @@ impl<'a> LegLattice<'a> {
             let at = ((end[axis] - self.airspace.lower[axis]) / self.pitch_m).floor() as usize;
             (at..=at + 1).filter(move |k| *k < self.size[axis])
         };
-        let cells = near(2).flat_map(|z| near(1).flat_map(move |y| near(0).map(move |x| VoxelIndex { x, y, z })));
+        let cells =
+            near(2).flat_map(|z| near(1).flat_map(move |y| near(0).map(move |x| VoxelIndex { x, y, z })));
         let distance_m = |cell: &VoxelIndex| (self.point(*cell) - end).norm();
         cells
             .filter(|cell| self.leg_m(end, &self.point(*cell)).is_some())

@@ -55,7 +55,9 @@ impl Traffic {
     #[must_use]
     pub fn separation_m(&self, route: &[Vector3<f64>], cost: &RouteCost) -> f64 {
         let mut least = f64::INFINITY;
-        self.encounters(&Track::along(route, cost), f64::INFINITY, |distance_m| least = least.min(distance_m));
+        self.encounters(&Track::along(route, cost), f64::INFINITY, |distance_m| {
+            least = least.min(distance_m)
+        });
         least
     }
 
@@ -94,8 +96,9 @@ impl Track {
         for leg in route.windows(2) {
             let way = leg[1] - leg[0];
             let leg_s = cost.leg_s(&way);
+            let velocity = if leg_s > 0.0 { way / leg_s } else { way };
             while next < PARTS && next as f64 * step_s < flown_s + leg_s {
-                cuts[next] = leg[0] + way * ((next as f64 * step_s - flown_s) / leg_s);
+                cuts[next] = leg[0] + velocity * (next as f64 * step_s - flown_s);
                 next += 1;
             }
             flown_s += leg_s;
