@@ -32,7 +32,7 @@ impl Objective for Function {
         &self.space
     }
 
-    fn cost(&mut self, position: &[f64]) -> f64 {
+    fn cost_below(&mut self, _: f64, position: &[f64]) -> f64 {
         for (dimension, value) in position.iter().enumerate() {
             assert!(
                 (self.space.lower()[dimension]..=self.space.upper()[dimension]).contains(value),

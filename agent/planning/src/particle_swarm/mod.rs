@@ -10,7 +10,7 @@
 //! struct Sphere(SearchSpace);
 //! impl Objective for Sphere {
 //!     fn space(&self) -> &SearchSpace { &self.0 }
-//!     fn cost(&mut self, at: &[f64]) -> f64 { at.iter().map(|x| x * x).sum() }
+//!     fn cost_below(&mut self, _: f64, at: &[f64]) -> f64 { at.iter().map(|x| x * x).sum() }
 //! }
 //!
 //! let mut sphere = Sphere(SearchSpace::new(vec![-10.0; 4], vec![10.0; 4])?);
@@ -40,6 +40,7 @@ pub trait Objective {
     /// Where it is defined.
     fn space(&self) -> &SearchSpace;
 
-    /// Its value at a position in the space, one number for each dimension. Finite.
-    fn cost(&mut self, position: &[f64]) -> f64;
+    /// Its value at a position in the space, one number for each dimension; if that is not below `limit`, any number that is
+    /// not. A swarm only needs to know values that are better than what it remembers.
+    fn cost_below(&mut self, limit: f64, position: &[f64]) -> f64;
 }

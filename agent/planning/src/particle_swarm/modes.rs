@@ -9,31 +9,39 @@ use std::f64::consts::PI;
 #[derive(Clone, Debug)]
 pub(super) struct Modes {
     length: usize,
-    /// Row after row.
-    matrix: Vec<f64>,
+    /// The matrix in strips of [`LANES`] columns, filled up with zeros; in each strip row after row.
+    strips: Vec<Vec<[f64; LANES]>>,
 }
+
+/// Sums that a processor takes at once.
+const LANES: usize = 4;
 
 impl Modes {
     pub(super) fn new(length: usize) -> Modes {
         let ends = (length + 1) as f64;
-        let entry = |k: usize| {
-            let (mode, place) = ((k / length + 1) as f64, (k % length + 1) as f64);
-            (2.0 / ends).sqrt() * (PI * mode * place / ends).sin()
+        let entry = |row: usize, column: usize| match (length, column < length) {
+            // A chain of one is itself.
+            (1, true) => 1.0,
+            (_, true) => (2.0 / ends).sqrt() * (PI * ((row + 1) * (column + 1)) as f64 / ends).sin(),
+            (_, false) => 0.0,
         };
-        // A chain of one is itself.
-        let matrix = if length == 1 { vec![1.0] } else { (0..length * length).map(entry).collect() };
-        Modes { length, matrix }
+        let strip = |strip: usize| {
+            (0..length).map(|row| std::array::from_fn(|lane| entry(row, strip * LANES + lane))).collect()
+        };
+        Modes { length, strips: (0..length.div_ceil(LANES)).map(strip).collect() }
     }
 
     /// Transforms every chain of `from` into `to`.
     pub(super) fn transform(&self, from: &[f64], to: &mut [f64]) {
         for (from, to) in from.chunks_exact(self.length).zip(to.chunks_exact_mut(self.length)) {
-            to.fill(0.0);
-            // The matrix is symmetric: its rows are its columns.
-            for (value, column) in from.iter().zip(self.matrix.chunks_exact(self.length)) {
-                for (sum, entry) in to.iter_mut().zip(column) {
-                    *sum += value * entry;
+            for (strip, to) in self.strips.iter().zip(to.chunks_mut(LANES)) {
+                let mut sums = [0.0; LANES];
+                for (value, entries) in from.iter().zip(strip) {
+                    for (sum, entry) in sums.iter_mut().zip(entries) {
+                        *sum += value * entry;
+                    }
                 }
+                to.copy_from_slice(&sums[..to.len()]);
             }
         }
     }

@@ -162,7 +162,7 @@ impl<M: Motion> Swarm<M> {
         let dimensions = self.flock.space.dimensions();
         let here = self.turn * dimensions..(self.turn + 1) * dimensions;
         let position = &self.flock.positions[here.clone()];
-        let cost = objective.cost(position);
+        let cost = objective.cost_below(self.flock.best_costs[self.turn], position);
         self.evaluations += 1;
         if cost < self.flock.best_costs[self.turn] {
             self.flock.best_costs[self.turn] = cost;

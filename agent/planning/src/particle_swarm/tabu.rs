@@ -123,13 +123,14 @@ impl TabuSwarm {
             self.next = None;
         }
         let feature = self.draw(objective.space());
-        let cost = objective.cost(&self.candidate);
+        let next_cost = self.next.as_ref().map_or(f64::INFINITY, |(_, next)| next.cost);
+        let cost = objective.cost_below(next_cost.max(self.swarm.best().cost), &self.candidate);
         self.in_turn += 1;
         self.spent += 1;
         let is_best = cost < self.swarm.best().cost;
         self.swarm.learn(&self.candidate, cost);
         let is_allowed = is_best || !self.tabu.contains(&feature);
-        if is_allowed && self.next.as_ref().is_none_or(|(_, next)| cost < next.cost) {
+        if is_allowed && cost < next_cost {
             self.next = Some((feature, Best { position: self.candidate.clone(), cost }));
         }
         if self.in_turn.is_multiple_of(self.config.candidates)

@@ -109,13 +109,36 @@ impl RouteCost {
     /// The cost of flying along these points (ENU, metres) among others. `O(legs (zones + samples) + PARTS vehicles)`.
     #[must_use]
     pub fn assess(&self, route: &[Vector3<f64>], airspace: &Airspace, traffic: &Traffic) -> Assessment {
+        self.assess_below(f64::INFINITY, route, airspace, traffic)
+    }
+
+    /// The same, as far as it is needed to know whether the cost is below a limit. All its parts only ever add to it, so what
+    /// has reached the limit is left there.
+    #[must_use]
+    pub(super) fn assess_below(
+        &self,
+        limit_m: f64,
+        route: &[Vector3<f64>],
+        airspace: &Airspace,
+        traffic: &Traffic,
+    ) -> Assessment {
         let mut sum = Assessment::default();
         for leg in route.windows(2) {
-            self.add_leg(&leg[0], &leg[1], airspace, &mut sum);
+            self.add_way(&(leg[1] - leg[0]), &mut sum);
         }
-        self.add_encounters(&Track::along(route, self), traffic, &mut sum);
         self.add_endurance(&mut sum);
         self.weigh(&mut sum);
+        for leg in route.windows(2) {
+            if sum.cost_m >= limit_m {
+                return sum;
+            }
+            self.add_surroundings(&leg[0], &leg[1], airspace, &mut sum);
+            self.weigh(&mut sum);
+        }
+        if sum.cost_m < limit_m {
+            self.add_encounters(&Track::along(route, self), traffic, &mut sum);
+            self.weigh(&mut sum);
+        }
         sum
     }
 
@@ -128,7 +151,8 @@ impl RouteCost {
         airspace: &Airspace,
     ) -> Assessment {
         let mut sum = Assessment::default();
-        self.add_leg(from, to, airspace, &mut sum);
+        self.add_way(&(to - from), &mut sum);
+        self.add_surroundings(from, to, airspace, &mut sum);
         self.weigh(&mut sum);
         sum
     }
@@ -147,17 +171,26 @@ impl RouteCost {
             + self.violation_weight * sum.violation_m;
     }
 
-    fn add_leg(&self, from: &Vector3<f64>, to: &Vector3<f64>, airspace: &Airspace, sum: &mut Assessment) {
-        let way = to - from;
-        let length_m = way.norm();
-        sum.length_m += length_m;
-        sum.time_s += self.leg_s(&way);
+    fn add_way(&self, way: &Vector3<f64>, sum: &mut Assessment) {
+        sum.length_m += way.norm();
+        sum.time_s += self.leg_s(way);
+    }
+
+    fn add_surroundings(
+        &self,
+        from: &Vector3<f64>,
+        to: &Vector3<f64>,
+        airspace: &Airspace,
+        sum: &mut Assessment,
+    ) {
         sum.violation_m += airspace.intrusion_m(from, to);
         let terrain_m = airspace.terrain_bound_m(from, to);
         let high_m = self.comfortable_clearance_m.max(self.least_clearance_m) + terrain_m;
         if from.z.min(to.z) >= high_m {
             return;
         }
+        let way = to - from;
+        let length_m = way.norm();
         let samples = (length_m / self.sample_m).ceil().max(1.0);
         let part_m = length_m / samples;
         for k in 0..samples as usize {

@@ -116,8 +116,8 @@ impl Objective for RouteProblem<'_> {
         &self.space
     }
 
-    fn cost(&mut self, position: &[f64]) -> f64 {
+    fn cost_below(&mut self, limit: f64, position: &[f64]) -> f64 {
         let (cost, airspace, traffic) = (self.cost, self.airspace, self.traffic);
-        cost.assess(self.route(position), airspace, traffic).cost_m
+        cost.assess_below(limit, self.route(position), airspace, traffic).cost_m
     }
 }
