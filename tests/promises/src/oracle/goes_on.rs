@@ -43,6 +43,8 @@ impl Oracle for GoesOn {
                 if let Some(home) = knowledge.number(happened.home.as_str()) {
                     self.heard.insert((step.node, home), happened.seq);
                 }
+            } else if me.is_fact(happened) && happened.event.kind() == facts::PEER_JOINED {
+                self.meets(step.node, &happened.event, knowledge);
             } else if me.is_fact(happened) && happened.event.kind() == facts::REFUSED {
                 let (bthread, reason) = (happened.event.text("bthread"), happened.event.text("reason"));
                 if let Some(bthread) = bthread.filter(|_| reason == Some(RefusalReason::Safety.as_str())) {
@@ -89,6 +91,20 @@ impl Oracle for GoesOn {
                     }
                 }
             }
+        }
+    }
+}
+
+impl GoesOn {
+    /// A node hears a home for the first time. What a home that was there before it has told until then, it may have missed.
+    fn meets(&mut self, observer: usize, fact: &Event, knowledge: &Knowledge) {
+        let home = fact.text("node").and_then(|name| knowledge.number(name));
+        let Some((home, life)) = home.and_then(|home| Some((home, knowledge.member(home).present()?))) else {
+            return;
+        };
+        let ran = knowledge.member(observer).present().and_then(|life| life.ran);
+        if ran.is_some_and(|ran| life.began < ran) {
+            self.heard.entry((observer, home)).or_insert(life.occurred.len() as u64);
         }
     }
 }
