@@ -5,7 +5,9 @@
 mod dstar_grid;
 mod figure;
 mod report;
+mod runs;
 mod sphere;
+mod swarm_planning;
 
 use std::path::PathBuf;
 
@@ -35,6 +37,11 @@ pub const EXPERIMENTS: &[Experiment] = &[
         name: "dstar-grid",
         about: "D* with a collision factor on the marker grid, and re-planning by D* Lite (Zhang 2019)",
         run: dstar_grid::run,
+    },
+    Experiment {
+        name: "swarm-planning",
+        about: "twenty vehicles plan to ten targets among mountains and threats: particle swarms compared (P3)",
+        run: swarm_planning::run,
     },
 ];
 
