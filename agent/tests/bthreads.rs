@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use skein_agent::{
-    AgentConfig, Controller, Envelope, Fence, Me, PassageRule,
+    AgentConfig, Controller, Envelope, Fence, Me, PassageRule, Planners,
     bthreads::{self, LinkLossPolicy},
 };
 use skein_bp::{Bid, Event, EventSet, Program, ProgramConfig};
@@ -39,6 +39,7 @@ fn config() -> AgentConfig {
         lidar: true,
         fence: Fence { min: [-20.0, -20.0, 0.0], max: [20.0, 20.0, 10.0] },
         envelope: Envelope::default(),
+        planners: Planners::default(),
         link_loss: LinkLossPolicy::Continue,
         controller: Controller::Bp,
         passage_rule: PassageRule::Confirmed,

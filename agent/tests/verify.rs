@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use skein_agent::verify::{Scene, SceneReport, VehicleVerifier, check_script};
 use skein_agent::{
-    AgentConfig, AgentError, Controller, Envelope, Fence, PassageRule, bthreads::LinkLossPolicy,
+    AgentConfig, AgentError, Controller, Envelope, Fence, PassageRule, Planners, bthreads::LinkLossPolicy,
 };
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_bp::verify::ViolationKind;
@@ -34,6 +34,7 @@ fn config() -> AgentConfig {
         lidar: true,
         fence: Fence { min: [-60.0, -60.0, -1.0], max: [60.0, 60.0, 20.0] },
         envelope: Envelope::default(),
+        planners: Planners::default(),
         link_loss: LinkLossPolicy::Return,
         controller: Controller::Bp,
         passage_rule: PassageRule::Confirmed,

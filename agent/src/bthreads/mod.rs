@@ -3,20 +3,20 @@
 //! Adding a b-thread: write its file, name it in [`load`]. No other b-thread changes.
 
 mod battery;
-mod escape;
+pub(crate) mod escape;
 mod found_airborne;
 mod geofence;
 mod link_loss;
-mod mission;
-mod navigation;
+pub(crate) mod mission;
+pub(crate) mod navigation;
 mod obstacle_avoidance;
 mod one_name;
 mod operator;
-mod path_planning;
+pub(crate) mod path_planning;
 mod pilot;
 mod preflight;
 mod reposition;
-mod return_home;
+pub(crate) mod return_home;
 mod right_of_way;
 mod separation;
 mod together;
