@@ -27,6 +27,8 @@ pub(crate) struct Block {
     pub(crate) on_loss: OnLoss,
     /// The homes that it concerns.
     pub(crate) homes: Vec<NodeName>,
+    /// Whether its holder waits to be told that it holds, be it that no other home is concerned.
+    pub(crate) is_awaited: bool,
 }
 
 /// What the holder may rely on.
@@ -92,6 +94,7 @@ impl HeldBlocks {
             let at = |home: &NodeName| upheld(home, bthread, held.sync).filter(|upheld| now < upheld.until);
             let homes = &held.block.homes;
             let unsure = homes.iter().find(|home| at(home).is_none());
+            let concerns_anyone = held.block.is_awaited || !homes.is_empty();
             let acknowledged = || homes.iter().all(|home| at(home).is_some_and(|upheld| upheld.acknowledged));
             let (bthread, sync) = (bthread.clone(), held.sync);
             held.standing = match (held.standing, unsure) {
@@ -99,7 +102,7 @@ impl HeldBlocks {
                     news.push(BlockNews::Lapsed { bthread, home: home.clone() });
                     Standing::Unsure
                 }
-                (Standing::Unsure | Standing::Inherited, None) if acknowledged() => {
+                (Standing::Unsure | Standing::Inherited, None) if concerns_anyone && acknowledged() => {
                     news.push(BlockNews::Confirmed { bthread, sync });
                     Standing::Confirmed
                 }
@@ -141,7 +144,12 @@ mod tests {
     }
 
     fn block(set: &str) -> Block {
-        Block { set: EventSet::from(set), on_loss: OnLoss::Release, homes: homes().to_vec() }
+        Block {
+            set: EventSet::from(set),
+            on_loss: OnLoss::Release,
+            homes: homes().to_vec(),
+            is_awaited: false,
+        }
     }
 
     /// A block of both homes.

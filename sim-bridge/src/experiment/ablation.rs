@@ -36,7 +36,7 @@ pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
         scenario.orders.clear();
         scenario.time_limit_s = TIME_LIMIT_S;
         let trial = Trial::new(&scenario, Controller::Bp);
-        Ok(trial.with_agents(|agent| agent.planners.without = *without).fly(&mut |_| {})?.summary)
+        Ok(trial.with_agents(|agent| agent.planners.without = *without).fly(&mut |_, _| {})?.summary)
     })?;
     let mut report = Report::default();
     report.number("worlds", worlds);

@@ -96,7 +96,7 @@ fn fly(case: &Case, vehicles: usize, seed: u64) -> anyhow::Result<Outcome> {
     scenario.time_limit_s = PATIENCE_S;
     let controller = if case.loaded { Controller::Bp } else { Controller::None };
     let mut silence = Silence::default();
-    let flown = Trial::new(&scenario, controller).fly(&mut |swarm| silence.watch(swarm))?;
+    let flown = Trial::new(&scenario, controller).fly(&mut |swarm, _| silence.watch(swarm))?;
     Ok(Outcome {
         ran: silence.longest.is_some_and(|longest| longest < SILENT),
         navigated: flown.summary.succeeded,

@@ -9,6 +9,7 @@ mod feasibility;
 mod figure;
 mod performance;
 mod report;
+mod right_of_way;
 mod runs;
 mod sphere;
 mod statistics;
@@ -58,6 +59,11 @@ pub const EXPERIMENTS: &[Experiment] = &[
         name: "ablation",
         about: "what each layer of the pipeline contributes: 50 forests without it",
         run: ablation::run,
+    },
+    Experiment {
+        name: "right-of-way",
+        about: "one vehicle at a time through a window: blocks that are confirmed, and the naive rule beside them",
+        run: right_of_way::run,
     },
     Experiment {
         name: "sphere",

@@ -69,7 +69,7 @@ pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
 }
 
 fn fly(scenario: &Scenario, controller: Controller) -> anyhow::Result<Flight> {
-    let flown = Trial::new(scenario, controller).fly(&mut |_| {})?;
+    let flown = Trial::new(scenario, controller).fly(&mut |_, _| {})?;
     let summary = flown.summary;
     Ok(Flight {
         succeeded: summary.succeeded,

@@ -24,8 +24,9 @@ struct BidAbroad {
     blocked_homes: Vec<NodeName>,
     priority: Option<i32>,
     on_loss: OnLoss,
-    /// Whether its holder is, or was, or wants to be told that it holds.
+    /// Whether its holder is, or was, or wants to be told that the block holds.
     is_watched: bool,
+    awaits_confirmation: bool,
 }
 
 impl Node {
@@ -95,6 +96,7 @@ impl Node {
             priority: bid.given_priority(),
             on_loss: if bid.holds_when_lost() { OnLoss::Hold } else { OnLoss::Release },
             is_watched,
+            awaits_confirmation,
         })
     }
 
@@ -138,7 +140,12 @@ impl Node {
 
 impl BidAbroad {
     fn held_block(&self) -> Block {
-        Block { set: self.block.clone(), on_loss: self.on_loss, homes: self.blocked_homes.clone() }
+        Block {
+            set: self.block.clone(),
+            on_loss: self.on_loss,
+            homes: self.blocked_homes.clone(),
+            is_awaited: self.awaits_confirmation,
+        }
     }
 
     /// The bid as each home it concerns is to know it.
