@@ -30,6 +30,16 @@ pub enum Controller {
     None,
 }
 
+/// How a vehicle decides that it may enter a narrow passage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PassageRule {
+    /// It blocks everyone else's entering, and enters once all homes have confirmed that.
+    #[default]
+    Confirmed,
+    /// It enters when nobody is heard to be inside. Two may be inside at once: for comparison only.
+    Heard,
+}
+
 /// What the vehicle can do, and the distances it keeps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Envelope {
@@ -148,6 +158,8 @@ pub struct AgentConfig {
     pub link_loss: LinkLossPolicy,
     /// What decides.
     pub controller: Controller,
+    /// How it shares narrow passages.
+    pub passage_rule: PassageRule,
     /// The scripts that run from the start.
     pub scripts: Vec<Assignment>,
     /// Lease of the bids this node sends.

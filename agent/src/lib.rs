@@ -19,7 +19,7 @@ pub mod verify;
 mod watches;
 
 pub use self::{
-    config::{AgentConfig, Controller, Envelope, Fence, Layer, LocalPlanner, Planners},
+    config::{AgentConfig, Controller, Envelope, Fence, Layer, LocalPlanner, PassageRule, Planners},
     core::{AgentCore, AgentError, Outcome, SetPointRecord, Status},
     flight::FlightPhase,
     me::Me,

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use skein_agent::{
-    AgentConfig, Controller, Envelope, Fence, Me, Planners,
+    AgentConfig, Controller, Envelope, Fence, Me, PassageRule, Planners,
     bthreads::{self, LinkLossPolicy},
     scripts::{Runner, Scripts},
 };
@@ -43,6 +43,7 @@ fn config() -> AgentConfig {
         planners: Planners::default(),
         link_loss: LinkLossPolicy::Continue,
         controller: Controller::Bp,
+        passage_rule: PassageRule::Confirmed,
         scripts: Vec::new(),
         lease: Duration::from_secs(1),
         authority: skein_wire::standard_authority(),

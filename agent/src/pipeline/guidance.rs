@@ -505,8 +505,7 @@ impl Guidance {
             self.following.as_mut().filter(|following| now <= self.leave_until && !following.blocked)?;
         self.hover_at = None;
         let attraction = self.escape.attraction();
-        let step =
-            self.local.follow(&following.path, following.station_m, &motion.position, attraction, map);
+        let step = self.local.follow(&following.path, following.station_m, &motion.position, attraction, map);
         following.station_m = step.station_m;
         Some(Wish { velocity: step.velocity, height_m: step.carrot.z })
     }

@@ -85,7 +85,11 @@ impl Local {
     }
 
     /// What moves and tells nobody where it is, as far as this planner looks out for it.
-    pub fn moving<'a>(&'a self, now: Duration, map: &'a ClearanceMap) -> impl Iterator<Item = Neighbour> + 'a {
+    pub fn moving<'a>(
+        &'a self,
+        now: Duration,
+        map: &'a ClearanceMap,
+    ) -> impl Iterator<Item = Neighbour> + 'a {
         self.openings.iter().flat_map(move |openings| openings.moving.moving(now, map))
     }
 

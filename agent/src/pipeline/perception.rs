@@ -204,7 +204,8 @@ mod tests {
             let (sin, cos) = (f64::from(ray) * angle_step).sin_cos();
             let direction = pose.attitude * Vector3::new(cos, sin, 0.0);
             let ground = if direction.z < 0.0 { pose.position.z / -direction.z } else { f64::INFINITY };
-            let wall = if direction.x > 0.0 { (wall_m - pose.position.x) / direction.x } else { f64::INFINITY };
+            let wall =
+                if direction.x > 0.0 { (wall_m - pose.position.x) / direction.x } else { f64::INFINITY };
             ground.min(wall) as f32
         };
         Scan {

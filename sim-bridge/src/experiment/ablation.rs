@@ -36,7 +36,7 @@ pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
         scenario.orders.clear();
         scenario.time_limit_s = TIME_LIMIT_S;
         let trial = Trial::new(&scenario, Controller::Bp);
-        Ok(trial.with_agents(|agent| agent.planners.without = *without).fly(&mut |_| {})?.summary)
+        Ok(trial.with_agents(|agent| agent.planners.without = *without).fly(&mut |_, _| {})?.summary)
     })?;
     let mut report = Report::default();
     report.number("worlds", worlds);
@@ -55,7 +55,16 @@ pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
     report.number("variants", variants);
     report.table(
         "What each layer contributes: time and distance are means over the worlds that succeed",
-        &["", "succeeded", "hit obstacles", "hit vehicles", "time, s", "distance, m", "closest, m", "clearance, m"],
+        &[
+            "",
+            "succeeded",
+            "hit obstacles",
+            "hit vehicles",
+            "time, s",
+            "distance, m",
+            "closest, m",
+            "clearance, m",
+        ],
         rows,
     );
     Ok(report)

@@ -71,8 +71,16 @@ pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
         rows,
     );
     if let [variable, plain, ..] = found.as_slice() {
-        report.goal("RMS error, share of that of the plain integral", variable.0 / plain.0, Bound::Below(1.0));
-        report.goal("greatest error, share of that of the plain integral", variable.1 / plain.1, Bound::Below(1.0));
+        report.goal(
+            "RMS error, share of that of the plain integral",
+            variable.0 / plain.0,
+            Bound::Below(1.0),
+        );
+        report.goal(
+            "greatest error, share of that of the plain integral",
+            variable.1 / plain.1,
+            Bound::Below(1.0),
+        );
     }
     if let Some(first) = flights.first() {
         report.figure("circle", map(first));
@@ -174,7 +182,8 @@ fn fly(integral: PositionIntegral, seed: u64) -> anyhow::Result<Flight> {
 }
 
 fn map(flights: &[Flight]) -> Figure {
-    let circle = (0..=72).map(|k| f64::from(k) * TAU / 72.0).map(|a| (RADIUS_M * a.cos(), RADIUS_M * a.sin()));
+    let circle =
+        (0..=72).map(|k| f64::from(k) * TAU / 72.0).map(|a| (RADIUS_M * a.cos(), RADIUS_M * a.sin()));
     let reference = Line { name: "wanted".to_owned(), style: Style::Reference, points: circle.collect() };
     let line = |((name, _), flight): (&(&str, PositionIntegral), &Flight)| Line {
         name: format!("{name} integral"),

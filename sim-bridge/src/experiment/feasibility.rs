@@ -96,7 +96,7 @@ fn fly(case: &Case, vehicles: usize, seed: u64) -> anyhow::Result<Outcome> {
     scenario.time_limit_s = PATIENCE_S;
     let controller = if case.loaded { Controller::Bp } else { Controller::None };
     let mut silence = Silence::default();
-    let flown = Trial::new(&scenario, controller).fly(&mut |swarm| silence.watch(swarm))?;
+    let flown = Trial::new(&scenario, controller).fly(&mut |swarm, _| silence.watch(swarm))?;
     Ok(Outcome {
         ran: silence.longest.is_some_and(|longest| longest < SILENT),
         navigated: flown.summary.succeeded,
@@ -128,7 +128,9 @@ mod tests {
     fn the_program_runs_in_all_four_cases_and_navigates_with_b_threads_only() {
         let report = run(&Options { runs: Some(1), ..Options::default() }).expect("it can be run");
         let json = report.to_json();
-        let ticks = |field: &str| CASES.iter().enumerate().map(|(n, _)| json["cases"][n][field].clone()).collect::<Vec<_>>();
+        let ticks = |field: &str| {
+            CASES.iter().enumerate().map(|(n, _)| json["cases"][n][field].clone()).collect::<Vec<_>>()
+        };
         assert_eq!(ticks("program_runs"), [1, 1, 1, 1]);
         assert_eq!(ticks("navigates"), [1, 1, 0, 0]);
         assert!(report.is_reached());

@@ -9,9 +9,11 @@ mod feasibility;
 mod figure;
 mod performance;
 mod report;
+mod right_of_way;
 mod runs;
 mod sphere;
 mod statistics;
+mod swarm_planning;
 mod vfh;
 
 use std::path::PathBuf;
@@ -59,6 +61,11 @@ pub const EXPERIMENTS: &[Experiment] = &[
         run: ablation::run,
     },
     Experiment {
+        name: "right-of-way",
+        about: "one vehicle at a time through a window: blocks that are confirmed, and the naive rule beside them",
+        run: right_of_way::run,
+    },
+    Experiment {
         name: "sphere",
         about: "a hundred vehicles through the middle of a sphere, beside ORCA",
         run: sphere::run,
@@ -67,6 +74,11 @@ pub const EXPERIMENTS: &[Experiment] = &[
         name: "dstar-grid",
         about: "D* with a collision factor on the marker grid, and re-planning by D* Lite (Zhang 2019)",
         run: dstar_grid::run,
+    },
+    Experiment {
+        name: "swarm-planning",
+        about: "twenty vehicles plan to ten targets among mountains and threats: particle swarms compared (P3)",
+        run: swarm_planning::run,
     },
 ];
 

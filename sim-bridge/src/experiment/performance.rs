@@ -69,7 +69,7 @@ pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
 }
 
 fn fly(scenario: &Scenario, controller: Controller) -> anyhow::Result<Flight> {
-    let flown = Trial::new(scenario, controller).fly(&mut |_| {})?;
+    let flown = Trial::new(scenario, controller).fly(&mut |_, _| {})?;
     let summary = flown.summary;
     Ok(Flight {
         succeeded: summary.succeeded,
@@ -137,7 +137,12 @@ fn compare(report: &mut Report, pairs: &[[Flight; 2]]) {
     report.number("succeeded", json!({ "bp": succeeded[0], "sequential": succeeded[1] }));
     report.number(
         "failed_seeds_bp",
-        pairs.iter().zip(1..).filter(|(pair, _)| !pair[0].succeeded).map(|(_, seed)| Value::from(seed)).collect::<Vec<_>>(),
+        pairs
+            .iter()
+            .zip(1..)
+            .filter(|(pair, _)| !pair[0].succeeded)
+            .map(|(_, seed)| Value::from(seed))
+            .collect::<Vec<_>>(),
     );
     report.goal("runs that succeed with b-threads", succeeded[0] as f64, Bound::Exactly(pairs.len() as f64));
     report.table(
@@ -169,7 +174,14 @@ mod tests {
     use super::*;
 
     fn flight(navigation_s: f64, succeeded: bool) -> Flight {
-        Flight { succeeded, navigation_s, simulation_s: navigation_s + 1.0, cpu_percent: 1.0, whole_cpu_percent: 5.0, odometry_m: 70.0 }
+        Flight {
+            succeeded,
+            navigation_s,
+            simulation_s: navigation_s + 1.0,
+            cpu_percent: 1.0,
+            whole_cpu_percent: 5.0,
+            odometry_m: 70.0,
+        }
     }
 
     #[test]

@@ -76,7 +76,7 @@ fn scenario(seed: u64) -> anyhow::Result<Scenario> {
 
 fn fly(scenario: &Scenario) -> anyhow::Result<Flight> {
     let mut track = Vec::new();
-    let flown = Trial::new(scenario, Controller::Bp).fly(&mut |swarm| {
+    let flown = Trial::new(scenario, Controller::Bp).fly(&mut |swarm, _| {
         let vehicle = swarm.simulation().vehicle(0).filter(|vehicle| vehicle.airborne);
         let model = scenario.vehicles.first().map(|plan| &plan.model);
         if let (Some(vehicle), Some(model)) = (vehicle, model) {

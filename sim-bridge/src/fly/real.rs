@@ -14,8 +14,7 @@ use skein_world::STEP;
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohSession};
 
 use super::{
-    Flight, Happenings, Host, Links, Recording, Swarm,
-    agent_configs,
+    Flight, Happenings, Host, Links, Recording, Swarm, agent_configs,
     setup::{FLEET, GROUND, vehicle_name},
 };
 use crate::{

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AgentConfig, Controller, Envelope, Fence, Planners};
+use skein_agent::{AgentConfig, Controller, Envelope, Fence, PassageRule, Planners};
 use skein_bp::script::Assignment;
 use skein_dbp::{Kept, NodeName};
 use skein_ground::{GroundConfig, Order, Who};
@@ -101,6 +101,7 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
             },
             planners: Planners { local: scenario.local, without: None },
             link_loss: LinkLossPolicy::default(),
+            passage_rule: PassageRule::Confirmed,
             controller: match controller {
                 cli::Controller::Bp => Controller::Bp,
                 cli::Controller::Sequential => Controller::Sequential,

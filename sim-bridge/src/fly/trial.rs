@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use skein_agent::AgentConfig;
+use skein_dbp::Happened;
 
 use super::{
     Flight, Happenings, Host, Lockstep, Swarm, agent_configs, interruptions, memory_links, memory_network,
@@ -11,6 +12,9 @@ use crate::cli::Controller;
 use crate::cpu_time;
 use crate::scenario::Scenario;
 use crate::summary::{Summary, Traffic};
+
+/// An onlooker: the swarm, and the selections at their homes since the last tick.
+type Watch<'a> = dyn FnMut(&Swarm, &[Happened]) + 'a;
 
 /// A flight to be made.
 pub struct Trial<'a> {
@@ -44,19 +48,19 @@ impl<'a> Trial<'a> {
         self
     }
 
-    /// Flies; `watch` sees the swarm after each tick of its agents.
+    /// Flies; `watch` sees the swarm after each tick of its agents, and what has happened in it.
     ///
     /// # Errors
     /// What is wrong with an agent's configuration; or the user has interrupted it.
-    pub fn fly(self, watch: &mut dyn FnMut(&Swarm)) -> anyhow::Result<Flown> {
+    pub fn fly(self, watch: &mut Watch<'_>) -> anyhow::Result<Flown> {
         let began = cpu_time::this_thread()?;
         let network = memory_network(self.scenario);
         let links = memory_links(&network, self.scenario);
         let flight = Flight::new(self.scenario, self.controller, self.agents, links, None, None)?;
         let mut agents_cpu = Duration::ZERO;
-        let mut watch = |swarm: &Swarm| {
+        let mut watch = |swarm: &Swarm, selections: &[Happened]| {
             agents_cpu = swarm.agents_cpu();
-            watch(swarm);
+            watch(swarm, selections);
         };
         let summary = flight.fly(&mut Watched { lockstep: Lockstep(network), watch: &mut watch })?;
         anyhow::ensure!(interruptions() == 0, "interrupted");
@@ -67,7 +71,7 @@ impl<'a> Trial<'a> {
 /// Lockstep with an onlooker.
 struct Watched<'a> {
     lockstep: Lockstep,
-    watch: &'a mut dyn FnMut(&Swarm),
+    watch: &'a mut Watch<'a>,
 }
 
 impl Host for Watched<'_> {
@@ -77,7 +81,7 @@ impl Host for Watched<'_> {
 
     fn after_step(&mut self, swarm: &Swarm, happenings: &Happenings) {
         if happenings.ticked {
-            (self.watch)(swarm);
+            (self.watch)(swarm, &happenings.selections);
         }
     }
 

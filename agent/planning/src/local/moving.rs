@@ -138,7 +138,11 @@ impl Tracker {
     /// What moves, where it is expected `now`. Its uncertainty has grown since it was last seen, and it keeps no distance.
     ///
     /// Whatever moves has left the place where it was first seen: in the `map` that place is free.
-    pub fn moving<'a>(&'a self, now: Duration, map: &'a ClearanceMap) -> impl Iterator<Item = Neighbour> + 'a {
+    pub fn moving<'a>(
+        &'a self,
+        now: Duration,
+        map: &'a ClearanceMap,
+    ) -> impl Iterator<Item = Neighbour> + 'a {
         let MovingConfig { sigma_m: [sigma_m, growth_m_s], .. } = self.config;
         let moves = move |track: &&Track| {
             track.sightings >= self.config.fewest_sightings
@@ -292,8 +296,9 @@ mod tests {
     fn a_wall_does_not_move() {
         let mut tracker = Tracker::new(MovingConfig::default());
         for tick in 0..30 {
-            let wall: Vec<_> =
-                (0..40).map(|k| Vector3::new(3.0, -2.0 + 0.1 * f64::from(k), 3.0 + 0.05 * tick as f64)).collect();
+            let wall: Vec<_> = (0..40)
+                .map(|k| Vector3::new(3.0, -2.0 + 0.1 * f64::from(k), 3.0 + 0.05 * tick as f64))
+                .collect();
             tracker.look(at(tick), &wall);
             assert_eq!(tracker.moving(at(tick), &free()).count(), 0);
         }

@@ -137,12 +137,7 @@ pub fn run_up(speed_m_s: f64, way_m: f64, config: &SpeedConfig) -> f64 {
 /// The next velocity of a set-point that was `previous`, on its way to `wanted`, after `step_s`: it turns and changes its
 /// speed by no more than `accel_m_s2`.
 #[must_use]
-pub fn step(
-    previous: &Vector3<f64>,
-    wanted: &Vector3<f64>,
-    step_s: f64,
-    accel_m_s2: f64,
-) -> Vector3<f64> {
+pub fn step(previous: &Vector3<f64>, wanted: &Vector3<f64>, step_s: f64, accel_m_s2: f64) -> Vector3<f64> {
     previous + limited(wanted - previous, accel_m_s2 * step_s)
 }
 
@@ -155,7 +150,8 @@ mod tests {
     fn a_start_does_not_crawl_and_a_short_leg_never_cruises() {
         let config = SpeedConfig::default();
         assert_eq!(trapezoid(0.0, 15.0, &config), 1.5);
-        let fastest = (0..=15).map(|s| trapezoid(f64::from(s), 15.0 - f64::from(s), &config)).fold(0.0, f64::max);
+        let fastest =
+            (0..=15).map(|s| trapezoid(f64::from(s), 15.0 - f64::from(s), &config)).fold(0.0, f64::max);
         assert!(fastest < 3.5, "{fastest}");
     }
 

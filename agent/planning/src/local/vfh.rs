@@ -385,14 +385,16 @@ mod tests {
     fn a_wide_opening_is_passed_at_a_comfortable_distance_and_a_narrow_one_all_the_same() {
         let config = VfhConfig { safety_radius_m: 0.4, ..VfhConfig::default() };
         // The target is half a metre beside the right pillar.
-        let steered = |gap_m: f64| steered(&[(2.0, gap_m - 0.2, 0.4), (2.0, -1.0, 0.4)], -0.05, config).unwrap();
+        let steered =
+            |gap_m: f64| steered(&[(2.0, gap_m - 0.2, 0.4), (2.0, -1.0, 0.4)], -0.05, config).unwrap();
         assert!(steered(3.0) > 0.1, "{}", steered(3.0));
         assert!(steered(1.6).abs() < 0.1, "{}", steered(1.6));
     }
 
     #[test]
     fn walled_in_there_is_no_way() {
-        let ring: Vec<_> = (0..24).map(|k| direction(f64::from(k) * TAU / 24.0) * 1.5).map(|p| (p.x, p.y, 0.3)).collect();
+        let ring: Vec<_> =
+            (0..24).map(|k| direction(f64::from(k) * TAU / 24.0) * 1.5).map(|p| (p.x, p.y, 0.3)).collect();
         assert_eq!(steered(&ring, 0.3, VfhConfig::default()), None);
     }
 
@@ -402,7 +404,10 @@ mod tests {
         vfh.look(&Vector3::zeros(), &scan(&[(2.0, 0.0, 0.4)]), 720);
         let left = vfh.steer(0.1, None).unwrap();
         assert!(left > 0.0);
-        assert!((vfh.steer(-0.05, None).unwrap() - left).abs() < 0.2, "a little to the right changes nothing");
+        assert!(
+            (vfh.steer(-0.05, None).unwrap() - left).abs() < 0.2,
+            "a little to the right changes nothing"
+        );
         vfh.rest();
         assert!(vfh.steer(-0.05, None).unwrap() < 0.0, "but for one that begins anew");
     }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::{Context as _, ensure};
 use serde::Deserialize;
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AgentConfig, Controller, Envelope, Fence, LocalPlanner, Planners};
+use skein_agent::{AgentConfig, Controller, Envelope, Fence, LocalPlanner, PassageRule, Planners};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
@@ -225,6 +225,7 @@ impl File {
                 WithoutGround::Land => LinkLossPolicy::Land,
             },
             controller: Controller::Bp,
+            passage_rule: PassageRule::Confirmed,
             scripts: self.script.iter().map(|script| script.read(folder)).collect::<anyhow::Result<_>>()?,
             lease: Duration::from_millis(self.lease_ms),
             authority: self.authority.unwrap_or_else(standard_authority),

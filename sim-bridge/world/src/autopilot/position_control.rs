@@ -192,7 +192,8 @@ impl PositionControl {
             return;
         };
         let error = position - estimate.position.xy();
-        let growth = error * (integral_share(self.learns, error.norm()) * self.position_gain * POSITION_INTEGRAL_RATE);
+        let growth =
+            error * (integral_share(self.learns, error.norm()) * self.position_gain * POSITION_INTEGRAL_RATE);
         let integral = self.position_integral + growth * STEP.as_secs_f64();
         self.position_integral = integral.cap_magnitude(MAX_POSITION_INTEGRAL_M_S);
     }
@@ -290,7 +291,8 @@ mod tests {
     #[test]
     fn the_variable_integral_takes_in_what_was_published() {
         // 0 for |e| > 200 cm, (200 - |e|) / 100 between, 1 for |e| < 100 cm.
-        let published = [(0.0, 1.0), (0.99, 1.0), (1.0, 1.0), (1.25, 0.75), (1.5, 0.5), (2.0, 0.0), (7.0, 0.0)];
+        let published =
+            [(0.0, 1.0), (0.99, 1.0), (1.0, 1.0), (1.25, 0.75), (1.5, 0.5), (2.0, 0.0), (7.0, 0.0)];
         for (error_m, share) in published {
             assert!((integral_share(PositionIntegral::Variable, error_m) - share).abs() < 1e-12, "{error_m}");
             assert_eq!(integral_share(PositionIntegral::Plain, error_m), 1.0);

@@ -176,7 +176,8 @@ mod tests {
 
     #[test]
     fn walled_in_it_stays() {
-        let wall: Vec<_> = (0..40).map(|k| direction(f64::from(k) * 0.157) * 1.5).map(|p| (p.x, p.y)).collect();
+        let wall: Vec<_> =
+            (0..40).map(|k| direction(f64::from(k) * 0.157) * 1.5).map(|p| (p.x, p.y)).collect();
         assert!(fly(&wall, 0.15).iter().all(|(position, _)| position.xy().norm() < 0.8));
     }
 }
