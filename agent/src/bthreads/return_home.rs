@@ -40,11 +40,14 @@ enum Phase {
 impl ReturnHome {
     /// `home` is the point above the take-off place, metres ENU; its height is the vehicle's own return altitude.
     #[must_use]
-    pub fn new(me: Me, [x, y, z]: [f64; 3]) -> Self {
-        let home =
-            me.event(GOTO).with("leg", HOME_LEG).with("lands", true).with("x", x).with("y", y).with("z", z);
-        Self { me, home, phase: Phase::Grounded }
+    pub fn new(me: Me, home: [f64; 3]) -> Self {
+        Self { home: goto(&me, home), me, phase: Phase::Grounded }
     }
+}
+
+/// The `goto` to the point above the take-off place.
+pub(crate) fn goto(me: &Me, [x, y, z]: [f64; 3]) -> Event {
+    me.event(GOTO).with("leg", HOME_LEG).with("lands", true).with("x", x).with("y", y).with("z", z)
 }
 
 impl BThread for ReturnHome {

@@ -16,7 +16,7 @@ use skein_planning::route::{
     AnyAngleConfig, Effort, Plan, Planner, RouteCost, RouteProblem, any_angle, arrive_together, plan_in_turn,
 };
 
-use super::{Bound, Figure, Line, Options, Report, Style, runs};
+use super::{Bound, Figure, Line, Options, Report, Style, runs, statistics};
 use crate::bench::quantile::quantile;
 use crate::cpu_time;
 
@@ -358,8 +358,7 @@ fn share(cases: impl Iterator<Item = bool>) -> f64 {
 }
 
 fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
-    let (sum, count) = values.into_iter().fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
-    sum / count
+    statistics::mean(&values.into_iter().collect::<Vec<_>>())
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
+use skein_agent::LocalPlanner;
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_world::{Aabb, Obstacle, Scene, Shape, VehicleModel, WindConfig};
 
@@ -47,6 +48,8 @@ struct FileTable {
     model: Option<String>,
     #[serde(default, deserialize_with = "field::optional_positive")]
     cruise_speed_m_s: Option<f64>,
+    #[serde(default)]
+    local: LocalPlanner,
     #[serde(default, deserialize_with = "field::optional_positive")]
     takeoff_height_m: Option<f64>,
     #[serde(default, deserialize_with = "field::optional_positive")]
@@ -237,6 +240,7 @@ impl ScenarioFile {
             vehicles: plans,
             muster: table.formation.is_some() || table.targets.is_some(),
             cruise_speed_m_s,
+            local: table.local,
             takeoff_height_m,
             time_limit_s: table.time_limit_s.unwrap_or(DEFAULT_TIME_LIMIT_S),
             wind: table.wind.map(WindConfig::from).unwrap_or_default(),
