@@ -219,7 +219,11 @@ fn no_vehicles_are_refused() {
 fn an_unknown_scenario_lists_the_known_ones() {
     let error =
         Scenario::open("forrest", &Overrides::default(), 1).expect_err("no such scenario").to_string();
-    assert!(error.contains("`forrest`") && error.contains("forest, antipodal, window, open"), "{error}");
+    assert!(
+        error.contains("`forrest`")
+            && error.contains("forest, antipodal, window, open, survey, geese, valley"),
+        "{error}"
+    );
     let error =
         Scenario::open("no/such.toml", &Overrides::default(), 1).expect_err("no such file").to_string();
     assert!(error.starts_with("cannot read `no/such.toml`"), "{error}");

@@ -92,7 +92,7 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
             lidar: true,
             fence,
             envelope: Envelope {
-                cruise_m_s: scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
+                cruise_m_s: plan.pace * scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
                 climb_m_s: plan.model.max_climb_m_s.min(1.5),
                 brake_m_s2: plan.model.max_accel_m_s2 * 0.7,
                 hull_m: plan.model.hull_radius_m,
@@ -154,7 +154,7 @@ pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Control
         orders: orders.collect(),
         loaded: controller == cli::Controller::Bp,
         launch_on_order: scenario.orders.iter().any(|said| said.order == OrderKind::LaunchTogether),
-        muster: swaps_places(scenario),
+        muster: scenario.muster || swaps_places(scenario),
         operators: NodeName::new(SCRIPT).into_iter().collect(),
         lease: LEASE,
         seed: scenario.seed,

@@ -36,6 +36,12 @@ pub fn ground_point<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vector
     finite::<D::Error>([x, y, 0.0]).map(Vector3::from)
 }
 
+/// A list of places on the ground.
+pub fn ground_points<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Vector3<f64>>, D::Error> {
+    let values = Vec::<[f64; 2]>::deserialize(deserializer)?;
+    values.into_iter().map(|[x, y]| finite::<D::Error>([x, y, 0.0]).map(Vector3::from)).collect()
+}
+
 /// A list of points, each of three finite coordinates.
 pub fn points<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Vector3<f64>>, D::Error> {
     let values = Vec::<[f64; 3]>::deserialize(deserializer)?;
