@@ -114,7 +114,7 @@ impl VehiclePlan {
     }
 }
 
-/// What the in-memory network does to messages.
+/// What the in-memory network does to messages, and how the nodes are set up for it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Network {
@@ -124,11 +124,15 @@ pub struct Network {
     /// Share of messages that are lost, 0 to below 1.
     #[serde(deserialize_with = "field::share")]
     pub loss: f64,
+    /// How long a node's bids hold elsewhere without being renewed, in milliseconds, 100 to 10000: several times as long as
+    /// a message takes there and back.
+    #[serde(deserialize_with = "field::lease_ms")]
+    pub lease_ms: f64,
 }
 
 impl Default for Network {
     fn default() -> Self {
-        Self { latency_ms: 5.0, loss: 0.0 }
+        Self { latency_ms: 5.0, loss: 0.0, lease_ms: 1000.0 }
     }
 }
 
