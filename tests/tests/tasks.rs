@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use skein_agent::bthreads::Outcome;
+use skein_agent::Outcome;
 use skein_tests::Lockstep;
 
 type Point = [f64; 3];
