@@ -1,4 +1,7 @@
 //! Obstacles that move: found in a lidar's returns, followed from scan to scan, and predicted with growing uncertainty.
+//!
+//! Motion is horizontal. The height of a return is that of the lidar's plane, which pitches and climbs with the vehicle: seen from
+//! there every trunk goes up and down.
 
 use std::time::Duration;
 
@@ -113,12 +116,13 @@ impl Tracker {
         let mut lost: Vec<Track> = std::mem::take(&mut self.tracks);
         lost.retain(|track| now.saturating_sub(track.seen).as_secs_f64() < forget_s);
         for Thing { centre, radius_m, surface } in self.things(returns) {
-            let surprise = |track: &Track| (centre - track.expected(now)).norm();
+            let surprise = |track: &Track| (centre - track.expected(now)).xy().norm();
             let nearest = (0..lost.len()).min_by(|a, b| surprise(&lost[*a]).total_cmp(&surprise(&lost[*b])));
             self.tracks.push(match nearest.filter(|index| surprise(&lost[*index]) < gate_m) {
                 Some(index) => {
                     let track = lost.swap_remove(index);
-                    let expected = track.expected(now);
+                    let mut expected = track.expected(now);
+                    expected.z = centre.z;
                     Track {
                         position: expected + (centre - expected) * place_share,
                         velocity: track.velocity + (centre - expected) * velocity_share,
@@ -164,7 +168,7 @@ impl Tracker {
             track.sightings >= self.config.fewest_sightings
                 && track.surprise_m < self.config.most_surprise_m
                 && track.velocity.norm() > self.config.slowest_m_s
-                && (track.position - track.first_seen).norm() > self.config.moved_m
+                && (track.position - track.first_seen).xy().norm() > self.config.moved_m
                 && map.clearance(&track.first_surface) > self.config.stays_m
         };
         self.tracks.iter().filter(moves).map(move |track| Neighbour {
@@ -285,6 +289,16 @@ mod tests {
         assert!(!later.cooperative);
         tracker.look(at(40), &[]);
         assert_eq!(tracker.moving(at(40), &map).count(), 0, "it is gone");
+    }
+
+    #[test]
+    fn a_trunk_does_not_move_when_the_vehicle_climbs() {
+        let mut tracker = Tracker::new(MovingConfig::default());
+        for tick in 0..20 {
+            let eye = Vector3::new(0.0, 0.0, 2.0 + 0.15 * tick as f64);
+            tracker.look(at(tick), &seen(&eye, &Vector3::new(4.0, -1.0, eye.z), 0.25));
+        }
+        assert_eq!(tracker.moving(at(19), &free()).count(), 0);
     }
 
     #[test]
