@@ -18,11 +18,11 @@ vehicles = 1
 cruise_speed_m_s = 2.0
 
 [bounds]
-min_m = [-20.0, -30.0, -1.0]
+min_m = [-40.0, -30.0, -1.0]
 max_m = [50.0, 30.0, 12.0]
 
 [[vehicle]]
-start_m = [0.0, 0.0]
+start_m = [-30.0, 0.0]
 waypoints_m = [[30.0, 0.0, 3.0]]
 "#;
 /// Where the ways cross, and from where the intruder comes.
