@@ -50,7 +50,7 @@ impl Intruder {
         let telemetry = self.companion.telemetry();
         let (mode, armed, ready) = (telemetry.mode, telemetry.armed, telemetry.ready_to_arm);
         let height_m = telemetry.position.map_or(0.0, |position| position.value.z);
-        let every_second = now.as_millis() % 1000 == 0;
+        let every_second = now.as_millis().is_multiple_of(1000);
         match mode {
             _ if !every_second => {}
             _ if ready && !armed => self.companion.command(now, Command::Arm),
