@@ -31,5 +31,6 @@ pub mod map;
 pub mod passage;
 mod path;
 pub mod separation;
+pub mod traffic;
 
 pub use path::{Corner, Path, Projection};

@@ -158,7 +158,8 @@ fn events_per_s(mut program: Program, cpu_time: Duration) -> anyhow::Result<f64>
     }
 }
 
-fn this_threads_cpu_time() -> anyhow::Result<Duration> {
+/// CPU time of this thread so far.
+pub(crate) fn this_threads_cpu_time() -> anyhow::Result<Duration> {
     Ok(clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID)?.into())
 }
 

@@ -3,6 +3,7 @@
 //! An experiment is a file here, named in [`EXPERIMENTS`].
 
 mod figure;
+mod lsc;
 mod report;
 
 use std::path::PathBuf;
@@ -23,7 +24,7 @@ pub struct Experiment {
 }
 
 /// Every experiment.
-pub const EXPERIMENTS: &[Experiment] = &[];
+pub const EXPERIMENTS: &[Experiment] = &[lsc::EXPERIMENT];
 
 /// What the command line says to an experiment. What is not given is the experiment's own.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -1,0 +1,263 @@
+//! One vehicle in traffic: hears the others' words, plans for itself, commits itself by one step in its turn, and says so.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use thiserror::Error;
+
+use super::encounter::Apart;
+use super::itinerary::Itinerary;
+use super::lattice::{Move, State};
+use super::roads::{Distances, Roads};
+use super::search::{self, Request, Scratch};
+use super::standing::{Rank, Standing};
+
+/// A vehicle that has not been heard of for so many steps has changed its mind since.
+const FORGOTTEN_AFTER: u32 = 8;
+
+/// What a vehicle tells the others in its turn.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Word {
+    /// Its number, which no other has.
+    pub number: u32,
+    /// The step whose beginning it was said for.
+    pub said_for: u32,
+    /// Grows with every word.
+    pub sequence: u32,
+    /// Its plan, to its goal.
+    pub itinerary: Itinerary,
+    /// It keeps to its plan until this step, and brakes then unless it says otherwise.
+    pub committed: u32,
+    /// Who goes before whom.
+    pub standing: Standing,
+    /// The narrow places on its way, from which cell into which.
+    pub lanes: Vec<Lane>,
+    /// Where it rests once it has arrived.
+    pub goal: State,
+}
+
+/// A step from a cell into the next, in a place with room for one.
+pub type Lane = ([i16; 3], [i16; 3]);
+
+/// How a vehicle behaves in traffic.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TravellerConfig {
+    /// The distance kept from others.
+    pub apart: Apart,
+    /// Most states that a search expands.
+    pub budget: usize,
+}
+
+/// Why a vehicle cannot take part.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum TravellerError {
+    /// Its start or goal is not where it can be.
+    #[error(
+        "vehicle {number}: its {what} ({x}, {y}, {z}) m is outside the bounds or too near an obstacle; move it"
+    )]
+    Place {
+        /// The vehicle.
+        number: u32,
+        /// `start` or `goal`.
+        what: &'static str,
+        /// East, m.
+        x: f64,
+        /// North, m.
+        y: f64,
+        /// Up, m.
+        z: f64,
+    },
+    /// There is no way between them.
+    #[error("vehicle {number}: no way leads from its start to its goal; obstacles close every one")]
+    NoWay {
+        /// The vehicle.
+        number: u32,
+    },
+}
+
+/// What came of a turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Turn {
+    /// States expanded.
+    pub expanded: usize,
+    /// Whether the plan keeps its distance from all that go before.
+    pub is_clear: bool,
+}
+
+/// A vehicle in traffic.
+#[derive(Debug, Clone)]
+pub struct Traveller {
+    roads: Arc<Roads>,
+    distances: Distances,
+    config: TravellerConfig,
+    word: Word,
+    is_hindered: bool,
+    heard: BTreeMap<u32, Word>,
+    scratch: Scratch,
+}
+
+impl Traveller {
+    /// A vehicle at rest in the cell of `start`, on its way to that of `goal` (world ENU, m).
+    ///
+    /// # Errors
+    /// [`TravellerError`] names the vehicle and what is wrong.
+    pub fn new(
+        number: u32,
+        roads: Arc<Roads>,
+        start: &Vector3<f64>,
+        goal: &Vector3<f64>,
+        config: TravellerConfig,
+    ) -> Result<Self, TravellerError> {
+        let state = |what, point: &Vector3<f64>| {
+            let state = roads.lattice().nearest(point).filter(|state| roads.is_open(state));
+            let [x, y, z] = (*point).into();
+            state.ok_or(TravellerError::Place { number, what, x, y, z })
+        };
+        let (start, goal) = (state("start", start)?, state("goal", goal)?);
+        let distances = roads.distances(goal);
+        let way = distances.steps_from(&roads, &start).ok_or(TravellerError::NoWay { number })?;
+        let own = Rank { way: std::cmp::Reverse(way), number };
+        let word = Word {
+            number,
+            said_for: 0,
+            sequence: 0,
+            itinerary: Itinerary::resting(0, start),
+            committed: 0,
+            standing: Standing { arrived: start == goal, convoy: own, left: way, own },
+            lanes: lanes(&roads, &roads.route(start, &distances)),
+            goal,
+        };
+        Ok(Self {
+            roads,
+            distances,
+            config,
+            word,
+            is_hindered: false,
+            heard: BTreeMap::new(),
+            scratch: Scratch::default(),
+        })
+    }
+
+    /// What it says, and what it has heard the others say: all of it is passed on.
+    pub fn words(&self) -> impl Iterator<Item = &Word> {
+        std::iter::once(&self.word).chain(self.heard.values())
+    }
+
+    /// Where it can fly.
+    #[must_use]
+    pub fn roads(&self) -> &Roads {
+        &self.roads
+    }
+
+    /// Its own word.
+    #[must_use]
+    pub fn word(&self) -> &Word {
+        &self.word
+    }
+
+    /// Takes in a word, its own author's or passed on.
+    pub fn hear(&mut self, word: &Word) {
+        let is_new = self.heard.get(&word.number).is_none_or(|known| known.sequence < word.sequence);
+        if is_new && word.number != self.word.number {
+            self.heard.insert(word.number, word.clone());
+        }
+    }
+
+    /// What it does from `step` to the next, as far as it is committed.
+    #[must_use]
+    pub fn movement(&self, step: u32) -> Option<Move> {
+        self.word.itinerary.committed(step, self.word.committed)
+    }
+
+    /// Whether it rests at its goal at `step`.
+    #[must_use]
+    pub fn is_home(&self, step: u32) -> bool {
+        self.movement(step).is_some_and(|movement| movement.from == self.word.goal)
+    }
+
+    /// Its turn, before `step` begins: plans from there on and commits itself to the move from `step` to the next.
+    ///
+    /// To be taken once or more for each step, by one vehicle at a time among those that hear one another.
+    /// A second turn for the same step does nothing unless a commitment of another was in the way at the first.
+    pub fn take_turn(&mut self, step: u32) -> Option<Turn> {
+        if self.word.said_for == step && self.word.sequence > 0 && !self.is_hindered {
+            return None;
+        }
+        self.heard.retain(|_, word| word.said_for + FORGOTTEN_AFTER >= step);
+        let start = self.movement(step)?.from;
+        self.stand(start);
+        let found = self.search(step, start);
+        self.is_hindered = found.is_hindered;
+        self.word.itinerary = found.itinerary;
+        self.word.committed = step + 1;
+        self.word.said_for = step;
+        self.word.sequence += 1;
+        Some(Turn { expanded: found.expanded, is_clear: found.is_clear })
+    }
+
+    fn search(&mut self, step: u32, start: State) -> search::Found {
+        // Whoever is near enough to meet has spoken for this step or the last.
+        let near = self.heard.values().filter(|word| word.said_for + 1 >= step);
+        let committed: Vec<_> = near
+            .filter_map(|word| {
+                let at = |step| word.itinerary.committed(step, word.committed);
+                Some([at(step)?, at(step + 1)?, at(step + 2)?])
+            })
+            .collect();
+        let (before, behind): (Vec<&Word>, Vec<&Word>) =
+            self.heard.values().partition(|word| word.standing < self.word.standing);
+        let before: Vec<_> = before.into_iter().map(|word| &word.itinerary).collect();
+        let resting: Vec<_> =
+            behind.into_iter().filter(|word| word.standing.arrived).map(|word| word.goal).collect();
+        let request = Request {
+            roads: &self.roads,
+            distances: &self.distances,
+            step,
+            start,
+            apart: self.config.apart,
+            committed: &committed,
+            before: &before,
+            resting: &resting,
+        };
+        search::plan(&request, self.config.budget, &mut self.scratch)
+    }
+
+    /// Finds its standing among those it hears.
+    fn stand(&mut self, state: State) {
+        let standing = &mut self.word.standing;
+        standing.arrived |= state == self.word.goal;
+        self.word.lanes = lanes(&self.roads, &self.roads.route(state, &self.distances));
+        let leaders = self.heard.values().filter(|word| !word.standing.arrived);
+        let same_way = leaders.filter(|word| go_the_same_way(&self.word.lanes, &word.lanes));
+        let first = same_way.map(|word| word.standing.convoy).min();
+        if let Some(convoy) = first.filter(|convoy| *convoy < standing.convoy) {
+            standing.convoy = convoy;
+        }
+    }
+}
+
+/// The steps of a way that lead into or out of a cell which has room for one only, between two walls.
+fn lanes(roads: &Roads, route: &[[i16; 3]]) -> Vec<Lane> {
+    let steps = route.windows(2).filter_map(|pair| <[[i16; 3]; 2]>::try_from(pair).ok());
+    steps.filter(|[from, to]| is_narrow(roads, *from, *to)).map(|[from, to]| (from, to)).collect()
+}
+
+fn is_narrow(roads: &Roads, from: [i16; 3], to: [i16; 3]) -> bool {
+    let changed: Vec<usize> = (0..3).filter(|axis| from[*axis] != to[*axis]).collect();
+    let [along] = changed[..] else { return false };
+    let walled = |cell: [i16; 3]| {
+        (0..3).filter(|axis| *axis != along).all(|axis| {
+            [-1, 1].into_iter().all(|side| {
+                let mut beside = cell;
+                beside[axis] += side;
+                !roads.is_cell_open(beside)
+            })
+        })
+    };
+    walled(from) || walled(to)
+}
+
+fn go_the_same_way(own: &[Lane], other: &[Lane]) -> bool {
+    own.iter().any(|lane| other.contains(lane)) && !own.iter().any(|(from, to)| other.contains(&(*to, *from)))
+}

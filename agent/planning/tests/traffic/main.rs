@@ -1,0 +1,8 @@
+//! Vehicles in forests and mazes, each with its own plan and a radio of 3 m: they arrive, and no two come near one another.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
+mod places;
+mod run;
+
+mod published;
