@@ -16,6 +16,12 @@ impl Itinerary {
         Self { first_step: step, states: vec![state] }
     }
 
+    /// In one state from `step` until `end`, which is what is known; after that it may go anywhere.
+    #[must_use]
+    pub fn waiting(step: u32, state: State, end: u32) -> Self {
+        Self { first_step: step, states: vec![state; end.saturating_sub(step) as usize + 1] }
+    }
+
     /// `states` from `first_step` on; a rest is added if the last is none.
     #[must_use]
     pub fn new(first_step: u32, mut states: Vec<State>) -> Self {

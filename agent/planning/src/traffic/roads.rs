@@ -213,43 +213,44 @@ fn speed(code: u32) -> [i8; 3] {
     [code % 3, code / 3 % 3, code / 9].map(|digit| digit as i8 - 1)
 }
 
+/// A room of cells of 0.5 m, walls where the picture has `#`; north is up.
+#[cfg(test)]
+pub(super) fn room(picture: &[&str]) -> Roads {
+    let walls: Vec<Vector3<f64>> = picture
+        .iter()
+        .rev()
+        .enumerate()
+        .flat_map(|(y, row)| {
+            row.chars()
+                .enumerate()
+                .filter(|(_, c)| *c == '#')
+                .map(move |(x, _)| Vector3::new(x as f64, y as f64, 0.0) * 0.5)
+        })
+        .collect();
+    let greatest = Vector3::new(picture[0].len() as f64 - 1.0, picture.len() as f64 - 1.0, 0.0) * 0.5;
+    let lattice = Lattice::new(Vector3::zeros(), greatest, Vector3::zeros(), 0.5);
+    let clearance = move |point: &Vector3<f64>| {
+        let to_box =
+            |wall: &Vector3<f64>| (point - wall).abs().add_scalar(-0.25).map(|d| d.max(0.0)).xy().norm();
+        walls.iter().map(to_box).fold(f64::INFINITY, f64::min)
+    };
+    Roads::new(lattice, clearance, 0.22)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A room of cells of 0.5 m, walls where the picture has `#`; north is up.
-    fn roads(picture: &[&str]) -> Roads {
-        let walls: Vec<Vector3<f64>> = picture
-            .iter()
-            .rev()
-            .enumerate()
-            .flat_map(|(y, row)| {
-                row.chars()
-                    .enumerate()
-                    .filter(|(_, c)| *c == '#')
-                    .map(move |(x, _)| Vector3::new(x as f64, y as f64, 0.0) * 0.5)
-            })
-            .collect();
-        let greatest = Vector3::new(picture[0].len() as f64 - 1.0, picture.len() as f64 - 1.0, 0.0) * 0.5;
-        let lattice = Lattice::new(Vector3::zeros(), greatest, Vector3::zeros(), 0.5);
-        let clearance = move |point: &Vector3<f64>| {
-            let to_box =
-                |wall: &Vector3<f64>| (point - wall).abs().add_scalar(-0.25).map(|d| d.max(0.0)).xy().norm();
-            walls.iter().map(to_box).fold(f64::INFINITY, f64::min)
-        };
-        Roads::new(lattice, clearance, 0.22)
-    }
-
     #[test]
     fn a_straight_of_ten_cells_takes_a_step_for_each_and_one_to_start() {
-        let roads = roads(&["..........."]);
+        let roads = room(&["..........."]);
         let distances = roads.distances(State::at_rest([10, 0, 0]));
         assert_eq!(distances.steps_from(&roads, &State::at_rest([0, 0, 0])), Some(11));
     }
 
     #[test]
     fn a_corner_costs_no_time_and_its_inside_is_not_cut() {
-        let roads = roads(&["###.", "....", "####"]);
+        let roads = room(&["###.", "....", "####"]);
         let distances = roads.distances(State::at_rest([3, 2, 0]));
         assert_eq!(distances.steps_from(&roads, &State::at_rest([0, 1, 0])), Some(5));
         let route = roads.route(State::at_rest([0, 1, 0]), &distances);
@@ -258,7 +259,7 @@ mod tests {
 
     #[test]
     fn what_is_walled_in_cannot_be_reached() {
-        let roads = roads(&["..#.", "..#."]);
+        let roads = room(&["..#.", "..#."]);
         let distances = roads.distances(State::at_rest([3, 0, 0]));
         assert_eq!(distances.steps_from(&roads, &State::at_rest([0, 0, 0])), None);
         assert!(!roads.is_cell_open([2, 0, 0]) && roads.is_cell_open([3, 1, 0]));
@@ -266,7 +267,7 @@ mod tests {
 
     #[test]
     fn indices_and_states_are_the_same_thing() {
-        let roads = roads(&["...", "...", "..."]);
+        let roads = room(&["...", "...", "..."]);
         for index in 0..roads.state_count() {
             assert_eq!(roads.index(&roads.state(index)), Some(index));
         }

@@ -1,9 +1,11 @@
 //! A way through space and time, around what others have announced: A* over states and steps (Silver 2005, "Cooperative
 //! pathfinding"), on the lattice of [`Roads`].
 //!
-//! Costs, in the order in which they count: meeting the plan of one that goes before, time, passing over one that rests at its goal,
-//! way. A meeting is dear and not forbidden: whoever cannot escape gets as far away as it can, and plans again a step later. What
-//! *is* forbidden is a first step that is not compatible with what the others are committed to.
+//! Costs, in the order in which they count: meeting the plan of one that goes before, being where it will be a step later, time,
+//! passing over one that rests at its goal, way. A meeting is dear and not forbidden: whoever cannot escape gets as far away as it can,
+//! and plans again a step later. What *is* forbidden is a first step that is not compatible with what the others are
+//! committed to. Who makes way at the last moment would have the one that goes before wait for its commitment, and plan to go a
+//! step later, for which the last moment is a step later too; so making way early is cheaper.
 //!
 //! After the last announced move the search no longer tells steps apart, so its effort is bounded by states times announced steps; it
 //! ends at its budget of expansions with the best that it has.
@@ -20,6 +22,7 @@ const STEP_COST: u32 = 100;
 const HALF_CELL_COST: u32 = 1;
 const MEETING_COST: u32 = 3000;
 const DISTURBANCE_COST: u32 = 60;
+const TARRYING_COST: u32 = 120;
 
 /// What one vehicle wants to know.
 #[derive(Debug, Clone, Copy)]
@@ -169,6 +172,10 @@ impl<'a> Traffic<'a> {
             && moves.iter().any(|other| apart.is_broken(movement, other))
         {
             cost += MEETING_COST;
+        } else if let Some(moves) = self.before.get(step as usize + 1)
+            && moves.iter().any(|other| apart.is_broken(movement, other))
+        {
+            cost += TARRYING_COST;
         }
         let disturbs = |rest: &State| apart.is_broken(movement, &Move { from: *rest, to: *rest });
         if self.request.resting.iter().any(disturbs) {
@@ -231,5 +238,80 @@ impl Scratch {
         }
         states.reverse();
         states
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::traffic::roads::room;
+
+    const APART: Apart = Apart { half_cells: 1.4, downwash: 1.0 };
+
+    fn straight(step: u32, from: i16, to: i16, row: i16) -> Itinerary {
+        let way = if to > from { 1 } else { -1 };
+        let mut states = vec![State::at_rest([from, row, 0])];
+        while let Some(last) = states.last().filter(|last| last.braked().place[0] != 2 * to) {
+            states.push(last.then([way, 0, 0]));
+        }
+        Itinerary::new(step, states)
+    }
+
+    fn ask<'a>(roads: &'a Roads, distances: &'a Distances, start: State) -> Request<'a> {
+        Request { roads, distances, step: 0, start, apart: APART, committed: &[], before: &[], resting: &[] }
+    }
+
+    #[test]
+    fn in_a_corridor_it_waits_in_the_pocket_until_the_other_has_passed() {
+        let roads = room(&["####.##", "......."]);
+        let distances = roads.distances(State::at_rest([0, 0, 0]));
+        let oncoming = straight(0, 0, 6, 0);
+        let request = Request { before: &[&oncoming], ..ask(&roads, &distances, State::at_rest([5, 0, 0])) };
+        let found = plan(&request, 10_000, &mut Scratch::default());
+        assert!(found.is_clear);
+        assert!(found.itinerary.states().contains(&State::at_rest([4, 1, 0])), "{:?}", found.itinerary);
+        assert_eq!(found.itinerary.states().last(), Some(&State::at_rest([0, 0, 0])));
+    }
+
+    #[test]
+    fn without_a_pocket_it_says_that_it_cannot_escape() {
+        let roads = room(&["......."]);
+        let distances = roads.distances(State::at_rest([0, 0, 0]));
+        let oncoming = straight(0, 0, 6, 0);
+        let request = Request { before: &[&oncoming], ..ask(&roads, &distances, State::at_rest([5, 0, 0])) };
+        assert!(!plan(&request, 10_000, &mut Scratch::default()).is_clear);
+    }
+
+    #[test]
+    fn nobody_enters_where_another_is_committed_to_rest() {
+        let roads = room(&["....."]);
+        let distances = roads.distances(State::at_rest([4, 0, 0]));
+        let stands = State::at_rest([1, 0, 0]);
+        let committed = [[Move { from: stands, to: stands }; 3]];
+        let start = State::at_rest([0, 0, 0]);
+        let request = Request { committed: &committed, ..ask(&roads, &distances, start) };
+        let found = plan(&request, 10_000, &mut Scratch::default());
+        assert_eq!(found.itinerary.at(1), Some(start));
+        assert!(found.is_hindered);
+    }
+
+    #[test]
+    fn a_goal_that_another_crosses_later_is_not_rested_at_before() {
+        let roads = room(&[".......", "......."]);
+        let goal = State::at_rest([3, 0, 0]);
+        let distances = roads.distances(goal);
+        let later = straight(6, 0, 6, 0);
+        let request = Request { before: &[&later], ..ask(&roads, &distances, State::at_rest([3, 1, 0])) };
+        let found = plan(&request, 10_000, &mut Scratch::default());
+        assert!(found.is_clear && found.itinerary.end() > 9, "{:?}", found.itinerary);
+    }
+
+    #[test]
+    fn without_a_budget_a_moving_vehicle_brakes() {
+        let roads = room(&["....."]);
+        let distances = roads.distances(State::at_rest([4, 0, 0]));
+        let start = State { place: [1, 0, 0], speed: [1, 0, 0] };
+        let found = plan(&ask(&roads, &distances, start), 0, &mut Scratch::default());
+        assert_eq!(found.itinerary.states(), [start, State::at_rest([1, 0, 0])]);
     }
 }

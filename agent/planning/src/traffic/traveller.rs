@@ -15,6 +15,10 @@ use super::standing::{Rank, Standing};
 
 /// A vehicle that has not been heard of for so many steps has changed its mind since.
 const FORGOTTEN_AFTER: u32 = 8;
+/// A vehicle that cannot escape is gone around for so many steps: enough to let another out of a corridor that both want.
+const CORNERED_FOR: u32 = 12;
+/// A vehicle at its goal is believed to stay there for so many steps by those that it goes before.
+const STAYS_FOR: u32 = 20;
 
 /// What a vehicle tells the others in its turn.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -35,6 +39,20 @@ pub struct Word {
     pub lanes: Vec<Lane>,
     /// Where it rests once it has arrived.
     pub goal: State,
+    /// It rests, has found no way to escape those that go before, and will hardly have moved before this step.
+    pub cornered_until: u32,
+}
+
+impl Word {
+    /// Where it comes to rest if it says nothing more.
+    fn last_commitment(&self) -> Option<State> {
+        self.itinerary.at(self.committed).map(|state| state.braked())
+    }
+
+    /// Whether it rests at its goal and plans to stay.
+    fn is_settled(&self) -> bool {
+        self.itinerary.states() == [self.goal]
+    }
 }
 
 /// A step from a cell into the next, in a place with room for one.
@@ -127,6 +145,7 @@ impl Traveller {
             standing: Standing { arrived: start == goal, convoy: own, left: way, own },
             lanes: lanes(&roads, &roads.route(start, &distances)),
             goal,
+            cornered_until: 0,
         };
         Ok(Self {
             roads,
@@ -189,6 +208,9 @@ impl Traveller {
         self.stand(start);
         let found = self.search(step, start);
         self.is_hindered = found.is_hindered;
+        if !found.is_clear && found.itinerary.at(step + 1) == Some(start) {
+            self.word.cornered_until = step + CORNERED_FOR;
+        }
         self.word.itinerary = found.itinerary;
         self.word.committed = step + 1;
         self.word.said_for = step;
@@ -207,7 +229,15 @@ impl Traveller {
             .collect();
         let (before, behind): (Vec<&Word>, Vec<&Word>) =
             self.heard.values().partition(|word| word.standing < self.word.standing);
-        let before: Vec<_> = before.into_iter().map(|word| &word.itinerary).collect();
+        // Who rests at its goal stays there, for those behind it; and whoever cannot make way is waited for, whatever its standing.
+        let settled = before.iter().filter(|word| word.is_settled()).map(|word| (word, step + STAYS_FOR));
+        let cornered =
+            behind.iter().map(|word| (word, word.cornered_until)).filter(|(_, until)| *until > step);
+        let staying: Vec<_> = settled
+            .chain(cornered)
+            .filter_map(|(word, until)| Some(Itinerary::waiting(step, word.last_commitment()?, until)))
+            .collect();
+        let before: Vec<_> = before.into_iter().map(|word| &word.itinerary).chain(&staying).collect();
         let resting: Vec<_> =
             behind.into_iter().filter(|word| word.standing.arrived).map(|word| word.goal).collect();
         let request = Request {
@@ -260,4 +290,86 @@ fn is_narrow(roads: &Roads, from: [i16; 3], to: [i16; 3]) -> bool {
 
 fn go_the_same_way(own: &[Lane], other: &[Lane]) -> bool {
     own.iter().any(|lane| other.contains(lane)) && !own.iter().any(|(from, to)| other.contains(&(*to, *from)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::traffic::roads::room;
+
+    const CONFIG: TravellerConfig =
+        TravellerConfig { apart: Apart { half_cells: 1.4, downwash: 1.0 }, budget: 10_000 };
+
+    fn cell(x: f64, y: f64) -> Vector3<f64> {
+        Vector3::new(x, y, 0.0) * 0.5
+    }
+
+    fn traveller(number: u32, roads: &Arc<Roads>, start: f64, goal: f64) -> Traveller {
+        Traveller::new(number, Arc::clone(roads), &cell(start, 0.0), &cell(goal, 0.0), CONFIG)
+            .expect("there is a way")
+    }
+
+    #[test]
+    fn alone_it_flies_the_shortest_way() {
+        let roads = Arc::new(room(&["......"]));
+        let mut alone = traveller(1, &roads, 0.0, 5.0);
+        let arrival = (1..20).find(|step| {
+            alone.take_turn(*step);
+            alone.is_home(*step)
+        });
+        assert_eq!(arrival, Some(7), "a step for each of five cells, and one to start, from step 1 on");
+    }
+
+    #[test]
+    fn whoever_hears_nothing_more_comes_to_rest() {
+        let roads = Arc::new(room(&["......"]));
+        let mut traveller = traveller(1, &roads, 0.0, 5.0);
+        traveller.take_turn(1);
+        traveller.take_turn(2);
+        let stops_in = traveller.movement(9).map(|movement| movement.to);
+        assert_eq!(stops_in, Some(State::at_rest([2, 0, 0])));
+    }
+
+    #[test]
+    fn the_same_way_through_a_corridor_makes_a_convoy() {
+        let roads = Arc::new(room(&["..#####..", ".........", "..#####.."]));
+        let start =
+            |number, x| Traveller::new(number, Arc::clone(&roads), &cell(x, 1.0), &cell(8.0, 1.0), CONFIG);
+        let (mut leader, mut follower) = (start(1, 0.0).expect("a way"), start(2, 1.0).expect("a way"));
+        let mut oncoming =
+            Traveller::new(3, Arc::clone(&roads), &cell(8.0, 1.0), &cell(1.0, 1.0), CONFIG).expect("a way");
+        leader.take_turn(1);
+        for other in [&mut follower, &mut oncoming] {
+            other.hear(leader.word());
+            other.take_turn(1);
+        }
+        assert_eq!(follower.word().standing.convoy, leader.word().standing.own);
+        assert_eq!(oncoming.word().standing.convoy, oncoming.word().standing.own);
+    }
+
+    #[test]
+    fn a_second_turn_is_for_those_who_were_hindered() {
+        let roads = Arc::new(room(&["......"]));
+        let (mut ahead, mut behind) = (traveller(1, &roads, 1.0, 5.0), traveller(2, &roads, 0.0, 4.0));
+        behind.hear(ahead.word());
+        behind.take_turn(1);
+        assert!(behind.movement(1).is_some_and(|movement| movement.from == movement.to), "the cell is taken");
+        ahead.take_turn(1);
+        behind.hear(ahead.word());
+        assert!(behind.take_turn(1).is_some());
+        assert!(
+            behind.movement(1).is_some_and(|movement| movement.from != movement.to),
+            "they leave together"
+        );
+        assert_eq!(ahead.take_turn(1), None);
+    }
+
+    #[test]
+    fn a_start_inside_a_wall_is_refused_by_name() {
+        let roads = Arc::new(room(&["..#..."]));
+        let refused = Traveller::new(7, Arc::clone(&roads), &cell(2.0, 0.0), &cell(4.0, 0.0), CONFIG);
+        assert!(refused.is_err_and(|error| error.to_string().contains("vehicle 7: its start")));
+        let cut_off = Traveller::new(8, roads, &cell(0.0, 0.0), &cell(4.0, 0.0), CONFIG);
+        assert_eq!(cut_off.err(), Some(TravellerError::NoWay { number: 8 }));
+    }
 }

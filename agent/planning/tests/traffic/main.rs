@@ -5,4 +5,4 @@
 mod places;
 mod run;
 
-mod published;
+mod explore;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use super::places::Place;
 use skein_planning::traffic::{Apart, Move, Roads, Traveller, TravellerConfig, closest};
 
 /// Metres.
@@ -26,7 +26,8 @@ pub struct Outcome {
     pub most_expanded: usize,
 }
 
-pub fn fly(roads: &Arc<Roads>, agents: &[(Vector3<f64>, Vector3<f64>)], most_steps: u32) -> Outcome {
+pub fn fly(place: &Place, most_steps: u32) -> Outcome {
+    let (roads, agents) = (&place.roads, &place.trips);
     let mut travellers: Vec<Traveller> = (0..)
         .zip(agents)
         .map(|(number, (start, goal))| {
@@ -36,6 +37,8 @@ pub fn fly(roads: &Arc<Roads>, agents: &[(Vector3<f64>, Vector3<f64>)], most_ste
     let mut outcome =
         Outcome { steps: None, closest: f64::INFINITY, turns: 0, expanded: 0, most_expanded: 0 };
     for step in 1..most_steps {
+        // First all say what they are committed to: some may have come into range.
+        (0..travellers.len()).for_each(|index| speak(&mut travellers, index, step, roads));
         for _ in 0..ROUNDS {
             for index in 0..travellers.len() {
                 if let Some(turn) = travellers[index].take_turn(step) {
@@ -49,6 +52,10 @@ pub fn fly(roads: &Arc<Roads>, agents: &[(Vector3<f64>, Vector3<f64>)], most_ste
         let moves: Vec<Move> = travellers.iter().map(|traveller| traveller.movement(step).unwrap()).collect();
         for (index, one) in moves.iter().enumerate() {
             for other in &moves[..index] {
+                let d = closest(one, other, CONFIG.apart.downwash);
+                if d < 1.0 && std::env::var("TRACE").is_ok() {
+                    eprintln!("MEET {index} {one:?} {other:?}");
+                }
                 outcome.closest = outcome.closest.min(closest(one, other, CONFIG.apart.downwash));
             }
         }
@@ -64,6 +71,25 @@ pub fn fly(roads: &Arc<Roads>, agents: &[(Vector3<f64>, Vector3<f64>)], most_ste
 }
 
 fn trace(travellers: &[Traveller], step: u32) {
+    if (200..206).contains(&step) {
+        for t in travellers {
+            let w = t.word();
+            eprintln!(
+                "  {} {:?} cornered {} goal {:?} left {} : {:?}",
+                w.number,
+                w.standing.convoy.number,
+                w.cornered_until,
+                w.goal.place.map(|p| p / 2),
+                w.standing.left,
+                w.itinerary
+                    .states()
+                    .iter()
+                    .take(24)
+                    .map(|s| [f64::from(s.place[0]) / 2.0, f64::from(s.place[1]) / 2.0])
+                    .collect::<Vec<_>>()
+            );
+        }
+    }
     let line: Vec<String> = travellers
         .iter()
         .map(|t| {

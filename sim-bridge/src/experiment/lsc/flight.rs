@@ -1,8 +1,9 @@
 //! One mission: a world, its vehicles, their radio, and what came of it.
 //!
 //! Nobody plans for anybody else. The only things vehicles share are the map, the clock that starts with the mission, and what they
-//! say to whoever is within range. Within each step they speak in turn, one every 4 ms, twice each; a word is planned in the turn
-//! in which it is said. The last is said just before the step begins.
+//! say to whoever is within range. Within each step they speak in turn, one every 4 ms: first all say what they are committed to, for
+//! those who have come into range, then twice each plans, commits itself and says so. The last word is said just before the
+//! step begins.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -25,8 +26,8 @@ const CELL_M: f64 = 0.5;
 const TICKS_PER_STEP: u64 = 26;
 /// The agents' tick in steps of the world: 20 ms.
 const STEPS_PER_TICK: u64 = 5;
-/// How often each speaks before a step.
-const ROUNDS: usize = 2;
+/// How often each speaks before a step; it plans every time but the first.
+const ROUNDS: usize = 3;
 /// Range of radio, m.
 const RADIO_RANGE_M: f64 = 3.0;
 /// Distance of hulls from obstacles in plans, m: for what the vehicle deviates from them.
@@ -178,8 +179,12 @@ impl Flight {
         for instant in 0.. {
             let (step, into) = (u32::try_from(instant / steps_per_step)?, instant % steps_per_step);
             if into >= first_turn && into - first_turn < turns {
-                let speaker = (into - first_turn) as usize % self.pilots.len();
-                self.speak(speaker, step + 1)?;
+                let turn = (into - first_turn) as usize;
+                let (round, speaker) = (turn / self.pilots.len(), turn % self.pilots.len());
+                if round > 0 {
+                    self.plan(speaker, step + 1)?;
+                }
+                self.speak(speaker);
             }
             if instant.is_multiple_of(STEPS_PER_TICK) {
                 let now = self.simulation.now();
@@ -205,16 +210,21 @@ impl Flight {
         Ok(None)
     }
 
-    /// A vehicle's turn: it plans, and says what it knows to all within range.
-    fn speak(&mut self, speaker: usize, step: u32) -> anyhow::Result<()> {
+    /// A vehicle plans, and commits itself by one step.
+    fn plan(&mut self, speaker: usize, step: u32) -> anyhow::Result<()> {
         let Some(pilot) = self.pilots.get_mut(speaker) else { return Ok(()) };
         let began = this_threads_cpu_time()?;
         if pilot.traveller.take_turn(step).is_some() {
             let took = this_threads_cpu_time()? - began;
             self.flown.plan_ms.push(took.as_secs_f64() * 1e3);
         }
+        Ok(())
+    }
+
+    /// A vehicle says what it knows to all within range.
+    fn speak(&mut self, speaker: usize) {
+        let (Some(pilot), Some(from)) = (self.pilots.get(speaker), self.position(speaker)) else { return };
         let words: Vec<_> = pilot.traveller.words().cloned().collect();
-        let Some(from) = self.position(speaker) else { return Ok(()) };
         for listener in 0..self.pilots.len() {
             let in_range =
                 self.position(listener).is_some_and(|position| (position - from).norm() <= RADIO_RANGE_M);
@@ -222,7 +232,6 @@ impl Flight {
                 words.iter().for_each(|word| pilot.traveller.hear(word));
             }
         }
-        Ok(())
     }
 
     /// The world until the agents' next tick. Returns the time then.
