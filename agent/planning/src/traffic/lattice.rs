@@ -55,15 +55,15 @@ impl State {
         self.then([0; 3])
     }
 
-    /// Every state a step later that the limits allow: no axis turns round without a rest, and one axis at most cruises.
-    /// Two that cruise would carry a vehicle farther in a step than it can answer for within the range of its radio.
+    /// Every state a step later that the limits allow: no axis turns round without a rest, two at most move, and one at most
+    /// cruises. More would carry a vehicle farther in a step than it can answer for within the range of its radio.
     pub fn successors(&self) -> impl Iterator<Item = Self> + '_ {
         let [x, y, z] = self.speed.map(speeds_after);
         z.flat_map(move |z| {
             let x = x.clone();
             y.clone().flat_map(move |y| x.clone().map(move |x| [x, y, z]))
         })
-        .filter(|after| cruising(&self.speed, after) <= 1)
+        .filter(|after| moving(&self.speed, after) <= 2 && cruising(&self.speed, after) <= 1)
         .map(|after| self.then(after))
     }
 
@@ -80,6 +80,12 @@ fn speeds_after(speed: i8) -> RangeInclusive<i8> {
     (speed - 1).max(-1)..=(speed + 1).min(1)
 }
 
+/// Axes that move at the beginning or the end of a step.
+fn moving(before: &[i8; 3], after: &[i8; 3]) -> usize {
+    before.iter().zip(after).filter(|(before, after)| **before != 0 || **after != 0).count()
+}
+
+/// Axes that move as fast as they may, all through a step.
 fn cruising(before: &[i8; 3], after: &[i8; 3]) -> usize {
     before.iter().zip(after).filter(|(before, after)| **before != 0 && before == after).count()
 }
@@ -201,11 +207,12 @@ mod tests {
     }
 
     #[test]
-    fn no_axis_turns_round_without_a_rest_and_one_at_most_cruises() {
+    fn no_axis_turns_round_without_a_rest_two_at_most_move_and_one_cruises() {
         let east = moving([1, 0, 0], [1, 0, 0]);
         assert!(east.successors().all(|after| after.speed[0] >= 0));
         let north_east = moving([1, 1, 0], [1, 1, 0]);
         assert!(north_east.successors().all(|after| after.speed[0] * after.speed[1] == 0));
+        assert!(north_east.successors().all(|after| after.speed[2] == 0));
         assert!(north_east.successors().any(|after| after == north_east.braked()), "braking always goes");
     }
 

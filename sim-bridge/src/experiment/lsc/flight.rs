@@ -12,7 +12,8 @@ use anyhow::Context as _;
 use nalgebra::Vector3;
 use skein_planning::traffic::{Apart, Lattice, Roads, Traveller, TravellerConfig};
 use skein_world::{
-    Aabb, GpsModel, STEP, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup, WindConfig,
+    Aabb, STEP, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup, WindConfig,
+    vehicle::GpsModel,
 };
 
 use super::pilot::Pilot;
@@ -158,6 +159,7 @@ impl Flight {
             }
             self.deliver();
             let since = *hovered_since.get_or_insert(now);
+            if std::env::var("DBG").is_ok() && (now.as_millis() / 20) % 50 == 0 { eprintln!("{now:?} {}", self.pilots.iter().map(|p| p.dbg()).collect::<Vec<_>>().join(" ")); }
             if !all {
                 hovered_since = None;
             } else if now.saturating_sub(since) >= Duration::from_secs(1) {

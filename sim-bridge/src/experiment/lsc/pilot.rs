@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use nalgebra::Vector3;
 use skein_mav::{Command, Companion, CompanionConfig, Datum, FlightMode, SetPoint};
 use skein_planning::traffic::{Move, Traveller};
 
@@ -11,6 +10,8 @@ use crate::mission::LscAgent;
 
 /// A command that is not obeyed is repeated after this long.
 const REPEAT_AFTER: Duration = Duration::from_secs(1);
+/// A vehicle hovers at its start, to within this, m, and slower than this, m/s, as far as its autopilot can tell.
+const HOVERING: (f64, f64) = (0.04, 0.15);
 
 /// A vehicle with its agent.
 pub struct Pilot {
@@ -69,7 +70,7 @@ impl Pilot {
         if flies || self.is_up() {
             self.steer(now, &Reference::resting(self.agent.start));
         }
-        flies && self.tracker.error_m() < 0.03 && self.speed_m_s() < 0.05
+        flies && self.tracker.error_m() < HOVERING.0 && self.speed_m_s() < HOVERING.1
     }
 
     /// While the clock runs: one tick along its itinerary. `step` has been flown by `phase`, 0 to 1; it takes `step_s`.
@@ -99,6 +100,7 @@ impl Pilot {
         self.companion.set_point(now, set_point);
     }
 
+    pub fn dbg(&self) -> String { format!("[{:?} e{:.3} v{:.3} z{:.2}]", self.companion.telemetry().mode, self.tracker.error_m(), self.speed_m_s(), self.companion.telemetry().position.map_or(0.0, |p| p.value.z)) }
     fn is_up(&self) -> bool {
         let position = self.companion.telemetry().position;
         position.is_some_and(|position| (position.value.z - self.agent.start.z).abs() < 0.15)
