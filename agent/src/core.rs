@@ -22,12 +22,13 @@ use crate::{
     me::Me,
     neighbours::{Neighbour, Neighbours},
     pipeline::{
-        guidance::{Guidance, Motion, Surroundings},
+        guidance::{Guidance, Motion, Report, Surroundings},
         perception::{Perception, Pose, Scan},
         set_point::{FRESH_FOR, KeepAlive, SILENT_AFTER, keep_alive, oldest_age},
     },
     precedence,
     scripts::{Circumstances, RunningScript, ScriptFacts, Scripts},
+    verify::check_script,
     watches::Watches,
 };
 
@@ -49,6 +50,9 @@ const CLIMB_S: f64 = 4.0;
 const MOST_UNSEEN_S: f64 = 4.0;
 /// After so long a silence, s, its failsafe has landed it, or its mission is over.
 const SURELY_DOWN_S: f64 = 45.0;
+/// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for between
+/// two ticks. `skein-agent verify --script` looks at all.
+const STATES_TRIED: usize = 500;
 /// A navigation cycle and a state message to the others begin this often.
 const CYCLE_PERIOD: Duration = Duration::from_millis(100);
 
@@ -178,11 +182,13 @@ impl AgentCore {
         for assignment in &config.scripts {
             scripts
                 .load(&mut program, assignment, "configuration")
+                .and_then(|()| check_script(&config, assignment, STATES_TRIED))
                 .map_err(|why| AgentError::Script { name: assignment.name().to_owned(), why })?;
         }
         let roster: Vec<_> =
             config.roster.iter().map(|node| name("roster", node)).collect::<Result<_, _>>()?;
         let own_name = name("node", &config.node)?;
+        let neighbours = Neighbours::new(own_name.clone(), config.incarnation);
         let node_config = NodeConfig {
             lease: config.lease,
             safety: safety_events(&me),
@@ -209,7 +215,7 @@ impl AgentCore {
                 None => NodeLink::new(Node::new(node_config, program), fleet),
             },
             name: own_name,
-            neighbours: Neighbours::default(),
+            neighbours,
             perception: Perception::new(&config.fence, home, heights(&config))?,
             watches: Watches::new(me.clone()),
             failsafes: Failsafes::default(),
@@ -281,6 +287,8 @@ impl AgentCore {
         let neighbours: Vec<Neighbour> = self.neighbours.at(now).collect();
         self.follow_autopilot(now);
         self.watch(now, &neighbours);
+        let report = self.guidance.go_on_planning(self.perception.map_mut());
+        self.hear_of_path(report);
         if now >= self.next_cycle {
             self.next_cycle = now + CYCLE_PERIOD;
             self.begin_cycle(now, &neighbours, link);
@@ -369,6 +377,14 @@ impl AgentCore {
         })
     }
 
+    /// Tells the program what came of a plan, if something did.
+    fn hear_of_path(&mut self, report: Option<Report>) {
+        if let Some(report) = report {
+            self.node.node_mut().enqueue(report.into_event(&self.me));
+            self.script_facts.forget_path();
+        }
+    }
+
     /// A navigation cycle: looks along the path, and tells the others where this vehicle is.
     fn begin_cycle(&mut self, now: Duration, neighbours: &[Neighbour], link: &mut dyn Link) {
         if let (FlightPhase::Flying, Some(motion)) = (self.flight.phase(), self.motion()) {
@@ -379,6 +395,7 @@ impl AgentCore {
             self.tell_scripts(&motion, neighbours);
         }
         if let Some(state) = self.state(now) {
+            let state = State { echo: self.neighbours.echo(now), ..state };
             self.node.put_state(&state, link);
         }
     }
@@ -433,13 +450,14 @@ impl AgentCore {
             Some(PLAN) => {
                 if let Some(motion) = self.motion() {
                     let report = self.guidance.plan(why, &motion, self.perception.map_mut(), neighbours);
-                    self.node.node_mut().enqueue(report.into_event(&self.me));
-                    self.script_facts.forget_path();
+                    self.hear_of_path(report);
                 }
             }
             Some(ADVANCE | HOMEWARD) => self.guidance.grant_leave(now),
             Some(LAND) => self.task = format!("landing: {why}"),
-            Some(RETURN) => self.task = format!("returning: {why}"),
+            Some(RETURN) if self.flight.phase() != FlightPhase::Landing => {
+                self.task = format!("returning: {why}");
+            }
             Some(HOLD) => self.task = "holding".to_owned(),
             Some(LANDED) => self.guidance.forget(),
             Some(vocabulary::TAKEOFF) => self.task = "taking off".to_owned(),
@@ -482,6 +500,10 @@ impl AgentCore {
         let from = sender.map_or(self.name.as_str(), |(node, _)| node).to_owned();
         let outcome = if from.starts_with("uav/") && from != self.name.as_str() {
             Err(format!("{from} may not send scripts: that is for the ground station and its operators"))
+        } else if !self.scripts.runs(assignment.name())
+            && let Err(why) = check_script(&self.config, &assignment, STATES_TRIED)
+        {
+            Err(why)
         } else {
             self.script_facts.forget();
             self.scripts.load(self.node.node_mut().program_mut(), &assignment, &from)
@@ -514,6 +536,7 @@ impl AgentCore {
                     map: self.perception.map(),
                     obstacles: self.perception.obstacles(),
                     neighbours: &tracks,
+                    rank: self.rank(neighbours),
                 };
                 let set_point = self.guidance.steer(now, &motion, &surroundings);
                 self.set_points.commands += 1;
@@ -528,6 +551,12 @@ impl AgentCore {
             }
             KeepAlive::Silence => self.guidance.rest(),
         }
+    }
+
+    /// How many of the neighbours have names that come before this vehicle's.
+    fn rank(&self, neighbours: &[Neighbour]) -> u32 {
+        let before = neighbours.iter().filter(|neighbour| neighbour.node < self.name);
+        u32::try_from(before.count()).unwrap_or(u32::MAX)
     }
 
     fn motion(&self) -> Option<Motion> {
@@ -641,6 +670,12 @@ impl AgentCore {
         &self.node
     }
 
+    /// Whether a path is being searched for that the last tick was not enough for.
+    #[must_use]
+    pub fn is_planning(&self) -> bool {
+        self.guidance.is_planning()
+    }
+
     /// The vehicle's node name.
     #[must_use]
     pub fn name(&self) -> &NodeName {
@@ -657,7 +692,23 @@ fn heights(config: &AgentConfig) -> [f64; 2] {
     [lowest_m.max(home_m + LEAST_HEIGHT_M), heights().fold(0.0, f64::max) + ABOVE_WAYPOINTS_M]
 }
 
-/// What no remote b-thread can block, and only the operator's gateway can request.
-fn safety_events(me: &Me) -> EventSet {
-    me.any_of(&vocabulary::OWN)
+/// What no remote b-thread can block, and only the operator's gateway can request; the waypoint at home is part of it, for
+/// without it `return` would lead nowhere.
+pub(crate) fn safety_events(me: &Me) -> EventSet {
+    let home = me.any(GOTO).and(EventSet::field_is("leg", bthreads::HOME_LEG));
+    me.any_of(&vocabulary::OWN).or(home)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn from_afar_nobody_blocks_the_way_home_and_anybody_with_a_say_any_other() {
+        let me = Me::new("uav/1");
+        let goto = |leg: i64| me.event(GOTO).with("leg", leg);
+        let safety = safety_events(&me);
+        assert!(safety.contains(&goto(bthreads::HOME_LEG)) && safety.contains(&me.event(HOMEWARD)));
+        assert!(!safety.contains(&goto(bthreads::OPERATOR_LEG)) && !safety.contains(&goto(0)));
+    }
 }

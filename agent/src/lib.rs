@@ -14,6 +14,7 @@ mod neighbours;
 pub mod pipeline;
 pub mod precedence;
 pub mod scripts;
+pub mod verify;
 mod watches;
 
 pub use self::{

@@ -1,25 +1,49 @@
 //! What a vehicle knows of the others: their last word, which stays, as a ghost that the safety filter lets grow, when they fall silent.
+//!
+//! How old a word is, the time on the network included, is known from echoes: each vehicle tells the others in turn what it
+//! has last heard of them. From the round trip follows where the other's clock stands (NTP, RFC 5905), and from that the
+//! age of everything it says, whichever way each message took.
 
 use std::{collections::BTreeMap, time::Duration};
 
 use nalgebra::Vector3;
 use skein_dbp::NodeName;
 use skein_planning::separation;
-use skein_wire::State;
+use skein_wire::{Echo, State};
 
-/// A neighbour silent for longer than this is not relied on to keep its distance.
-const SILENT_AFTER: Duration = Duration::from_millis(500);
+/// A neighbour silent for longer than this is not relied on to keep its distance: with three of ten messages lost, that is one in 170 000.
+const SILENT_AFTER: Duration = Duration::from_millis(1000);
+/// Clocks drift apart by no more than this, seconds in a second: a round trip that took this much longer by now tells as much.
+const DRIFT: f64 = 1e-3;
+/// What was heard longer ago is not told back.
+const ECHO_FOR: Duration = Duration::from_millis(500);
 
 /// The last state heard of each other vehicle.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Neighbours {
+    me: NodeName,
+    incarnation: u64,
     last: BTreeMap<NodeName, Heard>,
+    /// Whom the newest echo was for.
+    echoed: Option<NodeName>,
 }
 
 #[derive(Debug)]
 struct Heard {
     state: State,
-    /// When it arrived, on this vehicle's clock: clocks of two vehicles are never compared.
+    /// When it arrived, on this vehicle's clock.
+    at: Duration,
+    clock: Option<Clock>,
+}
+
+/// Where another vehicle's clock stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Clock {
+    /// This vehicle's clock less the other's, seconds.
+    behind_s: f64,
+    /// The round trip that told, seconds: half of it is the most by which `behind_s` is wrong.
+    round_trip_s: f64,
+    /// When it told, on this vehicle's clock.
     at: Duration,
 }
 
@@ -43,22 +67,50 @@ impl Neighbour {
 }
 
 impl Neighbours {
+    /// Nobody has been heard of yet by `me` in this incarnation.
+    #[must_use]
+    pub fn new(me: NodeName, incarnation: u64) -> Self {
+        Self { me, incarnation, last: BTreeMap::new(), echoed: None }
+    }
+
     /// Takes in a state message that arrived at `now`; one older than the last is dropped.
     pub fn hear(&mut self, now: Duration, state: State) {
-        let newest = self
-            .last
-            .get(&state.node)
+        let last = self.last.get(&state.node);
+        let newest = last
             .is_none_or(|last| (state.incarnation, state.time) > (last.state.incarnation, last.state.time));
         if newest {
-            self.last.insert(state.node.clone(), Heard { state, at: now });
+            let known =
+                last.filter(|last| last.state.incarnation == state.incarnation).and_then(|last| last.clock);
+            let clock = better(now, known, self.clock_of(now, &state));
+            self.last.insert(state.node.clone(), Heard { state, at: now, clock });
         }
+    }
+
+    /// What the echo in a state that arrives at `now` says of its sender's clock.
+    fn clock_of(&self, now: Duration, state: &State) -> Option<Clock> {
+        let echo = state.echo.as_ref()?;
+        let is_mine = echo.node == self.me && echo.incarnation == self.incarnation;
+        let round_trip_s = now.checked_sub(echo.time)?.checked_sub(echo.held)?.as_secs_f64();
+        let sent_s = now.as_secs_f64() - 0.5 * round_trip_s;
+        is_mine.then_some(Clock { behind_s: sent_s - state.time.as_secs_f64(), round_trip_s, at: now })
+    }
+
+    /// What to tell one of the others back, each in turn.
+    pub fn echo(&mut self, now: Duration) -> Option<Echo> {
+        let is_fresh = |heard: &&Heard| now.saturating_sub(heard.at) <= ECHO_FOR;
+        let after = |heard: &&Heard| self.echoed.as_ref().is_none_or(|echoed| heard.state.node > *echoed);
+        let heard =
+            self.last.values().filter(is_fresh).find(after).or_else(|| self.last.values().find(is_fresh))?;
+        let (State { node, incarnation, time, .. }, held) = (&heard.state, now.saturating_sub(heard.at));
+        let echo = Echo { node: node.clone(), incarnation: *incarnation, time: *time, held };
+        self.echoed = Some(node.clone());
+        Some(echo)
     }
 
     /// Every neighbour as of `now`, in the order of their names.
     pub fn at(&self, now: Duration) -> impl Iterator<Item = Neighbour> + '_ {
         (0_u32..).zip(self.last.values()).map(move |(id, heard)| {
             let state = &heard.state;
-            let age = now.saturating_sub(heard.at);
             Neighbour {
                 node: state.node.clone(),
                 armed: state.armed,
@@ -67,9 +119,9 @@ impl Neighbours {
                     position: state.position,
                     velocity: state.velocity,
                     sigma_m: state.position_sigma_m,
-                    age_s: age.as_secs_f64(),
+                    age_s: heard.age_s(now),
                     radius_m: state.radius_m,
-                    cooperative: age <= SILENT_AFTER,
+                    cooperative: now.saturating_sub(heard.at) <= SILENT_AFTER,
                 },
             }
         })
@@ -82,5 +134,112 @@ impl Neighbours {
             .map(|neighbour| ((neighbour.position() - position).norm(), neighbour.node))
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(distance, node)| (node, distance))
+    }
+}
+
+impl Heard {
+    /// Since it was said; since it arrived, while the time on the network is not known.
+    fn age_s(&self, now: Duration) -> f64 {
+        let since_arrival_s = now.saturating_sub(self.at).as_secs_f64();
+        self.clock.map_or(since_arrival_s, |clock| {
+            let said_s = self.state.time.as_secs_f64() + clock.behind_s;
+            (now.as_secs_f64() - said_s).max(since_arrival_s)
+        })
+    }
+}
+
+/// Of two tellings the one that may be less wrong by now.
+fn better(now: Duration, known: Option<Clock>, heard: Option<Clock>) -> Option<Clock> {
+    let wrong_s =
+        |clock: &Clock| 0.5 * clock.round_trip_s + DRIFT * now.saturating_sub(clock.at).as_secs_f64();
+    known.into_iter().chain(heard).min_by(|a, b| wrong_s(a).total_cmp(&wrong_s(b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(milliseconds: u64) -> Duration {
+        Duration::from_millis(milliseconds)
+    }
+
+    fn name(number: u32) -> NodeName {
+        NodeName::new(&format!("uav/{number}")).unwrap()
+    }
+
+    fn age_s(neighbours: &Neighbours, now: Duration) -> f64 {
+        neighbours.at(now).next().unwrap().track.age_s
+    }
+
+    /// Two vehicles whose clocks are 70 s apart tell one another where they are; a message takes `there` one way and `back` the other.
+    fn converse(there: Duration, back: Duration) -> (Neighbours, Duration) {
+        let apart = ms(70_000);
+        let (mut one, mut other) = (Neighbours::new(name(1), 1), Neighbours::new(name(2), 1));
+        for start in [ms(1000), ms(2000), ms(3000)] {
+            let said = State { incarnation: 1, time: start, echo: one.echo(start), ..State::new(name(1)) };
+            other.hear(start + there + apart, said);
+            let answers = start + there + ms(40);
+            let echo = other.echo(answers + apart);
+            let said = State { incarnation: 1, time: answers + apart, echo, ..State::new(name(2)) };
+            one.hear(answers + back, said);
+        }
+        (one, ms(3040) + there + back)
+    }
+
+    #[test]
+    fn a_word_is_as_old_as_it_was_long_on_the_way_whatever_the_clocks_say() {
+        let (one, now) = converse(ms(300), ms(300));
+        assert!((age_s(&one, now) - 0.3).abs() < 1e-6, "{}", age_s(&one, now));
+        assert!((age_s(&one, now + ms(100)) - 0.4).abs() < 1e-6);
+        let (one, now) = converse(ms(100), ms(300));
+        assert!((age_s(&one, now) - 0.2).abs() < 1e-6, "half of the round trip, and half of it is the error");
+    }
+
+    #[test]
+    fn a_late_word_is_known_to_be_late() {
+        let (mut one, now) = converse(ms(10), ms(10));
+        let time = now + ms(70_000);
+        one.hear(now + ms(450), State { incarnation: 1, time, ..State::new(name(2)) });
+        assert!((age_s(&one, now + ms(450)) - 0.45).abs() < 1e-6);
+    }
+
+    #[test]
+    fn without_an_echo_or_after_a_restart_age_counts_from_arrival() {
+        let (mut one, now) = converse(ms(300), ms(300));
+        one.hear(now, State { incarnation: 2, time: ms(5), ..State::new(name(2)) });
+        assert_eq!(age_s(&one, now + ms(60)), 0.06);
+    }
+
+    #[test]
+    fn echoes_for_others_or_for_a_former_life_tell_nothing() {
+        let mut one = Neighbours::new(name(1), 2);
+        for echo in [
+            Echo { node: name(3), incarnation: 2, time: ms(500), held: ms(0) },
+            Echo { node: name(1), incarnation: 1, time: ms(500), held: ms(0) },
+            Echo { node: name(1), incarnation: 2, time: ms(9000), held: ms(0) },
+        ] {
+            let time = ms(1000) + echo.time;
+            one.hear(ms(1000), State { time, echo: Some(echo), ..State::new(name(2)) });
+            assert_eq!(age_s(&one, ms(1000)), 0.0);
+        }
+    }
+
+    #[test]
+    fn everybody_gets_an_echo_in_turn() {
+        let mut one = Neighbours::new(name(1), 1);
+        for number in [2, 3, 4] {
+            one.hear(ms(100), State { time: ms(50), ..State::new(name(number)) });
+        }
+        let told: Vec<_> = (0..4).filter_map(|_| one.echo(ms(120))).map(|echo| echo.node).collect();
+        assert_eq!(told, [name(2), name(3), name(4), name(2)]);
+        assert_eq!(one.echo(ms(2000)), None, "what was heard long ago is not told back");
+    }
+
+    #[test]
+    fn one_that_is_silent_is_not_relied_on() {
+        let mut one = Neighbours::new(name(1), 1);
+        one.hear(ms(0), State { time: ms(0), ..State::new(name(2)) });
+        let relied_on = |now| one.at(now).next().unwrap().track.cooperative;
+        assert!(relied_on(ms(1000)) && !relied_on(ms(1001)));
     }
 }

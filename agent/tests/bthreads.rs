@@ -214,6 +214,32 @@ mod before_take_off {
     }
 
     #[test]
+    fn a_vehicle_that_has_taken_off_takes_off_again_only_from_the_ground() {
+        let mut vehicle = Vehicle::new(&config());
+        vehicle.reports(READY);
+        vehicle.reports(TAKEOFF);
+        assert!(!vehicle.may(TAKEOFF));
+        vehicle.hears(mine(COMMAND_FAILED).with("why", "Arm: denied"));
+        let mut other = Vehicle::new(&config());
+        other.reports(READY);
+        other.reports(TAKEOFF);
+        other.program.remove("mission");
+        other.reports(LANDED);
+        assert!(other.may(TAKEOFF));
+    }
+
+    #[test]
+    fn an_order_to_return_on_the_ground_does_not_count_in_the_air() {
+        let mut vehicle = Vehicle::new(&config());
+        assert_eq!(vehicle.is_ordered("return"), ["order return", "return: ordered by the operator"]);
+        vehicle.reports(READY);
+        vehicle.reports(TAKEOFF);
+        assert_eq!(vehicle.reports(AIRBORNE), ["airborne", "goto 0", "plan: waypoint"]);
+        let home = ["battery_low", "return: battery low", "goto -1", "plan: waypoint"];
+        assert_eq!(vehicle.reports(BATTERY_LOW), home, "it was still returning");
+    }
+
+    #[test]
     fn a_remote_request_takes_the_vehicle_off_once_it_is_ready() {
         let mut vehicle = Vehicle::new(&config());
         vehicle.program.put_proxy("ground/1#launch", &Bid::new().request(mine(TAKEOFF)));
@@ -227,14 +253,14 @@ mod pilot {
 
     #[test]
     fn blocks_every_movement_until_the_vehicle_is_handed_back() {
-        let moves = [TAKEOFF, GOTO, PLAN, ADVANCE, ENTER, HOLD, LAND, RETURN];
+        let moves = [GOTO, PLAN, ADVANCE, ENTER, HOLD, LAND, RETURN];
         let mut vehicle = Vehicle::on_its_way();
-        assert_eq!(moves.map(|verb| vehicle.may(verb)), [true; 8]);
+        assert_eq!(moves.map(|verb| vehicle.may(verb)), [true; 7]);
         assert_eq!(vehicle.reports(PILOT), ["pilot"]);
         assert_eq!(vehicle.after(SECOND), NOTHING);
-        assert_eq!(moves.map(|verb| vehicle.may(verb)), [false; 8]);
+        assert_eq!(moves.map(|verb| vehicle.may(verb)), [false; 7]);
         assert_eq!(vehicle.is_ordered("hand_back"), ["order hand_back", "hand_back", "advance"]);
-        assert_eq!(moves.map(|verb| vehicle.may(verb)), [true; 8]);
+        assert_eq!(moves.map(|verb| vehicle.may(verb)), [true; 7]);
     }
 
     #[test]
@@ -660,6 +686,29 @@ mod one_name {
         assert_eq!(vehicle.is_ordered("resume"), ["order resume", "advance"]);
         let again = vehicle.learns(mine(DUPLICATE_NAME).with("incarnation", 4));
         assert_eq!(again, ["duplicate_name", hold], "it goes on while the other is there");
+    }
+}
+
+mod return_home {
+    use super::*;
+
+    #[test]
+    fn a_vehicle_on_its_way_down_is_not_sent_home() {
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.is_ordered("land");
+        assert_eq!(vehicle.reports(FENCE_BREACHED), ["fence_breached", "return: outside the geofence"]);
+    }
+
+    #[test]
+    fn who_turned_home_while_climbing_is_led_nowhere_else_once_it_is_up() {
+        let mut vehicle = Vehicle::new(&config());
+        vehicle.reports(READY);
+        vehicle.reports(TAKEOFF);
+        let home = ["battery_low", "return: battery low", "goto -1", "plan: waypoint"];
+        assert_eq!(vehicle.reports(BATTERY_LOW), home);
+        assert_eq!(vehicle.reports(AIRBORNE), ["airborne"]);
+        let why = "declined: it is not free to go: on the ground, landing or returning";
+        assert_eq!(vehicle.hears(at(order(ME, "goto"), [4.0, 3.0, 2.0])), ["order goto", why]);
     }
 }
 

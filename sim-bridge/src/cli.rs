@@ -109,6 +109,8 @@ pub enum Campaign {
     /// Generated programs on 2 to 10 nodes in memory, in lockstep, under every fault a network and a process can have;
     /// every promise is checked at every step.
     Network(NetworkCampaign),
+    /// Whole swarms in lockstep whose vehicles hear one another late and not always: nobody may touch anything.
+    Separation(SeparationCampaign),
     /// A swarm as processes over Zenoh, in real time, with a fault at a random moment of each flight.
     #[cfg(feature = "zenoh")]
     Processes {
@@ -149,6 +151,32 @@ pub struct NetworkCampaign {
     #[arg(long = "break", value_name = "PROMISE", ignore_case = true,
         value_parser = ["G1", "G2", "G3", "G4", "G5", "G6", "G7", "G8", "G9"])]
     pub breaks: Option<String>,
+}
+
+/// Options of `campaign separation`.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct SeparationCampaign {
+    /// How many seeds of each scenario.
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    pub seeds: u64,
+    /// The first seed.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub from: u64,
+    /// Built-in scenarios.
+    #[arg(long = "scenario", value_name = "NAME", default_values_t = ["antipodal".to_owned(), "forest".to_owned()])]
+    pub scenarios: Vec<String>,
+    /// Size of the swarm.
+    #[arg(long, value_name = "N", default_value_t = 16)]
+    pub vehicles: usize,
+    /// Mean time that a message takes; each takes from half to one and a half of it.
+    #[arg(long, value_name = "MS", default_value_t = 300.0)]
+    pub latency_ms: f64,
+    /// Share of messages that are lost.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.3)]
+    pub loss: f64,
+    /// How many at once; as many as this computer has processors if not given.
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<usize>,
 }
 
 /// Options of `fly`.
@@ -232,6 +260,17 @@ pub enum Bench {
         #[arg(long, value_name = "N", default_value_t = 12)]
         philosophers: usize,
     },
+    /// Searches on published maps, beside their published lengths.
+    Plan(PlanBench),
+    /// One tick of a vehicle's navigation: map from a scan of 720 rays, local plan, safety filter with 20 neighbours.
+    Nav {
+        /// How many ticks.
+        #[arg(long, value_name = "N", default_value_t = 2000)]
+        ticks: usize,
+        /// What forest and neighbours come from.
+        #[arg(long, value_name = "S", default_value_t = 1)]
+        seed: u64,
+    },
     /// Memory and messages per node as a fleet grows, over the network in memory.
     Fleet {
         /// Sizes of the fleet, the ground station included.
@@ -293,6 +332,58 @@ pub enum Bench {
         #[arg(long, value_name = "N", default_value_t = 2000)]
         port_offset: u16,
     },
+}
+
+/// Options of `bench plan`.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct PlanBench {
+    /// A map of the Moving AI lab's (.map), or a voxel map (.3dmap).
+    #[arg(long, value_name = "FILE", requires = "scen", required_unless_present = "peers")]
+    pub map: Option<PathBuf>,
+    /// Its problems, with their optimal lengths (.scen, .3dscen).
+    #[arg(long, value_name = "FILE", requires = "map")]
+    pub scen: Option<PathBuf>,
+    /// Which search.
+    #[arg(long, value_enum, default_value_t = Planner::Astar)]
+    pub planner: Planner,
+    /// Only the first so many problems.
+    #[arg(long, value_name = "N")]
+    pub limit: Option<usize>,
+    /// How many times the least a way of `weighted` or `budgeted` may cost.
+    #[arg(long, value_name = "X", default_value_t = 1.05, value_parser = at_least_one)]
+    pub bound: f64,
+    /// Most cells to expand for a problem; without end if not given, but for `budgeted`.
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
+    pub budget: Option<usize>,
+    /// Beside the `pathfinding` crate instead, on random grids and on the map if one is given (cargo feature `peers`).
+    #[arg(long)]
+    pub peers: bool,
+}
+
+/// Searches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Planner {
+    /// A*: the shortest way.
+    Astar,
+    /// Weighted A*: a way within the bound.
+    Weighted,
+    /// Anytime repairing A*: better ways until one is within the bound or the budget is spent.
+    Budgeted,
+    /// D* Lite: the shortest way, from scratch.
+    DstarLite,
+}
+
+impl Planner {
+    /// Its name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Astar => "astar",
+            Self::Weighted => "weighted",
+            Self::Budgeted => "budgeted",
+            Self::DstarLite => "dstar-lite",
+        }
+    }
 }
 
 /// Options of `serve`.
@@ -371,6 +462,13 @@ fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
         _ => Err("expected a number above 0".to_owned()),
+    }
+}
+
+fn at_least_one(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number >= 1.0 => Ok(number),
+        _ => Err("expected a number, 1 or more".to_owned()),
     }
 }
 

@@ -9,6 +9,7 @@ pub mod check;
 pub mod cli;
 #[cfg(feature = "zenoh")]
 pub mod configure;
+mod cpu_time;
 pub mod experiment;
 pub mod fly;
 #[cfg(feature = "zenoh")]

@@ -67,6 +67,17 @@ fn without_webgl_some_are_sent_home_or_down_and_the_rest_fly_on() {
 }
 
 #[test]
+fn a_script_is_sent_from_a_file_and_withdrawn_and_all_land_together() {
+    let Some(browser) = Browser::find() else { return };
+    let flight = Flight::start(&["antipodal", "--vehicles", "4"]);
+    browser.run("script-and-abort.mjs", &flight);
+    let (status, summary) = flight.end();
+    assert_eq!(status.code(), Some(1), "nobody arrived");
+    assert_eq!(summary.collisions, Collisions::default());
+    assert!(summary.per_vehicle.iter().all(|each| each.outcome == Outcome::LandedEarly));
+}
+
+#[test]
 fn pages_of_others_are_refused_and_nonsense_orders_nothing() {
     let flight = Flight::start(&["open", "--vehicles", "1"]);
     let host = flight.host();

@@ -19,13 +19,14 @@
 //!
 //! let (goal, config) = (Vector3::new(8.1, 0.1, 3.1), astar::AstarConfig::default());
 //! let request = astar::Request { start: eye, goal, potential: &Potential::default(), discs: &[] };
-//! let plan = astar::plan(&mut map, &request, &config, &mut astar::AstarScratch::default())?;
+//! let plan = astar::plan(&mut map, &request, &config, &mut astar::Astar::default())?;
 //! let path = simplify(&map, &plan.path, config.clearance_m);
 //! assert!(path.length_m() > 8.0 && path.points().len() <= 5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 pub mod global;
+pub mod grid;
 pub mod local;
 pub mod map;
 pub mod passage;

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use skein_planning::Path;
-use skein_planning::global::astar::{AstarConfig, AstarScratch, Disc, Plan, PlanError, Request, plan};
+use skein_planning::global::astar::{Astar, AstarConfig, Disc, Plan, PlanError, Request, plan};
 use skein_planning::global::{Potential, PotentialObstacle, elide_collinear, simplify};
 use skein_planning::map::{ClearanceMap, VoxelMapConfig};
 
@@ -44,7 +44,7 @@ fn run(
 ) -> Result<Plan, PlanError> {
     let potential = Potential::default();
     let request = Request { start: centre(from), goal: centre(to), potential: &potential, discs: &[] };
-    plan(map, &request, config, &mut AstarScratch::default())
+    plan(map, &request, config, &mut Astar::default())
 }
 
 /// The least cost by Dijkstra's algorithm without a heap or a heuristic, on the rules as documented.
@@ -137,7 +137,7 @@ proptest! {
         let obstacle = PotentialObstacle { centre: Vector3::new(x, y, 0.5), influence_m: 3.0 };
         let potential = Potential::gated(&centre(from), &Vector3::new(1.0, 1.0, 0.0), &[obstacle], 4.0);
         let request = Request { start: centre(from), goal: centre(to), potential: &potential, discs: &[] };
-        let found = plan(&mut grid(FLAT, &blocked), &request, &config, &mut AstarScratch::default());
+        let found = plan(&mut grid(FLAT, &blocked), &request, &config, &mut Astar::default());
         let clearance = |cell: [usize; 3]| blocked.iter()
             .map(|other| (centre(*other) - centre(cell)).norm() - 0.5).fold(5.0, f64::min);
         let cost = |cell| {
@@ -166,7 +166,7 @@ proptest! {
             discs: &[],
         };
         let config = AstarConfig { clearance_m, ..AstarConfig::default() };
-        if let Ok(plan) = plan(&mut map, &request, &config, &mut AstarScratch::default()) {
+        if let Ok(plan) = plan(&mut map, &request, &config, &mut Astar::default()) {
             let simple = simplify(&map, &plan.path, clearance_m);
             let elided = elide_collinear(&plan.path);
             prop_assert!(simple.points().len() <= elided.points().len());
@@ -228,7 +228,7 @@ fn discs_are_gone_round_and_can_be_left() {
         let discs = [Disc { centre: centre(centre_cell), radius_m: 3.0 }];
         let request =
             Request { start: centre(start), goal: centre([28, 15, 0]), potential: &potential, discs: &discs };
-        plan(&mut grid([30, 30, 1], &[]), &request, &shortest(), &mut AstarScratch::default())
+        plan(&mut grid([30, 30, 1], &[]), &request, &shortest(), &mut Astar::default())
     };
     let round = go([1, 15, 0], [15, 15, 0]).unwrap();
     assert!(round.path.points().iter().all(|point| (point - centre([15, 15, 0])).norm() >= 3.0));
@@ -268,7 +268,7 @@ fn a_change_of_height_within_the_band_is_spread_along_the_path() {
     let potential = Potential::default();
     let (start, goal) = (Vector3::new(0.1, 0.1, 3.0), Vector3::new(8.1, 0.1, 3.8));
     let request = Request { start, goal, potential: &potential, discs: &[] };
-    let path = plan(&mut map, &request, &AstarConfig::default(), &mut AstarScratch::default()).unwrap().path;
+    let path = plan(&mut map, &request, &AstarConfig::default(), &mut Astar::default()).unwrap().path;
     assert_eq!(path.end(), goal);
     assert!((path.point_at(path.length_m() / 2.0).z - 3.4).abs() < 0.03);
     assert_eq!(elide_collinear(&path).points().len(), 2);
@@ -290,7 +290,7 @@ fn climbs_and_detours_over_walls_are_found_in_space() {
 #[test]
 fn a_search_does_not_remember_the_last_one() {
     let potential = Potential::default();
-    let mut scratch = AstarScratch::default();
+    let mut scratch = Astar::default();
     let mut map = grid([20, 20, 1], &[[5, 5, 0], [6, 6, 0]]);
     let mut go = |from, to| {
         let request = Request { start: centre(from), goal: centre(to), potential: &potential, discs: &[] };

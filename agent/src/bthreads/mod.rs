@@ -38,7 +38,7 @@ pub use pilot::Pilot;
 pub use preflight::Preflight;
 pub use reposition::{OPERATOR_LEG, Reposition};
 pub use return_home::{HOME_LEG, ReturnHome};
-pub use right_of_way::RightOfWay;
+pub use right_of_way::{NAME as RIGHT_OF_WAY, RightOfWay};
 pub use separation::Separation;
 pub use together::Together;
 
@@ -53,7 +53,7 @@ pub fn load(program: &mut Program, config: &AgentConfig) {
     program.add("obstacle_avoidance", ObstacleAvoidance::new(me.clone()));
     let with_say = |node: &&String| node.starts_with("uav/") || **node == config.ground;
     let others = config.roster.iter().filter(with_say).filter(|node| **node != config.node);
-    program.add(right_of_way::NAME, RightOfWay::new(me.clone(), others.map(String::as_str)));
+    program.add(RIGHT_OF_WAY, RightOfWay::new(me.clone(), others.map(String::as_str)));
     program.add("preflight", Preflight::new(me.clone()));
     program.add("found_airborne", FoundAirborne::new(me.clone()));
     program.add("one_name", OneName::new(me.clone()));

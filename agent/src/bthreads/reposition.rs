@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{AIRBORNE, DECLINED, GOTO, LAND, LANDED, ORDER, RETURN};
+use skein_wire::vocabulary::{
+    AIRBORNE, DECLINED, FOUND_AIRBORNE, GOTO, LAND, LANDED, ORDER, RETURN, TAKEOFF,
+};
 
 use crate::{me::Me, precedence};
 
@@ -17,29 +19,30 @@ const PATIENCE: Duration = Duration::from_secs(2);
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct Reposition {
     me: Me,
-    phase: Phase,
+    standing: Standing,
+    task: Task,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+enum Standing {
+    Grounded,
+    Free,
+    /// On the way down or home, from which no order leads away.
+    Bound,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
-enum Phase {
-    /// On the ground, or on the way down or home.
-    Unfree,
-    Free,
-    Turning {
-        to: Event,
-        until: Duration,
-    },
-    Declining {
-        why: String,
-        free: bool,
-    },
+enum Task {
+    Nothing,
+    Turning { to: Event, until: Duration },
+    Declining { why: String },
 }
 
 impl Reposition {
     /// The b-thread of vehicle `me`.
     #[must_use]
     pub fn new(me: Me) -> Self {
-        Self { me, phase: Phase::Unfree }
+        Self { me, standing: Standing::Grounded, task: Task::Nothing }
     }
 
     /// The `goto` that an order asks for.
@@ -49,10 +52,12 @@ impl Reposition {
         Some(goto.with("x", x?).with("y", y?).with("z", z?))
     }
 
-    fn answer(&self, order: &Event, now: Duration) -> Phase {
-        match self.goto(order) {
-            Some(to) => Phase::Turning { to, until: now + PATIENCE },
-            None => Phase::Declining { why: "it names no point".into(), free: true },
+    fn answer(&self, order: &Event, now: Duration) -> Task {
+        let declining = |why: &str| Task::Declining { why: why.to_owned() };
+        match (self.standing, self.goto(order)) {
+            (Standing::Free, Some(to)) => Task::Turning { to, until: now + PATIENCE },
+            (Standing::Free, None) => declining("it names no point"),
+            _ => declining("it is not free to go: on the ground, landing or returning"),
         }
     }
 }
@@ -60,48 +65,34 @@ impl Reposition {
 impl BThread for Reposition {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::LINK).wait_for(me.any(ORDER));
-        Some(match &self.phase {
-            Phase::Unfree => bid.wait_for(me.any(AIRBORNE)),
-            Phase::Free => bid.wait_for(me.any_of(&[LAND, RETURN, LANDED])),
-            Phase::Turning { to, until } => {
-                bid.request(to.clone()).deadline(*until).wait_for(me.any_of(&[LAND, RETURN, LANDED]))
-            }
-            Phase::Declining { why, .. } => bid
-                .request(me.because(DECLINED, why).with("what", "goto"))
-                .wait_for(me.any_of(&[AIRBORNE, LAND, RETURN, LANDED])),
+        let bid = Bid::new().priority(precedence::LINK).wait_for(me.any_of(match self.standing {
+            Standing::Grounded => &[ORDER, AIRBORNE, LAND, RETURN],
+            Standing::Free => &[ORDER, LAND, RETURN, LANDED],
+            Standing::Bound => &[ORDER, LANDED, TAKEOFF, FOUND_AIRBORNE],
+        }));
+        Some(match &self.task {
+            Task::Nothing => bid,
+            Task::Turning { to, until } => bid.request(to.clone()).deadline(*until),
+            Task::Declining { why } => bid.request(me.because(DECLINED, why).with("what", "goto")),
         })
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        let verb = self.me.verb(event);
-        let goto = verb == Some(ORDER) && event.text("what") == Some("goto");
-        self.phase = match (self.phase.clone(), verb) {
-            (_, Some(AIRBORNE)) => Phase::Free,
-            (_, Some(LAND | RETURN | LANDED)) => Phase::Unfree,
-            (Phase::Unfree | Phase::Declining { free: false, .. }, Some(ORDER)) if goto => Phase::Declining {
-                why: "it is not free to go: on the ground, landing or returning".into(),
-                free: false,
-            },
-            (Phase::Free | Phase::Turning { .. } | Phase::Declining { free: true, .. }, Some(ORDER))
-                if goto =>
-            {
-                self.answer(event, cx.now())
-            }
+        let is_goto = event.text("what") == Some("goto");
+        self.task = match (&self.task, self.me.verb(event)) {
+            (_, Some(ORDER)) if is_goto => self.answer(event, cx.now()),
             // Another order takes the place of this one.
-            (Phase::Turning { .. }, Some(ORDER | GOTO)) => Phase::Free,
-            (Phase::Turning { .. }, None) => Phase::Declining {
-                why: "the vehicle blocks it: outside the geofence, or held".into(),
-                free: true,
-            },
-            (Phase::Declining { free, .. }, Some(DECLINED)) => {
-                if free {
-                    Phase::Free
-                } else {
-                    Phase::Unfree
-                }
+            (Task::Declining { why }, Some(ORDER)) => Task::Declining { why: why.clone() },
+            (Task::Turning { .. }, None) => {
+                Task::Declining { why: "the vehicle blocks it: outside the geofence, or held".into() }
             }
-            (phase, _) => phase,
+            _ => Task::Nothing,
+        };
+        self.standing = match self.me.verb(event) {
+            Some(AIRBORNE) => Standing::Free,
+            Some(LAND | RETURN) => Standing::Bound,
+            Some(LANDED | TAKEOFF | FOUND_AIRBORNE) => Standing::Grounded,
+            _ => self.standing,
         };
     }
 }

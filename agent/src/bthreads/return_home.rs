@@ -2,7 +2,9 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ARRIVED, GOTO, LAND, LANDED, RETURN};
+use skein_wire::vocabulary::{
+    AIRBORNE, ARRIVED, COMMAND_FAILED, FOUND_AIRBORNE, GOTO, HAND_BACK, LAND, LANDED, RETURN, TAKEOFF,
+};
 
 use crate::{me::Me, precedence};
 
@@ -19,10 +21,20 @@ pub struct ReturnHome {
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 enum Phase {
+    /// On the ground, where `return` leads nowhere.
+    Grounded,
     Away,
-    Turning { why: String },
-    Returning { why: String },
-    Landing { why: String },
+    Turning {
+        why: String,
+    },
+    Returning {
+        why: String,
+    },
+    Landing {
+        why: String,
+    },
+    /// On the way down, from which no way leads home any more.
+    Down,
 }
 
 impl ReturnHome {
@@ -31,7 +43,7 @@ impl ReturnHome {
     pub fn new(me: Me, [x, y, z]: [f64; 3]) -> Self {
         let home =
             me.event(GOTO).with("leg", HOME_LEG).with("lands", true).with("x", x).with("y", y).with("z", z);
-        Self { me, home, phase: Phase::Away }
+        Self { me, home, phase: Phase::Grounded }
     }
 }
 
@@ -39,22 +51,26 @@ impl BThread for ReturnHome {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
         let bid = Bid::new().priority(precedence::BATTERY_LOW);
+        let grounded = me.any_of(&[LANDED, COMMAND_FAILED]);
+        let over = grounded.clone().or(me.any(LAND));
         Some(match &self.phase {
-            Phase::Away => bid.wait_for(me.any(RETURN)),
-            Phase::Turning { .. } => bid.request(self.home.clone()).wait_for(me.any_of(&[LAND, LANDED])),
-            Phase::Returning { .. } => bid.wait_for(me.any_of(&[ARRIVED, LAND, LANDED])),
-            Phase::Landing { why } => bid.request(me.because(LAND, why)),
+            Phase::Grounded => bid.wait_for(me.any_of(&[TAKEOFF, AIRBORNE, FOUND_AIRBORNE, HAND_BACK])),
+            Phase::Away => bid.wait_for(me.any(RETURN)).wait_for(over),
+            Phase::Turning { .. } => bid.request(self.home.clone()).wait_for(over),
+            Phase::Returning { .. } => bid.wait_for(me.any(ARRIVED)).wait_for(over),
+            Phase::Landing { why } => bid.request(me.because(LAND, why)).wait_for(grounded),
+            Phase::Down => bid.wait_for(me.any(HAND_BACK)).wait_for(grounded),
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         self.phase = match (self.phase.clone(), self.me.verb(event)) {
+            (_, Some(LAND)) => Phase::Down,
+            (_, Some(LANDED | COMMAND_FAILED)) => Phase::Grounded,
             (Phase::Away, _) => Phase::Turning { why: event.text("why").unwrap_or("return").to_owned() },
-            (Phase::Turning { why }, Some(GOTO)) => Phase::Returning { why },
-            (Phase::Returning { why }, Some(ARRIVED)) if event.int("leg") == Some(HOME_LEG) => {
-                Phase::Landing { why }
-            }
-            (Phase::Returning { why }, Some(ARRIVED)) => Phase::Returning { why },
+            (Phase::Turning { why }, _) => Phase::Returning { why },
+            (Phase::Returning { why }, _) if event.int("leg") == Some(HOME_LEG) => Phase::Landing { why },
+            (Phase::Returning { why }, _) => Phase::Returning { why },
             _ => Phase::Away,
         };
     }

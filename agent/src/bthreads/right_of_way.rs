@@ -190,6 +190,10 @@ impl BThread for RightOfWay {
             {
                 Phase::Yielding { passage, until: now + PATIENCE }
             }
+            (Phase::Yielding { passage, until }, None) if self.met <= until => {
+                self.met = Duration::ZERO;
+                Phase::Claiming { passage }
+            }
             // Time is up, or a vehicle that is not this one has left.
             (Phase::Yielding { passage, .. }, None) => self.claim_again(passage, now),
             (phase, _) => phase,

@@ -9,8 +9,7 @@ use skein_planning::{
     Path,
     global::{
         Potential, PotentialObstacle,
-        astar::{self, AstarConfig, AstarScratch, Disc, PlanError, Request},
-        simplify,
+        astar::{self, Astar, AstarConfig, Disc, PlanError, Request},
     },
     local::{
         apf::{self, ApfConfig},
@@ -23,10 +22,12 @@ use skein_planning::{
 };
 use skein_wire::vocabulary::{ARRIVED, LEAVE, PASSAGE, PATH_BLOCKED, PLANNED, STUCK, UNPLANNABLE};
 
+use super::evasion::{Evasion, Room, Way};
 use crate::{
     config::{Envelope, Fence},
     me::Me,
     neighbours::Neighbour,
+    pipeline::route_search::{ALLOWANCE, Found, RouteSearch, Task},
 };
 
 /// Leave to move lasts for so long after an `advance`: a little more than two navigation cycles.
@@ -53,14 +54,6 @@ const AROUND_NEIGHBOURS_M: f64 = 8.0;
 const PLANAR_BAND_M: f64 = 0.4;
 /// Clearance that the safety filter keeps between hull and obstacles, m: less than paths do, so that it does not fight them.
 const OBSTACLE_MARGIN_M: f64 = 0.1;
-/// Margins between hull and obstacles that are tried in turn when there is no path with the envelope's own, m.
-const TIGHT_MARGINS_M: [f64; 2] = [0.1, 0.03];
-/// Most voxels that a search at one height expands, so that no plan holds up the set-points for long.
-const LEVEL_BUDGET: usize = 100_000;
-/// Most voxels that a search at all heights expands; each costs more.
-const CLIMBING_BUDGET: usize = 40_000;
-/// As the height band of a level search: search all heights.
-const ALL_HEIGHTS: f64 = -1.0;
 /// How far ahead the way is looked at for the speed cap, m.
 const SENSED_AHEAD_M: f64 = 9.0;
 /// Standard deviation of the vehicle's own position, m.
@@ -73,6 +66,9 @@ const GIVES_WAY_M: f64 = 1.0;
 const ROOM_AHEAD_M: f64 = 1.5;
 /// Speed at which a hovering vehicle goes back to its place, at most, m/s.
 const STATION_KEEPING_M_S: f64 = 0.5;
+
+/// A vehicle that is hemmed in leaves its height where it has this much room, m.
+const EVASION_M: f64 = 1.0;
 
 /// How the vehicle moves. World ENU.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -165,7 +161,10 @@ pub struct Guidance {
     braking: BrakingConfig,
     filter: FilterConfig,
     escape: EscapeDetector,
-    scratch: AstarScratch,
+    evasion: Evasion,
+    routes: RouteSearch,
+    /// What the search for a path may still do in this tick.
+    allowance: usize,
 }
 
 impl Guidance {
@@ -198,7 +197,9 @@ impl Guidance {
                 ..FilterConfig::default()
             },
             escape: EscapeDetector::new(EscapeConfig::default()),
-            scratch: AstarScratch::default(),
+            evasion: Evasion::default(),
+            routes: RouteSearch::default(),
+            allowance: ALLOWANCE,
         }
     }
 
@@ -213,6 +214,7 @@ impl Guidance {
         let lands = goto.bool("lands").unwrap_or(true);
         self.leg = Some(Leg { number, target: Vector3::new(x, y, z), lands, arrived: false });
         self.following = None;
+        self.routes.abandon();
     }
 
     /// Gives leave to move for one navigation cycle.
@@ -232,6 +234,7 @@ impl Guidance {
         self.leg = None;
         self.following = None;
         self.passage = None;
+        self.routes.abandon();
     }
 
     /// The path ahead, from the vehicle's place on it to its end.
@@ -260,17 +263,18 @@ impl Guidance {
         Some(following.path.point_at((following.station_m + reach_m).min(following.path.length_m())))
     }
 
-    /// Plans a path to the waypoint. `why` is `stuck` when the vehicle made no way: neighbours that stand around are then
-    /// obstacles too. One that has fallen silent always is, as large as its ghost will be.
+    /// Begins to plan a path to the waypoint. `why` is `stuck` when the vehicle made no way: neighbours that stand around are
+    /// then obstacles too. One that has fallen silent always is, as large as its ghost will be. The answer comes at once if
+    /// this tick's allowance is enough for it, else from [`Guidance::go_on_planning`].
     pub fn plan(
         &mut self,
         why: &str,
         motion: &Motion,
         map: &mut ClearanceMap,
         neighbours: &[Neighbour],
-    ) -> Report {
+    ) -> Option<Report> {
         let Some(leg) = self.leg else {
-            return Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() };
+            return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() });
         };
         let target = map.voxels().clamp(&leg.target);
         // Outside the map, as beyond the fence, the way begins where the map does.
@@ -307,54 +311,38 @@ impl Guidance {
             (radius_m > 0.0).then_some(Disc { centre, radius_m })
         });
         let discs: Vec<Disc> = standing.chain(ghosts).collect();
-        let request = Request { start, goal: target, potential: &potential, discs: &discs };
-        let mut found = self.search(map, &request);
-        if found.is_err() && !discs.is_empty() {
-            found = self.search(map, &Request { discs: &[], ..request });
-        }
-        match found {
-            Ok((path, clearance_m)) => {
+        let Envelope { hull_m, margin_m, .. } = self.envelope;
+        let task = Task { leg: leg.number, start, goal: target, potential, discs, hull_m, margin_m };
+        self.routes.begin(task, map);
+        self.search(map)
+    }
+
+    /// Goes on with a plan that the ticks before were not enough for. Once in each tick, before anything else is planned.
+    pub fn go_on_planning(&mut self, map: &mut ClearanceMap) -> Option<Report> {
+        self.allowance = ALLOWANCE;
+        self.search(map)
+    }
+
+    /// Whether a plan has been begun that has no answer yet.
+    #[must_use]
+    pub fn is_planning(&self) -> bool {
+        self.routes.is_under_way()
+    }
+
+    fn search(&mut self, map: &mut ClearanceMap) -> Option<Report> {
+        let (leg, found) = self.routes.advance(map, &mut self.allowance)?;
+        Some(match found {
+            Ok(Found { path, clearance_m }) => {
                 let length_m = path.length_m();
                 self.following = Some(Following { path, clearance_m, station_m: 0.0, blocked: false });
                 self.escape.reset();
-                Report::Planned { leg: leg.number, length_m }
+                Report::Planned { leg, length_m }
             }
             Err(error) => {
                 self.following = None;
-                Report::Unplannable { leg: leg.number, why: error.to_string() }
+                Report::Unplannable { leg, why: error.to_string() }
             }
-        }
-    }
-
-    /// The path with the widest of the margins that allow one, and the clearance it keeps: level if there is such a path, else
-    /// over or under what is in the way.
-    fn search(&mut self, map: &mut ClearanceMap, request: &Request<'_>) -> Result<(Path, f64), PlanError> {
-        let level = AstarConfig { budget: LEVEL_BUDGET, ..AstarConfig::default() };
-        let climbing =
-            AstarConfig { planar_band_m: ALL_HEIGHTS, budget: CLIMBING_BUDGET, ..AstarConfig::default() };
-        let [tight_m, tightest_m] = TIGHT_MARGINS_M;
-        let wide_m = self.envelope.margin_m;
-        let tries = [
-            (level, wide_m),
-            (level, tight_m),
-            (level, tightest_m),
-            (climbing, wide_m),
-            (climbing, tightest_m),
-        ];
-        let mut first_error = None;
-        for (config, margin_m) in tries {
-            let clearance_m = self.envelope.hull_m + margin_m;
-            let config = AstarConfig { clearance_m, ..config };
-            match astar::plan(map, request, &config, &mut self.scratch) {
-                Ok(plan) => return Ok((simplify(map, &plan.path, clearance_m), clearance_m)),
-                // Far away: begin with the part of the way that leads nearest to the goal.
-                Err(PlanError::BudgetExhausted { partial, .. }) if config.planar_band_m > 0.0 => {
-                    return Ok((partial, clearance_m));
-                }
-                Err(error) => first_error = first_error.or(Some(error)),
-            }
-        }
-        Err(first_error.unwrap_or(PlanError::Unreachable { expanded: 0 }))
+        })
     }
 
     /// Looks along the path; once in each navigation cycle.
@@ -467,7 +455,17 @@ impl Guidance {
         };
         let obstacles: Vec<_> =
             surroundings.obstacles.iter().copied().chain(self.fence_ahead(motion.position)).collect();
-        let safe = filter(&request, surroundings.neighbours, &obstacles, &self.filter).velocity;
+        let filtered = filter(&request, surroundings.neighbours, &obstacles, &self.filter);
+        let clearance_m = self.filter.obstacle_clearance_m;
+        let room = || room(motion.position, surroundings.map, clearance_m);
+        if let Some(way) = self.evasion.decide(now, &filtered.outcome, surroundings.rank, room) {
+            let mut desired = filtered.velocity;
+            desired.z = way.sign() * self.envelope.climb_m_s;
+            let request = separation::Motion { desired, planar: false, ..request };
+            let velocity = filter(&request, surroundings.neighbours, &obstacles, &self.filter).velocity;
+            return SetPoint::Velocity { velocity, yaw: None };
+        }
+        let safe = filtered.velocity;
         if is_level {
             SetPoint::Planar { vx: safe.x, vy: safe.y, z: wish.height_m, yaw: None }
         } else {
@@ -477,7 +475,9 @@ impl Guidance {
 
     /// Along the path; `None` without path or leave.
     fn along_path(&mut self, now: Duration, motion: &Motion, map: &ClearanceMap) -> Option<Wish> {
-        let following = self.following.as_mut().filter(|_| now <= self.leave_until)?;
+        // Until there is a new path, a blocked one is not flown.
+        let following =
+            self.following.as_mut().filter(|following| now <= self.leave_until && !following.blocked)?;
         self.hover_at = None;
         let ahead = following.path.direction_at(following.station_m);
         let sensed_free_m = map.voxels().sensed_free_m(&motion.position, &ahead, SENSED_AHEAD_M);
@@ -527,6 +527,15 @@ impl Guidance {
     }
 }
 
+/// Whether a vehicle can leave its height, as far as the map reaches and tells.
+fn room(position: Vector3<f64>, map: &ClearanceMap, clearance_m: f64) -> Room {
+    let leads_free = |way: Way| {
+        let there = position + Vector3::z() * (way.sign() * EVASION_M);
+        map.voxels().index_of(&there).is_some() && map.is_segment_clear(&position, &there, clearance_m)
+    };
+    Room { up: leads_free(Way::Up), down: leads_free(Way::Down) }
+}
+
 /// The velocity wanted before others are considered (ENU, m/s), and the height it leads to (m).
 #[derive(Clone, Copy, Debug)]
 struct Wish {
@@ -543,4 +552,6 @@ pub struct Surroundings<'a> {
     pub obstacles: &'a [Vector3<f64>],
     /// The other vehicles in the air.
     pub neighbours: &'a [separation::Neighbour],
+    /// How many of them, and of those on the ground, have names that come before this vehicle's.
+    pub rank: u32,
 }

@@ -77,17 +77,34 @@ impl Scripts {
             }
             None => {}
         }
-        let BoundScript { name, about, with, bthread } =
-            assignment.bind(self.me.name()).map_err(|error| error.to_string())?;
-        self.rights.check(&bthread)?;
-        bthread.try_out(STATES_TRIED).map_err(|fault| fault.to_string())?;
-        let runner = Runner::new(self.me.clone(), &name, bthread.clone(), self.rights.block().clone());
+        let script = self.examine(assignment)?;
+        let runner = self.runner(&script);
+        let BoundScript { name, about, with, bthread } = script;
         let listens = FACTS.into_iter().filter(|fact| self.listens(&bthread, fact)).collect();
         program.add(Runner::bthread_name(&name), runner);
         let from = from.to_owned();
         self.running
             .insert(name, RunningScript { about, with, from, assignment: assignment.clone(), listens });
         Ok(())
+    }
+
+    /// A script with its parameters, once it has passed what can be said of it alone: its rights, and that it neither blocks
+    /// something for ever nor goes round by itself.
+    ///
+    /// # Errors
+    /// Why it is not run.
+    pub fn examine(&self, assignment: &Assignment) -> Result<BoundScript, String> {
+        let script = assignment.bind(self.me.name()).map_err(|error| error.to_string())?;
+        self.rights.check(&script.bthread)?;
+        script.bthread.try_out(STATES_TRIED).map_err(|fault| fault.to_string())?;
+        Ok(script)
+    }
+
+    /// The b-thread that runs a script within its rights.
+    #[must_use]
+    pub fn runner(&self, script: &BoundScript) -> Runner {
+        let may_block = self.rights.block().clone();
+        Runner::new(self.me.clone(), &script.name, script.bthread.clone(), may_block)
     }
 
     /// Whether a script asks about a fact. Whoever blocks some leave to move, and not all, must know where it leads.

@@ -14,8 +14,11 @@ const BUTTONS: { what: Command; key: string; title: string }[] = [
   { what: 'return', key: 'B', title: 'Fly back home and land there' },
   { what: 'land', key: 'L', title: 'Land here and now' },
   { what: 'goto', key: 'G', title: 'Fly to a place you click' },
+  { what: 'abort', key: '', title: 'Everyone lands where it is, decided together' },
   { what: 'launch', key: '', title: 'Arm and take off; asks again first' },
 ];
+/** These are decided for everyone, whoever is selected. */
+const FOR_ALL: ReadonlySet<Command> = new Set(['abort', 'launch', 'launch_together']);
 
 export interface CommandEvents {
   order(what: Exclude<Command, 'goto'>): void;
@@ -27,8 +30,9 @@ export class Commands {
   private readonly to = html('span', { class: 'to-whom' });
   private readonly everyone = html('button', { type: 'button', class: 'link-button', hidden: true }, 'All vehicles');
   private readonly buttons = new Map<Command, HTMLButtonElement>();
-  private readonly confirmTo = html('strong', {});
   private readonly confirm: HTMLDialogElement;
+  private live = false;
+  private all = true;
 
   constructor(
     root: HTMLElement,
@@ -60,12 +64,14 @@ export class Commands {
   setAddressees(words: string, all: boolean): void {
     setText(this.to, words);
     this.to.title = words;
-    setText(this.confirmTo, words);
     this.everyone.hidden = all;
+    this.all = all;
+    this.showEnabled();
   }
 
   setEnabled(enabled: boolean): void {
-    for (const button of this.buttons.values()) button.disabled = !enabled;
+    this.live = enabled;
+    this.showEnabled();
     if (!enabled) this.confirm.close();
   }
 
@@ -73,22 +79,31 @@ export class Commands {
     this.buttons.get('goto')?.setAttribute('aria-pressed', String(placing));
   }
 
+  private showEnabled(): void {
+    for (const [what, button] of this.buttons) button.disabled = !this.live || (FOR_ALL.has(what) && !this.all);
+  }
+
   private makeConfirm(): HTMLDialogElement {
     const cancel = html('button', { type: 'button', class: 'command', autofocus: true }, 'Cancel');
-    const arm = html('button', { type: 'button', class: 'command command-arm' }, 'Arm and take off');
+    const launch = (what: 'launch' | 'launch_together', words: string) => {
+      const button = html('button', { type: 'button', class: 'command command-arm' }, words);
+      button.addEventListener('click', () => {
+        dialog.close();
+        this.events.order(what);
+      });
+      return button;
+    };
     const dialog = html(
       'dialog',
       { class: 'confirm', 'aria-labelledby': 'confirm-title' },
       html('h2', { id: 'confirm-title' }, 'Arm motors and take off?'),
-      html('p', {}, this.confirmTo),
-      html('p', { class: 'muted' }, 'Each vehicle takes off when its own checks pass.'),
-      html('div', { class: 'dialog-buttons' }, cancel, arm),
+      html('p', {}, html('strong', {}, 'All vehicles')),
+      html('p', { class: 'muted' }, 'In turn: each when its own checks pass and the one before it is in the air. Together: all at once, when everyone is there and ready.'),
+    );
+    dialog.append(
+      html('div', { class: 'dialog-buttons' }, cancel, launch('launch_together', 'Take off together'), launch('launch', 'Take off in turn')),
     );
     cancel.addEventListener('click', () => dialog.close());
-    arm.addEventListener('click', () => {
-      dialog.close();
-      this.events.order('launch');
-    });
     return dialog;
   }
 }

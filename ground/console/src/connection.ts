@@ -2,7 +2,7 @@
  * The connection to the ground station: one WebSocket, opened again with growing patience whenever it is lost.
  */
 
-import { readMessage, type OrderRequest, type Question, type ServerMessage, type WithdrawalRequest } from './protocol';
+import { type ClientMessage, readMessage, type ServerMessage } from './protocol';
 
 const FIRST_RETRY_MS = 500;
 const LAST_RETRY_MS = 5000;
@@ -42,9 +42,9 @@ export class Connection {
   }
 
   /** Sends an order or a question; `false` if there is no connection to send it on. */
-  send(request: OrderRequest | WithdrawalRequest | Question): boolean {
+  send(message: ClientMessage): boolean {
     if (!this.socket || !this.live) return false;
-    this.socket.send(JSON.stringify(request));
+    this.socket.send(JSON.stringify(message));
     return true;
   }
 

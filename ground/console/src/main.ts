@@ -13,14 +13,13 @@ import { listenToKeys } from './keys';
 import { Banner, Notices } from './notices';
 import { OrdersPanel } from './orders-panel';
 import { Placing } from './placing';
-import type {
-  Command, Fleet, OrderRequest, Point, Question, Scene, ServerMessage, WithdrawalRequest,
-} from './protocol';
+import type { ClientMessage, Command, Fleet, Point, Question, Scene, Script, ServerMessage } from './protocol';
 import { addresseeWords, Selection } from './selection';
 import { Theme } from './theme';
 import { VehiclesPanel } from './vehicles-panel';
 import { View } from './view/view';
 import { WhyPanel } from './why-panel';
+import { showScript } from './script-dialog';
 import { ScriptsPanel } from './scripts-panel';
 import { clockWords, durationWords, orderName, outcomeWords } from './words';
 
@@ -33,7 +32,7 @@ const ANSWER_MS = 3000;
 
 /** An order that the station has not answered yet. */
 interface Sent {
-  what: Command | 'unload';
+  what: Command | 'load' | 'unload';
   timer: number;
   point?: Point;
 }
@@ -48,7 +47,7 @@ const vehicles = new VehiclesPanel(part('vehicles'), part('vehicles-note'), sele
 const events = new EventsPanel(part('events-head'), part('events'), selection);
 const why = new WhyPanel(part('why'), part('why-title'), part('why-note'), part('why-body'));
 const orders = new OrdersPanel(part('answers'));
-const scripts = new ScriptsPanel(part('vehicles'), withdraw);
+const scripts = new ScriptsPanel(part('vehicles'), withdraw, (file) => void readScript(file));
 const notices = new Notices(part('notices'));
 const connectionBanner = new Banner(part('banners'), 'alert');
 const outcomeBanner = new Banner(part('banners'), 'status');
@@ -126,6 +125,9 @@ function receive(message: ServerMessage): void {
       if (sent?.what === 'return' || sent?.what === 'land') view.setGoal(null);
       break;
     }
+    case 'script':
+      if (settle(message.tag)) offer(message.script);
+      break;
     case 'error': {
       const sent = message.tag === null ? undefined : settle(message.tag);
       notices.show(sent ? `${orderName(sent.what)} was refused: ${message.message}` : message.message);
@@ -177,7 +179,7 @@ function askWhy(): void {
 
 function showAddressees(): void {
   const to = selection.addressees(names());
-  commands.setAddressees(addresseeWords(to, fleet.vehicles.length), selection.names.size === 0);
+  commands.setAddressees(addresseeWords(to, fleet.vehicles.length), to === 'all');
 }
 
 function order(what: Command, point?: Point): void {
@@ -188,13 +190,26 @@ function withdraw(name: string, to: string[]): void {
   send({ type: 'order', tag: newTag(), what: 'unload', name, to });
 }
 
+/** Asks the station what a script's file says. */
+async function readScript(file: File): Promise<void> {
+  send({ type: 'read_script', tag: newTag(), file: file.name, text: await file.text() });
+}
+
+function offer(script: Script): void {
+  const to = selection.addressees(names());
+  showScript(script, addresseeWords(to, fleet.vehicles.length), (values) =>
+    send({ type: 'order', tag: newTag(), what: 'load', to, script: { script: script.file, with: values } }),
+  );
+}
+
 function newTag(): string {
   tags += 1;
   return `${Date.now().toString(36)}-${tags}`;
 }
 
-function send(request: OrderRequest | WithdrawalRequest): void {
-  const { tag, what } = request;
+function send(request: Exclude<ClientMessage, Question>): void {
+  const { tag } = request;
+  const what = request.type === 'order' ? request.what : 'load';
   const point = 'point' in request ? request.point : undefined;
   if (!connection.send(request)) {
     notices.show(`${orderName(what)} was not sent: there is no connection to the station.`);

@@ -158,10 +158,38 @@ export interface Refusal {
   message: string;
 }
 
-export type ServerMessage = Scene | Fleet | Orders | Events | Why | Ordered | Refusal;
+/** What a script's file says. */
+export interface ScriptAnswer {
+  type: 'script';
+  tag: string;
+  script: Script;
+}
 
-export const COMMANDS = ['hold', 'resume', 'return', 'land', 'goto', 'launch'] as const;
-export type Command = (typeof COMMANDS)[number];
+export interface Script {
+  name: string;
+  about: string;
+  parameters: Parameter[];
+  /** All of it, as it is sent on. */
+  file: unknown;
+}
+
+export const PARAMETER_KINDS = ['number', 'integer', 'node', 'point', 'route'] as const;
+
+export interface Parameter {
+  name: string;
+  about: string;
+  kind: (typeof PARAMETER_KINDS)[number];
+  unit: string;
+  default: Argument | null;
+  min: number | null;
+  max: number | null;
+}
+
+export type Argument = number | string | Vec3 | Vec3[];
+
+export type ServerMessage = Scene | Fleet | Orders | Events | Why | Ordered | ScriptAnswer | Refusal;
+
+export type Command = 'hold' | 'resume' | 'return' | 'land' | 'goto' | 'abort' | 'launch' | 'launch_together';
 
 /** A go-to's place; without a height every vehicle keeps its own. */
 export type Point = [x: number, y: number, z: number | null];
@@ -180,6 +208,23 @@ export interface Question {
   vehicle: string | null;
 }
 
+/** Asks what a script's file says. */
+export interface ReadingRequest {
+  type: 'read_script';
+  tag: string;
+  file: string;
+  text: string;
+}
+
+/** Sends a script to vehicles, with values for its parameters. */
+export interface ScriptRequest {
+  type: 'order';
+  tag: string;
+  what: 'load';
+  to: 'all' | string[];
+  script: { script: unknown; with: Record<string, Argument> };
+}
+
 /** Takes a script back. */
 export interface WithdrawalRequest {
   type: 'order';
@@ -188,6 +233,9 @@ export interface WithdrawalRequest {
   name: string;
   to: string[];
 }
+
+/** What this console says. */
+export type ClientMessage = OrderRequest | ReadingRequest | ScriptRequest | WithdrawalRequest | Question;
 
 /** Reads a message of the station; `null` if it is none that this console knows. */
 export function readMessage(text: string): ServerMessage | null {
@@ -216,6 +264,8 @@ export function readMessage(text: string): ServerMessage | null {
       return readWhy(json);
     case 'ordered':
       return { type: 'ordered', tag: string(json.tag), id: number(json.id) };
+    case 'script':
+      return isRecord(json.script) ? { type: 'script', tag: string(json.tag), script: readScript(json.script) } : null;
     case 'error':
       return {
         type: 'error',
@@ -284,6 +334,26 @@ function readVehicle(json: Json): Vehicle | null {
     link: { alive: link.alive === true, ageMs: number(link.age_ms) },
     notes: strings(json.notes),
   };
+}
+
+function readScript(json: Json): Script {
+  const parameters = isRecord(json.parameters) ? Object.entries(json.parameters) : [];
+  return {
+    name: string(json.name),
+    about: string(json.about),
+    parameters: parameters.flatMap(([name, value]) => {
+      const parameter = isRecord(value) ? readParameter(name, value) : null;
+      return parameter ? [parameter] : [];
+    }),
+    file: json,
+  };
+}
+
+function readParameter(name: string, json: Json): Parameter | null {
+  const kind = PARAMETER_KINDS.find((known) => known === json.type);
+  if (!kind) return null;
+  const [min, max] = [number(json.min), number(json.max)];
+  return { name, about: string(json.about), kind, unit: string(json.unit), default: (json.default as Argument | undefined) ?? null, min, max };
 }
 
 function readOutcome(json: unknown): Outcome | null {

@@ -1,5 +1,6 @@
 /**
- * The scripts that run on vehicles: one line each, with a button that takes it back everywhere.
+ * The scripts that run on vehicles: one line each, with a button that takes it back everywhere; and a button that sends
+ * another from a file.
  */
 
 import { html } from './dom';
@@ -14,8 +15,18 @@ export class ScriptsPanel {
   constructor(
     body: HTMLElement,
     private readonly withdraw: (script: string, vehicles: string[]) => void,
+    chosen: (file: File) => void,
   ) {
-    body.append(this.list);
+    const file = html('input', { type: 'file', accept: '.toml,.json', class: 'unseen', tabindex: '-1', 'aria-hidden': 'true' });
+    const send = html('button', { class: 'link-button', type: 'button', title: 'A b-thread as a TOML or JSON file' }, 'Send a script…');
+    send.addEventListener('click', () => file.click());
+    file.addEventListener('change', () => {
+      const [picked] = file.files ?? [];
+      if (picked) chosen(picked);
+      // So that the same file can be chosen again.
+      file.value = '';
+    });
+    body.append(this.list, html('p', { class: 'send-script' }, send, file));
   }
 
   show(fleet: Fleet): void {
@@ -32,7 +43,7 @@ export class ScriptsPanel {
   }
 
   private line(script: string, names: string[]): HTMLLIElement {
-    const button = html('button', { class: 'quiet', type: 'button', 'data-withdraw': script }, 'Withdraw');
+    const button = html('button', { class: 'link-button', type: 'button', 'data-withdraw': script }, 'Withdraw');
     button.addEventListener('click', () => this.withdraw(script, names));
     return html('li', { class: 'script', 'data-script': script }, html('span', {}, `${script}: ${nameWords(names)}`), button);
   }

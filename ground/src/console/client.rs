@@ -32,6 +32,9 @@ pub(super) async fn attend(mut socket: WebSocket, mut subscription: Subscription
                         question = vehicle.map(|vehicle| subscription.ask_about(vehicle));
                         Ok(())
                     }
+                    Some((tag, Ok(Request::Script(script)))) => {
+                        send(&mut socket, &json!({ "type": "script", "tag": tag, "script": script }).to_string()).await
+                    }
                     Some((tag, Ok(Request::Order(order)))) => give(&mut socket, tag, order, mailbox).await,
                     Some((tag, Err(why))) => refuse(&mut socket, tag, &why).await,
                     None if matches!(message, Message::Close(_)) => Err(Gone),

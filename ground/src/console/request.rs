@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 
 use serde::Deserialize;
-use skein_bp::script::Assignment;
+use skein_bp::script::{Assignment, ScriptFile};
 use skein_dbp::NodeName;
 use tokio::sync::oneshot;
 
@@ -56,6 +56,8 @@ pub(super) enum Request {
     Order(Order),
     /// To be told why this vehicle does what it does, from now on; none: nothing more.
     Why(Option<NodeName>),
+    /// To be told what a script's file says: its purpose and its parameters.
+    Script(Box<ScriptFile>),
 }
 
 /// A message of a browser.
@@ -64,6 +66,7 @@ pub(super) enum Request {
 enum Message {
     Order(Box<OrderMessage>),
     Why { vehicle: Option<NodeName> },
+    ReadScript { tag: Option<String>, file: String, text: String },
 }
 
 #[derive(Deserialize)]
@@ -111,6 +114,10 @@ pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
     match serde_json::from_str::<Message>(text) {
         Ok(Message::Order(message)) => (message.tag.clone(), order(*message).map(Request::Order)),
         Ok(Message::Why { vehicle }) => (None, Ok(Request::Why(vehicle))),
+        Ok(Message::ReadScript { tag, file, text }) => {
+            let script = ScriptFile::parse(&file, &text).map_err(|error| error.to_string());
+            (tag, script.map(|script| Request::Script(Box::new(script))))
+        }
         Err(error) => (None, Err(format!("not an order or a question: {error}"))),
     }
 }
@@ -170,6 +177,25 @@ mod tests {
         let vehicle = NodeName::new("uav/3").unwrap();
         assert_eq!(read(r#"{"type":"why","vehicle":"uav/3"}"#).1, Ok(Request::Why(Some(vehicle))));
         assert_eq!(read(r#"{"type":"why","vehicle":null}"#).1, Ok(Request::Why(None)));
+    }
+
+    #[test]
+    fn a_script_is_read_from_its_file_and_a_fault_is_told_with_its_line() {
+        let read_script = |text: &str| {
+            read(
+                &serde_json::json!({ "type": "read_script", "tag": "3", "file": "a.toml", "text": text })
+                    .to_string(),
+            )
+        };
+        let sound =
+            "name = \"a\"\nabout = \"Waits.\"\n[[body]]\nsync = { wait = { any_data = \"{me}/at\" } }\n";
+        let (tag, script) = read_script(sound);
+        let Ok(Request::Script(script)) = script else { panic!("{script:?}") };
+        assert_eq!((tag.as_deref(), script.name.as_str()), (Some("3"), "a"));
+        let fault = read_script(&sound.replace("sync", "dance")).1.unwrap_err();
+        assert!(fault.starts_with("a.toml") && fault.contains("unknown field `dance`"), "{fault}");
+        let fault = read_script("name = ").1.unwrap_err();
+        assert!(fault.starts_with("a.toml:1"), "{fault}");
     }
 
     #[test]

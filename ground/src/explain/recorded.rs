@@ -52,7 +52,7 @@ pub struct Recorded {
 }
 
 enum Note {
-    State(State),
+    State(Box<State>),
     Board(Board),
     Event(Occurred),
 }
@@ -146,7 +146,7 @@ fn ends_as_it_should(file: &[u8]) -> bool {
 fn note(message: &mcap::Message<'_>) -> Result<Option<Note>, DecodeError> {
     let schema = message.channel.schema.as_ref().map(|schema| schema.name.as_str());
     Ok(match schema {
-        Some("skein.State") => Some(Note::State(proto::State::decode(&*message.data)?.try_into()?)),
+        Some("skein.State") => Some(Note::State(Box::new(proto::State::decode(&*message.data)?.try_into()?))),
         Some("skein.Board") => Some(Note::Board(proto::Board::decode(&*message.data)?.try_into()?)),
         Some("skein.TraceEvent") => Some(Note::Event(TraceEvent::decode(&*message.data)?.try_into()?)),
         _ => None,

@@ -171,6 +171,14 @@ impl Bid {
         Self(Arc::new(Statement { requests, blocks, priority: *priority, ..Statement::default() }))
     }
 
+    /// The same bid without its requests: their events are waited for.
+    pub(crate) fn only_waiting(&self) -> Self {
+        let requests = self.requests().iter();
+        let mut bid = requests.fold(self.clone(), |bid, event| bid.wait_for(EventSet::from(event)));
+        bid.statement().requests.clear();
+        bid
+    }
+
     /// Whether the two bids ask for and block the same events, so that the same questions concern them.
     pub(crate) fn concerns_as(&self, other: &Self) -> bool {
         let (a, b) = (&*self.0, &*other.0);

@@ -220,8 +220,8 @@ impl EventSet {
             (Self::Or(sets), outer) => sets.iter().all(|set| set.is_within(outer)),
             (inner, Self::And(sets)) => sets.iter().all(|set| inner.is_within(set)),
             (inner, Self::Or(sets)) if sets.iter().any(|set| inner.is_within(set)) => true,
+            (Self::And(sets), outer) if sets.iter().any(|set| set.is_within(outer)) => true,
             (inner, Self::Not(set)) => inner.is_apart_from(set),
-            (Self::And(sets), outer) => sets.iter().any(|set| set.is_within(outer)),
             (Self::Named(inner), Self::Named(outer)) => inner.is_within(outer),
             (Self::Named(inner), Self::Prefix(outer)) => inner.fixed_start().starts_with(&**outer),
             (Self::Prefix(inner), Self::Prefix(outer)) => inner.starts_with(&**outer),
@@ -238,6 +238,7 @@ impl EventSet {
     pub fn about(&self, other: &EventSet) -> EventSet {
         match self {
             Self::Or(sets) => Self::any_of(sets.iter().map(|set| set.about(other))),
+            Self::And(sets) => Self::And(sets.iter().map(|set| set.about(other)).collect()),
             set if set.may_overlap(other) => set.clone(),
             _ => Self::None,
         }

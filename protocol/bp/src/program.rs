@@ -170,6 +170,11 @@ impl Program {
         self.add_boxed(name.into(), Box::new(bthread))
     }
 
+    /// Takes a b-thread out of the program, wherever it is; `false` when none of this name runs.
+    pub fn remove(&mut self, name: &str) -> bool {
+        self.board.bthread(name).and_then(|place| self.end(place)).is_some()
+    }
+
     /// Puts `event` at the end of the external queue. One whose home is elsewhere stays there.
     pub fn enqueue(&mut self, event: impl Into<Event>) {
         self.externals.push_back(event.into());
@@ -205,6 +210,19 @@ impl Program {
         }
         self.compact();
         removed.is_some()
+    }
+
+    /// Takes back what a b-thread requests at its present synchronisation point: there it waits for the same events, should
+    /// others request them.
+    pub fn withdraw_requests(&mut self, name: &str) {
+        let Some(place) = self.board.bthread(name) else { return };
+        let Some(entry) = self.board.get(place) else { return };
+        let (bid, sync) = (entry.bid.only_waiting(), entry.sync);
+        self.restate(place, bid);
+        if let Some(entry) = self.board.get_mut(place) {
+            entry.sync = sync;
+        }
+        self.revision += 1;
     }
 
     /// Says whether the program stays when it has nothing to do; see [`Program::is_daemon`].

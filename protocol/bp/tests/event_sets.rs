@@ -178,6 +178,10 @@ fn what_is_surely_within_a_set_is_known() {
     assert!(claim.is_within(&set("uav/*/land").or("uav/*/enter")));
     assert!(claim.is_within(&set("uav/*/land").not()));
     assert!(!claim.is_within(&set("uav/*/land")));
+    let but_facts = |home: EventSet| set("uav/1/**").and(home.and(set("uav/1/fact").not()));
+    let (narrow, wide) =
+        (but_facts(EventSet::prefix("uav/1/")), but_facts(EventSet::prefix("uav/1/").or("swarm/**")));
+    assert!(narrow.is_within(&wide), "what is kept out of both does not matter");
     assert!(set("uav/3/*").is_within(&EventSet::prefix("uav/3/")));
     assert!(EventSet::prefix("uav/3/go").is_within(&set("uav/3/**")));
     assert!(EventSet::from(goto(1.0, 2.0)).is_within(&EventSet::field_range("x", 0.0, 2.0)));

@@ -43,6 +43,21 @@ fn an_occurrence_happens_first_and_cannot_be_blocked() {
 }
 
 #[test]
+fn a_request_that_was_withdrawn_is_waited_for_until_the_next_synchronisation_point() {
+    let mut program = plain([
+        ("asks", json!([{"sync": {"request": ["go"]}}, {"sync": {"request": ["done"]}}])),
+        ("others", json!([{"sync": {"wait": "now"}}, {"sync": {"request": ["go"]}}])),
+    ]);
+    program.synchronise(START).unwrap();
+    program.withdraw_requests("asks");
+    assert_eq!(superstep(&mut program), Vec::<String>::new());
+    let (_, bid, sync) = program.bids().find(|(name, ..)| *name == "asks").unwrap();
+    assert_eq!((bid.requests(), sync), (&[][..], 1), "it is where it was");
+    program.enqueue("now");
+    assert_eq!(superstep(&mut program), ["now", "go", "done"]);
+}
+
+#[test]
 fn occurrences_keep_their_order() {
     let mut program = plain([("w", json!([{"sync": {"wait": "b"}}, {"assert_fail": "b"}]))]);
     program.occurred("a");

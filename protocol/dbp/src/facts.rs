@@ -9,9 +9,11 @@ use crate::NodeName;
 
 /// The block of `bthread` at its synchronisation point `sync` is acknowledged by every home it concerns (G3).
 ///
-/// It is told only while the b-thread is still at that point.
+/// It is told only while the b-thread is still at that point. One that moves on with the same block, or with a part of it, is
+/// told anew once that has been acknowledged, and may rely on the block all the while, unless [`BLOCK_LAPSED`] is told.
 pub const CONFIRMED: &str = "confirmed";
-/// The block of `bthread`, once confirmed, is about to lapse at `home`, which has not been heard in time (G3).
+/// The block of `bthread`, once confirmed, is not sure any more at `home`, which has not been heard in time, has lifted it, or
+/// has come into the roster and has yet to acknowledge it (G3).
 pub const BLOCK_LAPSED: &str = "block_lapsed";
 /// `home` does not honour a bid of `bthread`, for `reason`.
 pub const REFUSED: &str = "refused";

@@ -78,7 +78,7 @@ pub use message::{
 #[cfg(feature = "mutants")]
 pub use mutant::Mutant;
 pub use name::{NodeName, NodeNameError, first_two_chunks, is_chunk};
-pub use node::{Happened, LIFT, Node, NodeError, NodeStats, ProxyMove};
+pub use node::{BoardChange, ChannelMove, Happened, LIFT, Node, NodeError, NodeStats};
 pub use peers::Peer;
 pub use roster::{ROSTER, Roster, RosterError, SWARM};
 pub use table::RemoteParty;

@@ -88,10 +88,26 @@ pub struct RemoteBid {
     pub requests: Vec<Event>,
     /// What it blocks; only the home's own events count.
     pub block: EventSet,
+    /// The synchronisation point since which it has blocked no less than that: `sync` or an earlier one. What an authority
+    /// lifts stays lifted while the b-thread moves on with it.
+    pub block_since: u64,
     /// Its priority under the `sync_priority` strategy.
     pub priority: Option<i32>,
     /// What becomes of the block when the bidder is lost.
     pub on_loss: OnLoss,
+}
+
+impl RemoteBid {
+    /// How many bids one node may have at a home.
+    const MOST_BIDS: usize = 256;
+    /// How many events one bid may request.
+    const MOST_REQUESTS: usize = 64;
+
+    /// Whether a home takes it in at this place, counted from 0, among its sender's bids there.
+    #[must_use]
+    pub fn is_within_quota(&self, place: usize) -> bool {
+        place < Self::MOST_BIDS && self.requests.len() <= Self::MOST_REQUESTS
+    }
 }
 
 /// What becomes of a block when its holder is lost.

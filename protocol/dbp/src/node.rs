@@ -15,7 +15,7 @@ use skein_bp::{Bid, Event, EventSet, Origin, Program, ProgramError, Selection};
 
 use crate::explain::NodeExplanation;
 use crate::facts::{self, count, tell};
-use crate::held_blocks::HeldBlocks;
+use crate::held_blocks::{BlockNews, HeldBlocks};
 use crate::history::History;
 use crate::joint::Joint;
 use crate::outbox::Outbox;
@@ -62,15 +62,37 @@ pub struct Happened {
     pub at: Duration,
 }
 
-/// A proxy's bid as the program was told it: the channel's part in the run.
+/// The channel's part in the run: what it has changed on the program's board.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ProxyMove {
+pub struct ChannelMove {
     /// How many of the selections that [`Node::take_selections`] gives next came before it.
     pub after: usize,
-    /// The proxy, `node#bthread`.
-    pub proxy: Arc<str>,
-    /// Its bid from now on; none if it goes.
-    pub bid: Option<Bid>,
+    /// What has changed.
+    pub change: BoardChange,
+}
+
+/// A change that a channel makes on a program's board.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum BoardChange {
+    /// This proxy, `node#bthread`, states this bid from now on.
+    Put(Arc<str>, Bid),
+    /// This proxy is gone.
+    Gone(Arc<str>),
+    /// This b-thread's requests count no more at its synchronisation point.
+    Withdrawn(Arc<str>),
+}
+
+impl BoardChange {
+    /// Makes the change on the board of `program`.
+    pub fn apply(&self, program: &mut Program) {
+        match self {
+            Self::Put(proxy, bid) => program.put_proxy(proxy.clone(), bid),
+            Self::Gone(proxy) => {
+                program.remove_proxy(proxy);
+            }
+            Self::Withdrawn(bthread) => program.withdraw_requests(bthread),
+        }
+    }
 }
 
 /// Why a step did not go well. What happened in it counts all the same.
@@ -155,8 +177,8 @@ pub struct Node {
     two_homed: BTreeMap<String, u64>,
     outgoing: Vec<(Recipient, Message)>,
     selections: Vec<Happened>,
-    /// How proxies moved, where that is recorded.
-    proxy_moves: Option<Vec<ProxyMove>>,
+    /// What the channel has changed on the program's board, where that is recorded.
+    channel_moves: Option<Vec<ChannelMove>>,
     stats: NodeStats,
 }
 
@@ -167,8 +189,10 @@ pub(crate) type Select<'a> =
 /// What the program is to be told before it goes on.
 #[derive(Clone, Debug)]
 enum Delivery {
-    /// A fact of this node's own; with a b-thread, only while that is at the synchronisation point.
-    Fact(Event, Option<(String, u64)>),
+    /// A fact of this node's own.
+    Fact(Event),
+    /// Whether a b-thread's block is sure.
+    Block(BlockNews),
     /// What has occurred elsewhere.
     Occurrence(Occurrence),
     /// What a former life of this node has decided.
@@ -211,6 +235,7 @@ impl Node {
             facts,
             safety: config.safety.clone(),
             gateway: config.gateway.clone(),
+            orders: deciding::orders(&config.name),
             authority: config.authority.clone(),
             priority: config.remote_priority.clone(),
             longest_lease: config.longest_lease.max(config.lease),
@@ -254,7 +279,7 @@ impl Node {
             two_homed: BTreeMap::new(),
             outgoing: Vec::new(),
             selections: Vec::new(),
-            proxy_moves: None,
+            channel_moves: None,
             stats: NodeStats::default(),
             config,
         };
@@ -318,9 +343,12 @@ impl Node {
         outcome
     }
 
-    /// The messages to send, in order.
+    /// The messages to send, in order. Acknowledgements come last, so that no occurrence that a b-thread waits for
+    /// elsewhere goes behind one.
     pub fn take_outgoing(&mut self) -> Vec<(Recipient, Message)> {
-        std::mem::take(&mut self.outgoing)
+        let mut outgoing = std::mem::take(&mut self.outgoing);
+        outgoing.sort_by_key(|(_, message)| matches!(message, Message::Ack(_)));
+        outgoing
     }
 
     /// What this node must not forget, if that has changed since the last call: to be on disk before
@@ -353,15 +381,15 @@ impl Node {
         std::mem::take(&mut self.selections)
     }
 
-    /// Records from now on how proxies move, for one who replays the run; see
-    /// [`take_proxy_moves`](Self::take_proxy_moves).
-    pub fn record_proxies(&mut self) {
-        self.proxy_moves.get_or_insert_default();
+    /// Records from now on what the channel changes on the program's board, for one who replays the run; see
+    /// [`take_channel_moves`](Self::take_channel_moves).
+    pub fn record_channel(&mut self) {
+        self.channel_moves.get_or_insert_default();
     }
 
-    /// How proxies have moved since the last call, in order; to be taken together with the selections.
-    pub fn take_proxy_moves(&mut self) -> Vec<ProxyMove> {
-        self.proxy_moves.as_mut().map(std::mem::take).unwrap_or_default()
+    /// What the channel has changed since the last call, in order; to be taken together with the selections.
+    pub fn take_channel_moves(&mut self) -> Vec<ChannelMove> {
+        self.channel_moves.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// When [`step`](Self::step) is due even if no message comes.
@@ -378,9 +406,9 @@ impl Node {
             .into_iter()
             .chain(self.outboxes.values().map(|outbox| outbox.next_deadline(lease)))
             .chain(self.streams.values().map(Stream::next_deadline))
-            .chain([self.held.next_deadline(|home, bthread, sync| {
-                self.outboxes.get(home)?.kept_until(bthread, sync, lease)
-            })])
+            .chain([self
+                .held
+                .next_deadline(|home, bthread, sync| self.outboxes.get(home)?.upheld(bthread, sync, lease))])
             .chain([self.guard_due(), decisions])
             .flatten()
             .fold(self.presence_due, Duration::min)
@@ -429,9 +457,8 @@ impl Node {
         let lease = self.config.lease;
         held.into_iter().flat_map(|(sync, homes)| homes.iter().map(move |home| (home, sync))).map(
             move |(home, sync)| {
-                let until =
-                    self.outboxes.get(home).and_then(|outbox| outbox.kept_until(bthread, sync, lease));
-                (home, until.is_some_and(|until| self.now < until))
+                let upheld = self.outboxes.get(home).and_then(|outbox| outbox.upheld(bthread, sync, lease));
+                (home, upheld.is_some_and(|upheld| self.now < upheld.until))
             },
         )
     }
@@ -499,8 +526,17 @@ impl Node {
         self.now - self.started.unwrap_or(self.now)
     }
 
+    /// Changes the program's board.
+    fn change_board(&mut self, change: BoardChange) {
+        self.stalls_due = true;
+        change.apply(&mut self.program);
+        if let Some(moves) = &mut self.channel_moves {
+            moves.push(ChannelMove { after: self.selections.len(), change });
+        }
+    }
+
     fn fact(&mut self, what: &str, data: impl FnOnce(Event) -> Event) {
-        self.deliveries.push_back(Delivery::Fact(data(tell(&self.config.name, what)), None));
+        self.deliveries.push_back(Delivery::Fact(data(tell(&self.config.name, what))));
     }
 }
 

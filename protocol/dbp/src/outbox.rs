@@ -13,19 +13,39 @@ pub(crate) struct Outbox {
     /// Number of the present content; 0 before the first.
     pub(crate) epoch: u64,
     pub(crate) bids: Vec<RemoteBid>,
-    /// For each b-thread, its synchronisation point and the epoch in which that came in.
-    pub(crate) since: BTreeMap<String, (u64, u64)>,
+    /// For each b-thread that blocks something there, how its block came to be what it is.
+    pub(crate) blocks: BTreeMap<String, Statement>,
     /// Requests that a former life of the home may have served: the synchronisation point not to be asked for again.
     pub(crate) unknown: BTreeMap<String, u64>,
     /// What the home did not honour of the content it acknowledged last.
     pub(crate) refused: Vec<Refusal>,
-    /// Blocks that the home keeps even without renewal: for each b-thread, its synchronisation point (G5).
-    pub(crate) durable: BTreeMap<String, u64>,
     pub(crate) acked_epoch: u64,
     /// When the last acknowledged copy was sent.
     pub(crate) acked_sent_at: Duration,
     /// When the last copy was sent; none of the present content yet.
     pub(crate) sent_at: Option<Duration>,
+}
+
+/// A block, from the first synchronisation point that stated it or more, without a pause.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Statement {
+    /// The present synchronisation point, and the epoch in which it came in.
+    pub(crate) sync: u64,
+    pub(crate) entered: u64,
+    /// The first one, and an epoch since which every content holds the block.
+    pub(crate) since: u64,
+    pub(crate) held_since: u64,
+    /// The synchronisation point at which the home took it in as one that it keeps without renewal (G5).
+    pub(crate) durable: Option<u64>,
+}
+
+/// What a home surely does about a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Upheld {
+    /// Until when, on the holder's clock, it keeps the block: one that it keeps without renewal has no end.
+    pub(crate) until: Duration,
+    /// Whether it has acknowledged the block as it is stated at this very synchronisation point.
+    pub(crate) acknowledged: bool,
 }
 
 /// Who bids.
@@ -39,16 +59,29 @@ pub(crate) struct Sender<'a> {
     pub(crate) decided: u64,
 }
 
+impl Statement {
+    /// A block that comes in with the content `epoch`.
+    fn new(sync: u64, epoch: u64) -> Self {
+        Self { sync, entered: epoch, since: sync, held_since: epoch, durable: None }
+    }
+
+    /// Whether the home does not honour it, at any of its synchronisation points.
+    fn is_refused(&self, bthread: &str, refused: &[Refusal]) -> bool {
+        refused.iter().any(|refusal| {
+            refusal.bthread == bthread && refusal.sync >= self.since && refusal.reason.voids_block()
+        })
+    }
+}
+
 impl Outbox {
     pub(crate) fn new() -> Self {
         Self {
             home_incarnation: None,
             epoch: 0,
             bids: Vec::new(),
-            since: BTreeMap::new(),
+            blocks: BTreeMap::new(),
             unknown: BTreeMap::new(),
             refused: Vec::new(),
-            durable: BTreeMap::new(),
             acked_epoch: 0,
             acked_sent_at: Duration::ZERO,
             sent_at: None,
@@ -70,10 +103,38 @@ impl Outbox {
             }
         }
         bids.retain(|bid| !bid.requests.is_empty() || !bid.block.is_none());
+        let mut blocks = BTreeMap::new();
+        for (place, bid) in bids.iter_mut().enumerate().filter(|(_, bid)| !bid.block.is_none()) {
+            let statement =
+                self.continued(place, bid).unwrap_or_else(|| Statement::new(bid.sync, self.epoch + 1));
+            bid.block_since = statement.since;
+            blocks.insert(bid.bthread.clone(), statement);
+        }
         if bids != self.bids {
-            self.bids = bids;
+            (self.bids, self.blocks) = (bids, blocks);
             self.renew_content();
         }
+    }
+
+    /// The statement of a block that goes on with this bid: it blocks what it blocked in the content before, or less.
+    ///
+    /// The home keeps such a block whichever of the two contents it has. That a b-thread has moved on can be passed over only
+    /// if the home has taken in the block before that, for what is still on its way may be a refusal.
+    fn continued(&self, place: usize, bid: &RemoteBid) -> Option<Statement> {
+        let before = self.bids.iter().find(|before| before.bthread == bid.bthread)?;
+        let statement = *self.blocks.get(&bid.bthread)?;
+        if before.on_loss != bid.on_loss || !bid.block.is_within(&before.block) || !bid.is_within_quota(place)
+        {
+            return None;
+        }
+        if before.sync == bid.sync {
+            return Some(statement);
+        }
+        self.upheld_by(statement, &bid.bthread).then_some(Statement {
+            sync: bid.sync,
+            entered: self.epoch + 1,
+            ..statement
+        })
     }
 
     /// The home lives in a new incarnation: nothing that the old one had taken in counts any more. Gives the bids
@@ -106,17 +167,6 @@ impl Outbox {
 
     fn renew_content(&mut self) {
         self.epoch += 1;
-        let epoch = self.epoch;
-        let since = self.bids.iter().map(|bid| {
-            let entered = match self.since.get(&bid.bthread) {
-                Some((sync, entered)) if *sync == bid.sync => *entered,
-                _ => epoch,
-            };
-            (bid.bthread.clone(), (bid.sync, entered))
-        });
-        self.since = since.collect();
-        let since = &self.since;
-        self.durable.retain(|bthread, sync| since.get(bthread).is_some_and(|(stated, _)| stated == sync));
         self.sent_at = None;
     }
 
@@ -134,34 +184,33 @@ impl Outbox {
         self.acked_epoch = ack.epoch;
         let before = std::mem::replace(&mut self.refused, ack.refused);
         for bid in self.bids.iter().filter(|bid| bid.on_loss == OnLoss::Hold) {
-            let sync = bid.sync;
-            let acked = self.since.get(&bid.bthread).is_some_and(|(_, epoch)| *epoch <= ack.epoch);
-            if self.block_refused(&bid.bthread, sync) {
-                self.durable.remove(&bid.bthread);
-            } else if acked {
-                self.durable.insert(bid.bthread.clone(), sync);
+            let Some(statement) = self.blocks.get_mut(&bid.bthread) else { continue };
+            if statement.is_refused(&bid.bthread, &self.refused) {
+                statement.durable = None;
+            } else if statement.entered <= ack.epoch {
+                statement.durable = Some(statement.sync);
             }
         }
         self.refused.iter().filter(|refusal| !before.contains(refusal)).cloned().collect()
     }
 
-    fn block_refused(&self, bthread: &str, sync: u64) -> bool {
-        let refused = |refusal: &Refusal| {
-            refusal.bthread == bthread && refusal.sync == sync && refusal.reason.voids_block()
-        };
-        self.refused.iter().any(refused)
+    /// What the home surely does about the block that `bthread` holds at its synchronisation point `sync`; none if it is
+    /// not known to have taken it in. Counts 0.9 lease from sending (G3).
+    pub(crate) fn upheld(&self, bthread: &str, sync: u64, lease: Duration) -> Option<Upheld> {
+        let statement = self.blocks.get(bthread).filter(|statement| statement.sync == sync)?;
+        self.upheld_by(*statement, bthread).then(|| match statement.durable {
+            Some(point) => Upheld { until: Duration::MAX, acknowledged: point == sync },
+            None => Upheld {
+                until: self.acked_sent_at + lease * 9 / 10,
+                acknowledged: self.acked_epoch >= statement.entered,
+            },
+        })
     }
 
-    /// Until when, on this node's clock, the home surely keeps the block that `bthread` holds since its
-    /// synchronisation point `sync`; none if it has not acknowledged it. Counts 0.9 lease from sending (G3); a block that
-    /// is kept without renewal has no end.
-    pub(crate) fn kept_until(&self, bthread: &str, sync: u64, lease: Duration) -> Option<Duration> {
-        if self.durable.get(bthread) == Some(&sync) {
-            return Some(Duration::MAX);
-        }
-        let (since_sync, epoch) = *self.since.get(bthread)?;
-        let kept = since_sync == sync && self.acked_epoch >= epoch && !self.block_refused(bthread, sync);
-        kept.then(|| self.acked_sent_at + lease * 9 / 10)
+    /// Whether the home has taken in a block.
+    fn upheld_by(&self, statement: Statement, bthread: &str) -> bool {
+        (statement.durable.is_some() || self.acked_epoch >= statement.held_since)
+            && !statement.is_refused(bthread, &self.refused)
     }
 
     /// The record to send now, if one is due. Each renewal is repeated every tenth of the lease until it is

@@ -16,11 +16,6 @@ use crate::{
     ServedRequest,
 };
 
-/// How many bids one node may have here.
-const MOST_BIDS: usize = 256;
-/// How many events one bid may request.
-const MOST_REQUESTS: usize = 64;
-
 /// What of a remote bid this home honours.
 #[derive(Clone, Debug)]
 pub(crate) struct Rights {
@@ -32,6 +27,8 @@ pub(crate) struct Rights {
     pub(crate) safety: EventSet,
     /// ... but for these, which may be requested.
     pub(crate) gateway: EventSet,
+    /// An operator's orders to the node itself, which nobody blocks from afar.
+    pub(crate) orders: EventSet,
     /// What may be blocked from afar: the home's events without all of these.
     pub(crate) blockable: EventSet,
     /// Who may do what of the rest.
@@ -225,8 +222,8 @@ impl BidTable {
         if self.rights.mutant == Some(Mutant::G2) {
             taken = bidder.bids.clone();
         }
-        for (index, bid) in record.bids.iter().enumerate() {
-            let (honoured, reasons) = self.rights.judge(&record.node, bid, index, bidder.lease);
+        for (place, bid) in record.bids.iter().enumerate() {
+            let (honoured, reasons) = self.rights.judge(&record.node, bid, place, bidder.lease);
             bidder.refuse(bid, reasons);
             let Some(mut honoured) = honoured else { continue };
             // What has occurred since the bidder stated this resumes its b-thread, which asks no more (G4).
@@ -237,7 +234,7 @@ impl BidTable {
             let astray =
                 record.term != past.term && bid.requests.iter().any(|e| Roster::joint_events().contains(e));
             honoured.open &= for_this_life && !over && !astray;
-            if honoured.keep && bidder.lifted.get(&bid.bthread).is_some_and(|sync| bid.sync <= *sync) {
+            if honoured.keep && bidder.lifted.get(&bid.bthread).is_some_and(|sync| bid.block_since <= *sync) {
                 honoured.block = EventSet::None;
                 honoured.keep = false;
                 bidder.refuse(bid, vec![RefusalReason::Lifted]);
@@ -248,9 +245,11 @@ impl BidTable {
         bidder.lifted.retain(|bthread, _| taken.contains_key(bthread));
         for (bthread, orphan) in bidder.bids.iter().filter(|(_, bid)| bid.orphaned) {
             let heir = taken.entry(bthread.clone()).or_insert_with(|| orphan.clone());
-            // The b-thread's new life takes the block over if it states all of it, and then may withdraw it.
-            if !(heir.keep && orphan.block.is_within(&heir.block)) {
-                heir.block = std::mem::take(&mut heir.block).or(orphan.block.clone());
+            // The b-thread's new life takes the block over if it states all of it, and then may withdraw it. What this home
+            // honours of the two may differ, when it has become the coordinator between them, or is it no more.
+            if !(heir.keep && orphan.asked_block.is_within(&heir.asked_block)) {
+                heir.block = joined(&heir.block, &orphan.block);
+                heir.asked_block = joined(&heir.asked_block, &orphan.asked_block);
                 heir.keep = true;
                 heir.orphaned = true;
             }
@@ -438,22 +437,22 @@ impl Rights {
 
     /// From now on, these events have their home here.
     pub(crate) fn set_home(&mut self, home: EventSet) {
-        let never = self.facts.clone().or(self.safety.clone()).or(self.gateway.clone());
+        let never = EventSet::any_of([&self.facts, &self.safety, &self.gateway, &self.orders]);
         #[cfg(feature = "mutants")]
         let never = if self.mutant == Some(Mutant::G6) { self.facts.clone() } else { never };
         self.blockable = home.clone().and(never.not());
         self.home = home;
     }
 
-    /// What of the `index`-th bid of a record is honoured, and why not the rest.
+    /// What of a bid at this place of a record is honoured, and why not the rest.
     fn judge(
         &self,
         node: &NodeName,
         bid: &RemoteBid,
-        index: usize,
+        place: usize,
         lease: Duration,
     ) -> (Option<TakenBid>, Vec<RefusalReason>) {
-        if index >= MOST_BIDS || bid.requests.len() > MOST_REQUESTS {
+        if !bid.is_within_quota(place) {
             return (None, vec![RefusalReason::Quota]);
         }
         if lease > self.longest_lease {
@@ -547,6 +546,11 @@ impl TakenBid {
             None => bid,
         }
     }
+}
+
+/// The events of both sets; no larger a tree each time that the same ones are joined.
+fn joined(more: &EventSet, set: &EventSet) -> EventSet {
+    if more.is_within(set) { set.clone() } else { more.clone().or(set.clone()) }
 }
 
 /// What of these bids must outlive this home's life.

@@ -140,6 +140,7 @@ fn a_record_that_asks_for_too_much_is_cut_down_and_the_rest_is_told() {
         sync: 1,
         requests: vec![Event::new(event)],
         block: EventSet::All,
+        block_since: 1,
         priority: None,
         on_loss: OnLoss::Release,
     };
@@ -195,7 +196,7 @@ prop_compose! {
         let at = Duration::from_millis(at);
         let served = ServedRequest { node: b.clone(), incarnation: 3, bthread: "ask".into(), sync: n };
         let bid = RemoteBid {
-            bthread: "x".into(), sync: n, requests: vec![event.clone()], block: EventSet::from("uav/1/*"),
+            bthread: "x".into(), sync: n, requests: vec![event.clone()], block: EventSet::from("uav/1/*"), block_since: m,
             priority: Some(9), on_loss: if asks { OnLoss::Hold } else { OnLoss::Release },
         };
         match which {

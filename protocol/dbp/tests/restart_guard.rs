@@ -79,6 +79,7 @@ fn a_record_made_for_its_former_life_does_not_count() {
         sync: 1,
         requests: vec![],
         block: EventSet::from("uav/*/step"),
+        block_since: 1,
         priority: None,
         on_loss: OnLoss::Release,
     };

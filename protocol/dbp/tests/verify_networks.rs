@@ -11,7 +11,15 @@ use skein_dbp::verify::programs::{self, Network};
 use skein_dbp::verify::{Faults, Member, NetworkView};
 use skein_dbp::{NodeConfig, NodeName, facts};
 
-const NONE: Faults = Faults { delay: false, lapses: 0, restarts: 0, late_facts: false, most_under_way: 8 };
+const NONE: Faults = Faults {
+    delay: false,
+    lapses: 0,
+    restarts: 0,
+    repeats: 0,
+    partitions: 0,
+    late_facts: false,
+    most_under_way: 8,
+};
 
 fn trace(report: &Report) -> Vec<String> {
     report.verdict.iter().flat_map(|violation| &violation.trace).map(ToString::to_string).collect()
@@ -118,6 +126,9 @@ fn two_are_inside_where_a_lapsed_block_is_not_heeded() {
     };
     let network = Network {
         name: "deaf",
+        about: "whoever is inside does not heed that its block has lapsed",
+        is_sound: false,
+        faults: NONE,
         members: members.into(),
         requirement: Some(("one inside", Arc::new(one_inside))),
     };

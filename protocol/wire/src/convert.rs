@@ -12,7 +12,7 @@ use skein_dbp::{
 };
 
 use crate::proto::{self, event_set, value::Kind};
-use crate::{DecodeError, Form, MissionState, Scan, Scene, Solid, State};
+use crate::{DecodeError, Echo, Form, MissionState, Scan, Scene, Solid, State};
 
 type Result<T> = std::result::Result<T, DecodeError>;
 
@@ -194,6 +194,7 @@ impl From<&RemoteBid> for proto::RemoteBid {
             sync: bid.sync,
             requests: bid.requests.iter().map(Into::into).collect(),
             block: (!bid.block.is_none()).then(|| (&bid.block).into()),
+            block_since: Some(bid.block_since),
             priority: bid.priority,
             on_loss: on_loss.into(),
         }
@@ -221,6 +222,7 @@ impl TryFrom<proto::RemoteBid> for RemoteBid {
             sync: number("RemoteBid.sync", bid.sync, 1)?,
             requests: bid.requests.into_iter().map(Event::try_from).collect::<Result<_>>()?,
             block: bid.block.map_or(Ok(EventSet::None), EventSet::try_from)?,
+            block_since: bid.block_since.map_or(bid.sync, |since| since.min(bid.sync)),
             priority: bid.priority,
             on_loss,
         })
@@ -485,6 +487,12 @@ impl From<&State> for proto::State {
             }
             .into(),
             scripts: state.scripts.iter().take(State::MAX_SCRIPTS).cloned().collect(),
+            echo: state.echo.as_ref().map(|echo| proto::Echo {
+                node: text(&echo.node),
+                incarnation: echo.incarnation,
+                time_ns: ns(echo.time),
+                held_ns: ns(echo.held),
+            }),
         }
     }
 }
@@ -525,6 +533,20 @@ impl TryFrom<proto::State> for State {
                 proto::Mission::Failed => MissionState::Failed,
             },
             scripts: state.scripts,
+            echo: state.echo.map(Echo::try_from).transpose()?,
+        })
+    }
+}
+
+impl TryFrom<proto::Echo> for Echo {
+    type Error = DecodeError;
+
+    fn try_from(echo: proto::Echo) -> Result<Self> {
+        Ok(Self {
+            node: node("Echo.node", &echo.node)?,
+            incarnation: echo.incarnation,
+            time: Duration::from_nanos(echo.time_ns),
+            held: Duration::from_nanos(echo.held_ns),
         })
     }
 }

@@ -57,5 +57,5 @@ pub use payload::{MAX_PAYLOAD, Payload, VERSION};
 pub use scan::Scan;
 pub use scene::{Form, Scene, Solid};
 pub use skein_dbp::{NodeName, NodeNameError};
-pub use state::{MissionState, State};
+pub use state::{Echo, MissionState, State};
 pub use store::{MemoryStore, Store};

@@ -40,6 +40,21 @@ pub struct State {
     pub mission: MissionState,
     /// The names of the scripts that run on it; only the first [`State::MAX_SCRIPTS`] travel.
     pub scripts: Vec<String>,
+    /// The last word of one other vehicle, each in turn: from it that one learns how long messages take.
+    pub echo: Option<Echo>,
+}
+
+/// A state that was heard, told back.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Echo {
+    /// Whose state.
+    pub node: NodeName,
+    /// Its incarnation.
+    pub incarnation: u64,
+    /// Its time, on the clock of that node.
+    pub time: Duration,
+    /// Time from its arrival until it was told back.
+    pub held: Duration,
 }
 
 /// How far a vehicle's mission is.
@@ -80,6 +95,7 @@ impl State {
             path: Vec::new(),
             mission: MissionState::default(),
             scripts: Vec::new(),
+            echo: None,
         }
     }
 }

@@ -7,10 +7,11 @@ mod swarm;
 
 use std::time::Duration;
 
-use skein_bp::{EventSet, Program};
-use skein_dbp::NodeConfig;
+use skein_bp::script::{Op, Script};
+use skein_bp::{Bid, EventSet, Program};
+use skein_dbp::{NodeConfig, Roster, facts};
 use skein_wire::NetworkConfig;
-use swarm::{Always, Blocker, Requester, Swarm, hostile, name, program};
+use swarm::{Always, Blocker, LEASE, Requester, Swarm, hostile, name, program};
 
 const HOMES: [&str; 3] = ["uav/1", "uav/2", "uav/3"];
 const HOLDER: &str = "ground/main";
@@ -154,7 +155,7 @@ fn a_block_that_comes_with_a_request_stays_when_the_request_is_served() {
         let mut swarm = Swarm::new(&["uav/1", HOLDER], NetworkConfig { loss: 0.0, ..hostile() }, seed);
         swarm.start("uav/1", 1, stepper("uav/1", seed));
         let mut holder = program(seed);
-        holder.add("move", Always(skein_bp::Bid::new().request("uav/1/turn").block("uav/1/step")));
+        holder.add("move", Always(Bid::new().request("uav/1/turn").block("uav/1/step")));
         swarm.start(HOLDER, 1, holder);
         swarm.run(Duration::from_secs(10));
         let confirmed = swarm.saw(HOLDER, "ground/main/confirmed").next().unwrap().at;
@@ -171,8 +172,8 @@ fn a_silent_member_keeps_a_wildcard_block_unconfirmed() {
         swarm.start(home, 1, stepper(home, 1));
     }
     let mut holder = program(1);
-    holder.add("all", Always(skein_bp::Bid::new().block("uav/*/step")));
-    holder.add("one", Always(skein_bp::Bid::new().block("uav/1/step")));
+    holder.add("all", Always(Bid::new().block("uav/*/step")));
+    holder.add("one", Always(Bid::new().block("uav/1/step")));
     swarm.start(HOLDER, 1, holder);
     swarm.run(Duration::from_secs(2));
     let confirmed = |swarm: &Swarm| -> Vec<String> {
@@ -191,9 +192,118 @@ fn a_silent_member_keeps_a_wildcard_block_unconfirmed() {
 fn a_fleet_of_one_confirms_at_once() {
     let mut swarm = Swarm::new(&[HOLDER], NetworkConfig::default(), 1);
     let mut holder = program(1);
-    let confirmed = skein_dbp::facts::confirmed(&name(HOLDER), "hold");
-    holder.add("hold", Always(skein_bp::Bid::new().block("uav/*/step").wait_for(confirmed)));
+    let confirmed = facts::confirmed(&name(HOLDER), "hold");
+    holder.add("hold", Always(Bid::new().block("uav/*/step").wait_for(confirmed)));
     swarm.start(HOLDER, 1, holder);
     swarm.tick();
     assert!(swarm.saw(HOLDER, "ground/main/confirmed").count() >= 1);
+}
+
+/// Who claims awaits confirmation, and then stays with `claimed` until it is told that its block has lapsed.
+fn claimant(claimed: &str) -> Script {
+    let me = name(HOLDER);
+    let claim = Bid::new().block("uav/*/step").wait_for(facts::confirmed(&me, "claim"));
+    let act = Bid::new().block(claimed).wait_for(facts::block_lapsed(&me, "claim"));
+    Script::new(&[Op::Sync(claim), Op::Sync(act), Op::Sync(Bid::new().request("ground/main/warned"))])
+        .unwrap()
+}
+
+#[test]
+fn who_moves_on_with_its_block_and_is_cut_off_is_told_before_a_home_lets_go() {
+    for claimed in ["uav/*/step", "uav/1/step"] {
+        let mut swarm = Swarm::new(&["uav/1", HOLDER], NetworkConfig::default(), 1);
+        swarm.start("uav/1", 1, stepper("uav/1", 1));
+        let mut holder = program(1);
+        holder.add("claim", claimant(claimed));
+        swarm.start(HOLDER, 1, holder);
+        while swarm.saw(HOLDER, "ground/main/confirmed").next().is_none() {
+            swarm.tick();
+        }
+        // Nobody has acknowledged the block as it is stated now.
+        swarm.network.partition(&[&[name(HOLDER)]]);
+        let cut = swarm.now;
+        swarm.run(3 * LEASE);
+        let warned = swarm.occurred(HOLDER, "ground/main/warned").next().unwrap().at;
+        let stepped = swarm.occurred("uav/1", "uav/1/step").find(|seen| seen.at > cut).unwrap().at;
+        assert!(warned < stepped, "{claimed}: warned at {warned:?}, and the first step was at {stepped:?}");
+    }
+}
+
+#[test]
+fn who_moves_on_with_a_larger_block_awaits_its_confirmation_anew() {
+    let mut swarm = Swarm::new(&["uav/1", HOLDER], NetworkConfig::default(), 1);
+    swarm.start("uav/1", 1, stepper("uav/1", 1));
+    let mut holder = program(1);
+    holder.add("claim", claimant("uav/*/*"));
+    swarm.start(HOLDER, 1, holder);
+    while swarm.saw(HOLDER, "ground/main/confirmed").next().is_none() {
+        swarm.tick();
+    }
+    swarm.network.partition(&[&[name(HOLDER)]]);
+    swarm.run(3 * LEASE);
+    assert_eq!(swarm.saw(HOLDER, "ground/main/block_lapsed").count(), 0, "it relied on nothing");
+    swarm.network.heal();
+    swarm.run(LEASE);
+    assert_eq!(swarm.saw(HOLDER, "ground/main/confirmed").count(), 2);
+}
+
+/// All under the roster of a term, which their operator orders them in turn.
+fn order(swarm: &mut Swarm, term: u64, members: &[&str]) {
+    let roster = Roster { term, ..Roster::first(name(HOLDER), members.iter().map(|member| name(member))) };
+    for node in ALL {
+        swarm.node(node).enqueue(roster.order(&name(node)));
+    }
+}
+
+fn fleet_with_roster(bid: Bid) -> Swarm {
+    let mut swarm = Swarm::new(&ALL, NetworkConfig::default(), 1);
+    let joint = Some(Roster::first(name(HOLDER), HOMES.map(name)));
+    for home in HOMES {
+        let config = NodeConfig { joint: joint.clone(), ..swarm.config(home, 1) };
+        let mut steps = stepper(home, 1);
+        steps.add("never", Always(Bid::new().block(format!("{home}/never"))));
+        swarm.start_with(config, steps);
+    }
+    let mut holder = program(1);
+    holder.add("hold", Always(bid));
+    let config = NodeConfig { joint, ..swarm.config(HOLDER, 1) };
+    swarm.start_with(config, holder);
+    swarm.run(LEASE);
+    swarm
+}
+
+#[test]
+fn a_home_that_comes_into_the_roster_makes_a_confirmed_block_unsure_until_it_has_heard_of_it() {
+    let mut swarm = fleet_with_roster(Bid::new().block("uav/*/step"));
+    order(&mut swarm, 2, &["uav/1", "uav/2"]);
+    swarm.run(2 * LEASE);
+    let confirmed = |swarm: &Swarm| swarm.saw(HOLDER, "ground/main/confirmed").count();
+    let lapsed = |swarm: &Swarm| -> Vec<Option<String>> {
+        let told = swarm.saw(HOLDER, "ground/main/block_lapsed");
+        told.map(|seen| seen.happened.event.text("home").map(Into::into)).collect()
+    };
+    let before = confirmed(&swarm);
+    assert_eq!(lapsed(&swarm), [], "one home fewer takes nothing away");
+    assert!(swarm.occurred("uav/3", "uav/3/step").any(|seen| seen.at > 2 * LEASE), "it is free meanwhile");
+    order(&mut swarm, 3, &HOMES);
+    swarm.run(LEASE);
+    assert_eq!(lapsed(&swarm), [Some("uav/3".to_owned())]);
+    assert_eq!(confirmed(&swarm), before + 1);
+}
+
+#[test]
+fn an_acknowledgement_from_before_the_home_came_back_into_the_roster_confirms_nothing() {
+    // What is requested there goes on, whoever is in the roster, and is acknowledged.
+    let mut swarm = fleet_with_roster(Bid::new().request("uav/3/never").block("uav/3/step"));
+    order(&mut swarm, 2, &["uav/1", "uav/2"]);
+    swarm.run(2 * LEASE);
+    swarm.network.partition(&[&[name("uav/3")]]);
+    order(&mut swarm, 3, &HOMES);
+    let ordered = swarm.now;
+    swarm.run(LEASE);
+    let confirmed = |swarm: &Swarm| swarm.saw(HOLDER, "ground/main/confirmed").any(|seen| seen.at >= ordered);
+    assert!(!confirmed(&swarm), "uav/3 has not heard of the block");
+    swarm.network.heal();
+    swarm.run(2 * LEASE);
+    assert!(confirmed(&swarm));
 }

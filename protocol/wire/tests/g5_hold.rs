@@ -8,7 +8,7 @@ mod swarm;
 use std::time::Duration;
 
 use skein_bp::{Bid, Event};
-use skein_dbp::NodeConfig;
+use skein_dbp::{NodeConfig, Roster};
 use skein_wire::NetworkConfig;
 use swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, name, program};
 
@@ -42,6 +42,12 @@ fn start_holder(swarm: &mut Swarm, incarnation: u64, bid: Bid, until: Duration) 
 
 fn steps_since(swarm: &Swarm, since: Duration) -> usize {
     swarm.occurred("uav/1", "uav/1/step").filter(|seen| seen.at >= since).count()
+}
+
+/// The operator at the home lifts the holder's block.
+fn lift(swarm: &mut Swarm) {
+    let lift = Event::new("uav/1/lift").with("node", "ground/main").with("bthread", "hold");
+    swarm.node("uav/1").enqueue(lift);
 }
 
 const NEVER: Duration = Duration::from_secs(1_000_000);
@@ -105,15 +111,35 @@ fn a_new_life_that_does_not_state_it_does_not_end_it_but_an_authority_does() {
 }
 
 #[test]
+fn a_new_life_withdraws_it_whether_the_home_has_become_the_coordinator_meanwhile_or_is_it_no_more() {
+    for (first, second) in [("ground/spare", "uav/1"), ("uav/1", "ground/spare")] {
+        let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
+        let mut home = program(1);
+        home.add("steps", Requester::new("uav/1/step", i64::MAX, TICK));
+        let led_by = |coordinator: &str| Roster::first(name(coordinator), [name("uav/1")]);
+        let config = NodeConfig { durable: true, joint: Some(led_by(first)), ..swarm.config("uav/1", 1) };
+        swarm.start_with(config, home);
+        start_holder(&mut swarm, 1, Bid::new().hold_when_lost(), NEVER);
+        swarm.run(2 * LEASE);
+        swarm.crash("ground/main");
+        let order = Roster { term: 2, ..led_by(second) }.order(&name("uav/1"));
+        swarm.node("uav/1").enqueue(order);
+        swarm.run(LEASE);
+        let until = swarm.now + 2 * LEASE;
+        start_holder(&mut swarm, 2, Bid::new().hold_when_lost(), until);
+        swarm.run(4 * LEASE);
+        assert!(steps_since(&swarm, until) > 0, "it was withdrawn in vain from {second}'s member");
+    }
+}
+
+#[test]
 fn one_that_is_lifted_while_its_holder_lives_is_lapsed_and_refused() {
     let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
     start_home(&mut swarm, 1, 1);
     start_holder(&mut swarm, 1, Bid::new().hold_when_lost(), NEVER);
     swarm.run(2 * LEASE);
     let held = swarm.now;
-    let home = name("uav/1");
-    let lift = Event::new(home.event_name("lift")).with("node", "ground/main").with("bthread", "hold");
-    swarm.node("uav/1").enqueue(lift);
+    lift(&mut swarm);
     swarm.run(2 * LEASE);
     assert!(steps_since(&swarm, held) > 0);
     let reasons: Vec<_> = swarm
@@ -148,4 +174,39 @@ fn a_holder_that_lives_withdraws_it_from_a_home_that_has_restarted() {
     assert_eq!(steps_since(&swarm, restarted), 0, "what was promised is kept");
     swarm.run(6 * LEASE);
     assert!(steps_since(&swarm, until) > 0, "its holder withdrew it in vain");
+}
+
+#[test]
+fn what_an_authority_has_lifted_stays_lifted_while_its_holder_moves_on_with_it() {
+    let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
+    start_home(&mut swarm, 1, 1);
+    start_holder(&mut swarm, 1, Bid::new().hold_when_lost().wait_for("ground/main/tick"), NEVER);
+    swarm.run(2 * LEASE);
+    assert_eq!(swarm.saw("ground/main", "ground/main/confirmed").count(), 1);
+    // Both at once: neither knows of the other yet.
+    swarm.node("ground/main").enqueue("ground/main/tick");
+    lift(&mut swarm);
+    let lifted = swarm.now;
+    swarm.run(2 * LEASE);
+    assert!(steps_since(&swarm, lifted) > 10, "the new statement brought the block back");
+    assert_eq!(swarm.saw("ground/main", "ground/main/block_lapsed").count(), 1, "its holder has to know");
+    // Now it knows, and may state it anew.
+    swarm.node("ground/main").enqueue("ground/main/tick");
+    swarm.run(LEASE);
+    let stated = swarm.now;
+    swarm.run(LEASE);
+    assert_eq!(steps_since(&swarm, stated), 0);
+}
+
+#[test]
+fn the_order_that_lifts_a_block_cannot_be_blocked_by_it() {
+    let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
+    start_home(&mut swarm, 1, 1);
+    start_holder(&mut swarm, 1, Bid::new().hold_when_lost().block("uav/1/**"), NEVER);
+    swarm.run(2 * LEASE);
+    swarm.crash("ground/main");
+    lift(&mut swarm);
+    let lifted = swarm.now;
+    swarm.run(2 * LEASE);
+    assert!(steps_since(&swarm, lifted) > 10);
 }

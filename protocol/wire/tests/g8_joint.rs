@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use skein_bp::script::{Op, Script};
-use skein_bp::{Bid, Event};
-use skein_dbp::{NodeConfig, Roster};
+use skein_bp::{Bid, Event, Origin};
+use skein_dbp::{NodeConfig, Roster, facts};
 use skein_wire::NetworkConfig;
 use swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, name, program};
 
@@ -145,8 +145,7 @@ fn an_operator_moves_the_coordinator_and_leaves_out_who_is_lost_and_the_old_term
     for vehicle in ["uav/1", "uav/2"] {
         swarm.node(vehicle).enqueue(next.order(&name(vehicle)));
     }
-    let ask = Script::new(&[Op::Sync(Bid::new().request(Event::new("swarm/go").with("n", -1)))]).unwrap();
-    swarm.node("uav/2").program_mut().add("ask", ask);
+    ask(&mut swarm, "uav/2");
     swarm.run(3 * LEASE);
     let decided: Vec<_> =
         learned(&swarm)[&("uav/2".to_owned(), 1)].iter().map(|(seq, n, _)| (*seq, *n)).collect();
@@ -170,6 +169,87 @@ fn an_operator_moves_the_coordinator_and_leaves_out_who_is_lost_and_the_old_term
     swarm.run(5 * LEASE);
     let resumed = learned(&swarm)[&(GROUND.to_owned(), 1)].len();
     assert!(resumed > after.len());
+}
+
+/// Asks once for `swarm/go`, number -1, and stays there.
+fn ask(swarm: &mut Swarm, node: &str) {
+    let ask = Script::new(&[Op::Sync(Bid::new().request(Event::new("swarm/go").with("n", -1)))]).unwrap();
+    swarm.node(node).program_mut().add("ask", ask);
+}
+
+/// How often the one event that was asked for was decided, by any coordinator.
+fn decided(swarm: &Swarm) -> usize {
+    let here = |seen: &&swarm::Seen| seen.happened.origin == Origin::Internal;
+    let asked = |seen: &&swarm::Seen| seen.happened.event.int("n") == Some(-1);
+    swarm.seen.iter().filter(here).filter(asked).count()
+}
+
+fn take_order(swarm: &mut Swarm, roster: &Roster, nodes: &[&str]) {
+    for node in nodes {
+        swarm.node(node).enqueue(roster.order(&name(node)));
+    }
+}
+
+/// What `node` was told to be unknown: event, b-thread, and who was asked.
+fn unknown<'a>(swarm: &'a Swarm, node: &'a str) -> Vec<[&'a str; 3]> {
+    let told = swarm.seen.iter().filter(|seen| seen.node.as_str() == node);
+    let told = told.map(|seen| &seen.happened.event).filter(|event| event.kind() == facts::UNKNOWN);
+    told.map(|fact| ["event", "bthread", "home"].map(|key| fact.text(key).unwrap())).collect()
+}
+
+#[test]
+fn what_was_asked_of_a_former_coordinator_is_unknown_and_not_asked_of_the_next() {
+    let mut swarm = fleet(NetworkConfig::default(), 1);
+    start_ground(&mut swarm, 1, 0);
+    swarm.crash("uav/3");
+    swarm.run(2 * LEASE);
+    // Nothing can be decided without uav/3: the request stays open.
+    ask(&mut swarm, "uav/2");
+    swarm.run(LEASE);
+    assert_eq!((decided(&swarm), unknown(&swarm, "uav/2").len()), (0, 0));
+    let next = Roster { term: 2, ..Roster::first(name("uav/1"), [name("uav/2")]) };
+    take_order(&mut swarm, &next, &["uav/1", "uav/2"]);
+    swarm.run(2 * LEASE);
+    assert_eq!(unknown(&swarm, "uav/2"), [["swarm/go", "ask", GROUND]]);
+    assert_eq!(decided(&swarm), 0, "it was asked again by itself");
+    // Who asks anew is heard, and what then happens resumes who had asked before.
+    ask(&mut swarm, "uav/1");
+    swarm.run(2 * LEASE);
+    assert_eq!(decided(&swarm), 1);
+    assert!(swarm.node("uav/2").program().bid("ask").is_none());
+}
+
+#[test]
+fn who_becomes_coordinator_does_not_decide_what_it_has_asked_of_the_former_one() {
+    let mut swarm = fleet(NetworkConfig::default(), 1);
+    start_ground(&mut swarm, 1, 0);
+    swarm.crash("uav/2");
+    swarm.run(2 * LEASE);
+    ask(&mut swarm, "uav/1");
+    swarm.run(LEASE / 2);
+    // As soon as uav/2 is back, the ground station decides; uav/1 is cut off just then and does not hear of it.
+    start_vehicle(&mut swarm, "uav/2", 2);
+    swarm.network.partition(&[&[name("uav/1")]]);
+    swarm.run(LEASE);
+    assert_eq!(decided(&swarm), 1, "the test says nothing");
+    let alone = Roster { term: 2, ..Roster::first(name("uav/1"), []) };
+    take_order(&mut swarm, &alone, &["uav/1"]);
+    swarm.run(2 * LEASE);
+    assert_eq!(unknown(&swarm, "uav/1"), [["swarm/go", "ask", GROUND]]);
+    assert_eq!(decided(&swarm), 1, "one request was served twice");
+}
+
+#[test]
+fn a_block_of_everything_does_not_keep_a_node_in_a_term_that_is_over() {
+    let mut swarm = fleet(NetworkConfig::default(), 1);
+    let mut ground = program(1);
+    ground.add("hold", Always(Bid::new().block("uav/**")));
+    swarm.start_with(config(&swarm, GROUND, 1), ground);
+    swarm.run(LEASE);
+    assert!(swarm.saw(GROUND, "ground/main/confirmed").next().is_some());
+    take_order(&mut swarm, &Roster { term: 2, ..roster() }, &["uav/1"]);
+    swarm.run(LEASE);
+    assert_eq!(swarm.node("uav/1").roster().unwrap().term, 2);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use skein_dbp::{
     BidAck, BidRecord, JointWord, Message, Occurrence, OnLoss, Presence, Refusal, RefusalReason, RemoteBid,
     Repair, ServedRequest,
 };
-use skein_wire::{DecodeError, NodeName, Payload, State, VERSION, proto};
+use skein_wire::{DecodeError, Echo, NodeName, Payload, State, VERSION, proto};
 
 fn node_name() -> impl Strategy<Value = NodeName> {
     "[a-z]{1,8}/[a-z0-9_.-]{1,8}".prop_map(|name| NodeName::new(&name).unwrap())
@@ -51,11 +51,12 @@ fn event_set() -> impl Strategy<Value = EventSet> {
 prop_compose! {
     fn remote_bid()(
         bthread in "[a-z ]{0,9}", sync in 1..u64::MAX / 2, requests in prop::collection::vec(event(), 0..3),
-        block in event_set(), priority in any::<Option<i32>>(), hold in any::<bool>(),
+        block in event_set(), earlier in 0..u64::MAX, priority in any::<Option<i32>>(), hold in any::<bool>(),
     ) -> RemoteBid {
         // A set that surely holds nothing travels as none at all.
         let block = if block.is_none() { EventSet::None } else { block };
-        RemoteBid { bthread, sync, requests, block, priority, on_loss: if hold { OnLoss::Hold } else { OnLoss::Release } }
+        let block_since = sync.saturating_sub(earlier);
+        RemoteBid { bthread, sync, requests, block, block_since, priority, on_loss: if hold { OnLoss::Hold } else { OnLoss::Release } }
     }
 }
 
@@ -115,6 +116,12 @@ fn state() -> State {
         battery: 0.5,
         mode: "offboard".into(),
         path: vec![Default::default(); 40],
+        echo: Some(Echo {
+            node: NodeName::new("uav/2").unwrap(),
+            incarnation: 3,
+            time: Duration::from_millis(1500),
+            held: Duration::from_millis(20),
+        }),
         ..State::new(NodeName::new("uav/1").unwrap())
     }
 }
@@ -132,6 +139,7 @@ fn a_long_path_is_cut_for_the_way() {
     };
     assert_eq!(back.path.len(), State::MAX_PATH);
     assert_eq!(back.mode, "offboard");
+    assert_eq!(back.echo, state().echo);
 }
 
 #[test]

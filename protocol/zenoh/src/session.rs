@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use skein_wire::{Fleet, Key, NodeName};
 use zenoh::Wait;
-use zenoh::pubsub::Subscriber;
+use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
 
 use crate::inbox::Inbox;
@@ -17,6 +17,8 @@ use crate::{Mode, ZenohConfig, ZenohError, ZenohLink};
 
 /// How often opening is tried when the port that was free has been taken meanwhile.
 const OPENING_TRIES: usize = 8;
+/// How many keys have a publisher; what is put under others travels all the same.
+const MOST_PUBLISHERS: usize = 1024;
 /// A client looks for its router this often.
 const TRY_AGAIN: Duration = Duration::from_millis(200);
 
@@ -245,14 +247,14 @@ fn await_router(
 /// The life of the session's thread, until the last handle is gone. First it does what has `waited`.
 fn serve(session: &zenoh::Session, waited: Vec<Command>, queue: &Receiver<Command>, counters: &Counters) {
     let mut subscribers: BTreeMap<u64, Vec<Subscriber<()>>> = BTreeMap::new();
+    let mut publishers = Publishers { session, declared: BTreeMap::new() };
     for command in waited.into_iter().chain(queue.iter()) {
         match command {
             Command::Put { port, key, payload } => {
                 let key = key.to_string();
                 counters.messages.fetch_add(1, Ordering::Relaxed);
                 counters.bytes.fetch_add((key.len() + payload.len()) as u64, Ordering::Relaxed);
-                let put = session.put(key, payload).congestion_control(CongestionControl::Drop);
-                if let Err(error) = put.attachment(mark(session, port)).wait() {
+                if let Err(error) = publishers.put(key, payload, mark(session, port)) {
                     counters.failed.fetch_add(1, Ordering::Relaxed);
                     tracing::debug!("Zenoh did not put: {error}");
                 }
@@ -270,9 +272,32 @@ fn serve(session: &zenoh::Session, waited: Vec<Command>, queue: &Receiver<Comman
             }
         }
     }
-    drop(subscribers);
+    drop((subscribers, publishers));
     if let Err(error) = session.close().wait() {
         tracing::debug!("Zenoh did not close in order: {error}");
+    }
+}
+
+/// A publisher for each key that has been put, so that Zenoh finds out once, and not with each message, who hears it.
+struct Publishers<'a> {
+    session: &'a zenoh::Session,
+    declared: BTreeMap<String, Publisher<'a>>,
+}
+
+impl Publishers<'_> {
+    fn put(&mut self, key: String, payload: Vec<u8>, mark: Vec<u8>) -> zenoh::Result<()> {
+        if self.declared.len() < MOST_PUBLISHERS && !self.declared.contains_key(&key) {
+            let publisher = self.session.declare_publisher(key.clone());
+            let publisher = publisher.congestion_control(CongestionControl::Drop).wait()?;
+            self.declared.insert(key.clone(), publisher);
+        }
+        match self.declared.get(&key) {
+            Some(publisher) => publisher.put(payload).attachment(mark).wait(),
+            None => {
+                let put = self.session.put(key, payload).congestion_control(CongestionControl::Drop);
+                put.attachment(mark).wait()
+            }
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // A test fails by panicking.
 
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -176,6 +177,24 @@ fn putting_never_waits_and_what_does_not_fit_is_counted() {
     assert!(start.elapsed() < Duration::from_secs(2), "putting waited");
     let stats = session.stats();
     assert!(stats.dropped > 0 && stats.messages + stats.dropped <= 20_000, "{stats:?}");
+}
+
+#[test]
+fn messages_under_ever_new_keys_arrive() {
+    let (first, second) = sessions();
+    let mut link = first.link(&name("uav/0")).unwrap();
+    let mut other = second.link(&name("uav/1")).unwrap();
+    let mut missing: BTreeSet<Key> =
+        (1..=1200).map(|n| Key::new(&fleet(), Topic::State { node: name(&format!("uav/{n}")) })).collect();
+    // What comes before the subscription is known, or does not fit, is lost and put again.
+    wait_until("something under each key is heard", || {
+        missing.iter().take(64).for_each(|key| other.put(key, vec![7]));
+        std::thread::sleep(Duration::from_millis(5));
+        while let Some((key, _)) = link.poll() {
+            missing.remove(&key);
+        }
+        missing.is_empty()
+    });
 }
 
 #[test]

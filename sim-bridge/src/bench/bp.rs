@@ -6,7 +6,6 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use nix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use skein_bp::script::{Op, Script};
@@ -14,6 +13,7 @@ use skein_bp::verify::{Inspection, Verifier};
 use skein_bp::{Bid, EventSet, Program, ProgramConfig};
 
 use super::quantile::median;
+use crate::cpu_time;
 
 /// The same programs on BPpy, for a Python that has it.
 const PEER: &str = include_str!("bp_peer.py");
@@ -144,25 +144,28 @@ fn measure_peer(repetitions: usize, cpu_time: Duration) -> anyhow::Result<Figure
 
 fn events_per_s(mut program: Program, cpu_time: Duration) -> anyhow::Result<f64> {
     program.synchronise(Duration::ZERO)?;
-    let since = this_threads_cpu_time()?;
+    let since = cpu_time::this_thread()?;
     let mut events = 0.0;
     loop {
         for _ in 0..BATCH {
             program.step(Duration::ZERO)?.context("the program has stopped")?;
         }
         events += f64::from(BATCH);
-        let taken = this_threads_cpu_time()? - since;
+        let taken = cpu_time::this_thread()? - since;
         if taken >= cpu_time && !taken.is_zero() {
             return Ok(events / taken.as_secs_f64());
         }
     }
 }
 
+<<<<<<< HEAD
 /// CPU time of this thread so far.
 pub(crate) fn this_threads_cpu_time() -> anyhow::Result<Duration> {
     Ok(clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID)?.into())
 }
 
+=======
+>>>>>>> main
 /// What the verifier did.
 struct Verified {
     states: usize,
@@ -173,15 +176,11 @@ struct Verified {
 /// Looks for a deadlock at a table that has none, so at every state.
 fn verify(philosophers: usize) -> anyhow::Result<Verified> {
     let verifier = Verifier::new(dinner(philosophers)?).inspect([Inspection::Deadlock]);
-    let (since, cpu_since) = (Instant::now(), this_processs_cpu_time()?);
+    let (since, cpu_since) = (Instant::now(), cpu_time::this_process()?);
     let report = verifier.run();
-    let (time, cpu_time) = (since.elapsed(), this_processs_cpu_time()? - cpu_since);
+    let (time, cpu_time) = (since.elapsed(), cpu_time::this_process()? - cpu_since);
     anyhow::ensure!(report.verdict.is_none() && report.is_complete(), "the verifier is wrong: {report}");
     Ok(Verified { states: report.states, time_s: time.as_secs_f64(), cpu_time_s: cpu_time.as_secs_f64() })
-}
-
-fn this_processs_cpu_time() -> anyhow::Result<Duration> {
-    Ok(clock_gettime(ClockId::CLOCK_PROCESS_CPUTIME_ID)?.into())
 }
 
 /// Philosophers between sticks; all but the first take the right one first.

@@ -8,7 +8,11 @@ mod hold;
 mod link;
 #[cfg(feature = "zenoh")]
 pub mod link_peer;
-mod quantile;
+mod nav;
+mod plan;
+#[cfg(feature = "peers")]
+mod plan_peer;
+pub(crate) mod quantile;
 
 use std::time::Duration;
 
@@ -24,6 +28,8 @@ pub fn run(what: &Bench, as_json: bool) -> anyhow::Result<()> {
         Bench::Bp { repetitions, seconds, philosophers } => {
             bp::run(*repetitions, Duration::from_secs_f64(*seconds), *philosophers, as_json)
         }
+        Bench::Plan(args) => plan::run(args, as_json),
+        Bench::Nav { ticks, seed } => nav::run(*ticks, *seed, as_json),
         Bench::Fleet { nodes, seconds } => fleet::run(nodes, Duration::from_secs_f64(*seconds), as_json),
         Bench::FleetOf { nodes, seconds } => fleet::run_one(*nodes, Duration::from_secs_f64(*seconds)),
         #[cfg(feature = "zenoh")]

@@ -7,6 +7,7 @@ mod network;
 mod process_runs;
 #[cfg(feature = "zenoh")]
 pub mod processes;
+mod separation;
 
 use crate::cli;
 
@@ -17,6 +18,7 @@ use crate::cli;
 pub fn run(what: &cli::Campaign, as_json: bool) -> anyhow::Result<bool> {
     match what {
         cli::Campaign::Network(args) => network::run(args, as_json),
+        cli::Campaign::Separation(args) => separation::run(args, as_json),
         #[cfg(feature = "zenoh")]
         cli::Campaign::Processes { seeds, faults, jobs, out, port_offset, network } => {
             process_runs::run(*seeds, faults, *jobs, out.as_deref(), *port_offset, *network, as_json)

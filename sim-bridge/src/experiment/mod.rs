@@ -2,9 +2,11 @@
 //!
 //! An experiment is a file here, named in [`EXPERIMENTS`].
 
+mod dstar_grid;
 mod figure;
 mod lsc;
 mod report;
+mod sphere;
 
 use std::path::PathBuf;
 
@@ -24,7 +26,22 @@ pub struct Experiment {
 }
 
 /// Every experiment.
+<<<<<<< HEAD
 pub const EXPERIMENTS: &[Experiment] = &[lsc::EXPERIMENT];
+=======
+pub const EXPERIMENTS: &[Experiment] = &[
+    Experiment {
+        name: "sphere",
+        about: "a hundred vehicles through the middle of a sphere, beside ORCA",
+        run: sphere::run,
+    },
+    Experiment {
+        name: "dstar-grid",
+        about: "D* with a collision factor on the marker grid, and re-planning by D* Lite (Zhang 2019)",
+        run: dstar_grid::run,
+    },
+];
+>>>>>>> main
 
 /// What the command line says to an experiment. What is not given is the experiment's own.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -20,6 +20,7 @@ use anyhow::Context as _;
 use skein_ground::{Order, Who};
 use skein_wire::{Fleet, Network, NetworkConfig};
 
+pub(crate) use self::swarm::scan_for_agent;
 pub use self::{
     recording::Recording,
     setup::{FLEET, GROUND, agent_configs, ground_config, simulation_config, vehicle_name},
@@ -58,10 +59,8 @@ pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
     );
     let summary = match args.clock {
         Clock::Lockstep => {
-            let network = memory_network(&scenario);
-            let links = memory_links(&network, &scenario);
-            let flight = Flight::new(&scenario, args, links, recording(&out)?, table)?;
-            flight.fly(&mut Lockstep(network))?
+            let table = (!args.headless).then_some(table);
+            in_lockstep(&scenario, args.controller, Some(recording(&out)?), table)?
         }
         #[cfg(feature = "zenoh")]
         Clock::Real if args.processes => apart::fly(&scenario, args, &out, table)?,
@@ -75,6 +74,25 @@ pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
     let path = out.join("summary.json");
     summary.write(&path).with_context(|| format!("{}: cannot be written", path.display()))?;
     Ok(summary)
+}
+
+/// Flies a scenario as fast as the processor allows, shows nothing and writes no file.
+///
+/// # Errors
+/// What is wrong with the scenario.
+pub(crate) fn in_memory(scenario: &Scenario) -> anyhow::Result<Summary> {
+    in_lockstep(scenario, cli::Controller::Bp, None, None)
+}
+
+fn in_lockstep(
+    scenario: &Scenario,
+    controller: cli::Controller,
+    recording: Option<Recording>,
+    table: Option<LiveTable<std::io::Stderr>>,
+) -> anyhow::Result<Summary> {
+    let network = memory_network(scenario);
+    let links = memory_links(&network, scenario);
+    Flight::new(scenario, controller, links, recording, table)?.fly(&mut Lockstep(network))
 }
 
 /// `out/<scenario>-<seed>`, under the current folder.
@@ -145,7 +163,7 @@ static INTERRUPTIONS: LazyLock<Arc<AtomicU32>> = LazyLock::new(|| {
 struct Flight<'a> {
     scenario: &'a Scenario,
     swarm: Swarm,
-    recording: Recording,
+    recording: Option<Recording>,
     table: Option<LiveTable<std::io::Stderr>>,
     began: Instant,
     /// Why the swarm was ordered to land before its mission was over.
@@ -162,21 +180,21 @@ struct CalledOff {
 impl<'a> Flight<'a> {
     fn new(
         scenario: &'a Scenario,
-        args: &cli::Fly,
+        controller: cli::Controller,
         links: Links,
-        recording: Recording,
-        table: LiveTable<std::io::Stderr>,
+        recording: Option<Recording>,
+        table: Option<LiveTable<std::io::Stderr>>,
     ) -> anyhow::Result<Self> {
         LazyLock::force(&INTERRUPTIONS);
         let simulation = skein_world::Simulation::new(simulation_config(scenario));
-        let agents = agent_configs(scenario, args.controller);
-        let ground = ground_config(scenario, Fleet::new(setup::FLEET)?, args.controller);
+        let agents = agent_configs(scenario, controller);
+        let ground = ground_config(scenario, Fleet::new(setup::FLEET)?, controller);
         let swarm = Swarm::new(simulation, agents, ground, links)?;
         Ok(Self {
             scenario,
             swarm,
             recording,
-            table: (!args.headless).then_some(table),
+            table,
             began: Instant::now(),
             called_off: None,
             network_messages: 0,
@@ -189,14 +207,16 @@ impl<'a> Flight<'a> {
             host.before_step(&mut self.swarm);
             let happenings = self.swarm.step();
             host.after_step(&self.swarm, &happenings);
-            self.recording.take_in(&self.swarm, &happenings)?;
+            if let Some(recording) = &mut self.recording {
+                recording.take_in(&self.swarm, &happenings)?;
+            }
             if happenings.ticked {
                 self.look_after_limits();
                 self.network_messages = host.traffic().messages;
                 self.draw()?;
             }
         }
-        self.recording.finish()?;
+        self.recording.map(Recording::finish).transpose()?;
         let why = self.called_off.map(|called_off| called_off.why);
         let account = self.swarm.account(host.traffic());
         let summary = report::summary(self.scenario, &account, self.began.elapsed(), why);

@@ -5,23 +5,34 @@ use std::time::{Duration, Instant};
 use skein_dbp::Happened;
 use skein_wire::vocabulary::PLAN;
 
-/// Wall times of the agent ticks in which a plan was made.
+/// How long each plan took: the wall times of the agent's ticks that worked on it, together.
 #[derive(Debug, Default)]
-pub struct PlanTimes(Vec<f64>);
+pub struct PlanTimes {
+    /// Of each vehicle, what its plan has taken up to now.
+    under_way: Vec<f64>,
+    done: Vec<f64>,
+}
 
 impl PlanTimes {
-    /// Takes in one tick of an agent, from `began` to now, if it planned.
-    pub fn take_in(&mut self, began: Instant, selections: &[Happened]) {
+    /// Takes in one tick of a vehicle's agent, from `began` to now, if it planned; `is_planning` if the plan takes another.
+    pub fn take_in(&mut self, vehicle: usize, began: Instant, selections: &[Happened], is_planning: bool) {
+        if self.under_way.len() <= vehicle {
+            self.under_way.resize(vehicle + 1, 0.0);
+        }
+        let Some(under_way) = self.under_way.get_mut(vehicle) else { return };
         let planned = selections.iter().any(|happened| happened.event.name().ends_with(PLAN));
-        if planned {
-            self.0.push(milliseconds(began.elapsed()));
+        if planned || is_planning || *under_way > 0.0 {
+            *under_way += milliseconds(began.elapsed());
+        }
+        if !is_planning && *under_way > 0.0 {
+            self.done.push(std::mem::take(under_way));
         }
     }
 
-    /// All of them, in milliseconds.
+    /// All of them that are done, in milliseconds.
     #[must_use]
     pub fn milliseconds(&self) -> &[f64] {
-        &self.0
+        &self.done
     }
 }
 

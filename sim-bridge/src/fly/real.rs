@@ -68,7 +68,8 @@ pub fn fly(
         // Two swarms on one computer fly all the same.
         Err(error) => table.note(&format!("no MAVLink for other programs: {error:#}"))?,
     }
-    let flight = Flight::new(scenario, args, links, recording, table)?;
+    let table = (!args.headless).then_some(table);
+    let flight = Flight::new(scenario, args.controller, links, Some(recording), table)?;
     flight.fly(&mut RealTime {
         began: Instant::now(),
         speed: args.speed,

@@ -115,7 +115,7 @@ impl Swarm {
             let began = Instant::now();
             vehicle.agent.tick(now, vehicle.link.as_mut());
             let mut heard = vehicle.agent.take_selections();
-            self.plan_times.take_in(began, &heard);
+            self.plan_times.take_in(index, began, &heard, vehicle.agent.is_planning());
             self.simulation.send(index, &vehicle.agent.take_mavlink());
             keep_own(&mut heard, vehicle.agent.name());
             selections.append(&mut heard);
@@ -236,7 +236,8 @@ fn keep_own(selections: &mut Vec<Happened>, node: &NodeName) {
 }
 
 /// What the agent gets of a scan: all but the true pose, which it never learns.
-fn scan_for_agent(scan: &LidarScan) -> Scan {
+/// A scan of the world as a vehicle takes it in.
+pub(crate) fn scan_for_agent(scan: &LidarScan) -> Scan {
     Scan {
         stamp: scan.stamp,
         angle_min: scan.angle_min,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use skein_bp::{Bid, Event, EventSet, Program};
-use skein_dbp::{BidRecord, Happened, LIFT, NodeName, OnLoss, ProxyMove, ROSTER, Roster, facts};
+use skein_dbp::{BidRecord, ChannelMove, Happened, LIFT, NodeName, OnLoss, ROSTER, Roster, facts};
 
 use crate::story::{Cast, Grants, Story};
 
@@ -22,8 +22,8 @@ pub(crate) struct Step<'a> {
     pub(crate) received: &'a [BidRecord],
     /// What its b-threads saw happen.
     pub(crate) happened: &'a [Happened],
-    /// How its proxies moved.
-    pub(crate) moves: &'a [ProxyMove],
+    /// What the channel changed on its board.
+    pub(crate) moves: &'a [ChannelMove],
     /// Its program after the step.
     pub(crate) program: &'a Program,
 }
@@ -78,6 +78,8 @@ pub(crate) struct Keeping {
 pub(crate) struct Life {
     /// When it began, true time.
     pub(crate) began: Duration,
+    /// When it made its first step, true time: later, if the process was started and then stood still.
+    pub(crate) ran: Option<Duration>,
     /// What its clock showed at its first step.
     pub(crate) began_clock: Option<Duration>,
     pub(crate) over: bool,
@@ -133,7 +135,13 @@ impl Knowledge {
     /// A node begins a life.
     pub(crate) fn starts(&mut self, node: usize, at: Duration) {
         let member = &mut self.members[node];
-        member.lives.push(Life { began: at, began_clock: None, over: false, occurred: Vec::new() });
+        member.lives.push(Life {
+            began: at,
+            ran: None,
+            began_clock: None,
+            over: false,
+            occurred: Vec::new(),
+        });
         member.up = true;
         member.bids.clear();
         member.revision = None;
@@ -166,6 +174,7 @@ impl Knowledge {
             }
         }
         if let Some(life) = member.lives.last_mut() {
+            life.ran.get_or_insert(step.at);
             life.began_clock.get_or_insert(step.clock);
         }
     }
@@ -245,7 +254,9 @@ impl Member {
             let key = (bidder, bid.bthread.clone());
             let stay = (record.incarnation, bid.sync);
             let known = self.kept.get(&key).is_some_and(|kept| (kept.incarnation, kept.sync) == stay);
-            let lifted = self.lifted.get(&key).is_some_and(|lifted| *lifted >= stay);
+            // What was lifted stays so while its holder moves on with it.
+            let begun = (record.incarnation, bid.block_since);
+            let lifted = self.lifted.get(&key).is_some_and(|lifted| *lifted >= begun);
             if !known && !lifted && self.may_block(record.node.as_str(), &bid.block) {
                 let (incarnation, sync) = stay;
                 let set = bid.block.clone();
@@ -343,7 +354,8 @@ impl Member {
     /// Whether this home lets others block `event` at all.
     pub(crate) fn lets_block(&self, event: &Event) -> bool {
         let never = [&self.facts, &self.safety, &self.gateway];
-        self.home.contains(event) && !never.into_iter().any(|set| set.contains(event))
+        let is_order = [ROSTER, LIFT].contains(&event.kind());
+        self.home.contains(event) && !is_order && !never.into_iter().any(|set| set.contains(event))
     }
 
     /// Whether this is one of its own facts.

@@ -276,7 +276,7 @@ impl<'a> Stage<'a> {
             ..NodeConfig::new(cast.name.clone(), player.incarnation, self.roster.clone())
         };
         let mut started = Node::new(config, program(cast, self.story.seed, node));
-        started.record_proxies();
+        started.record_channel();
         let fleet = Fleet::new("promises").expect("a plain name");
         let link = TappedLink::new(self.network.join(&cast.name));
         self.court.starts(node, self.now, started.program());
@@ -312,7 +312,7 @@ impl<'a> Stage<'a> {
         let outcome = node_link.pump(clock, link);
         let not_understood = node_link.stats().undecodable + node_link.stats().forged;
         let happened = node_link.node_mut().take_selections();
-        let moves = node_link.node_mut().take_proxy_moves();
+        let moves = node_link.node_mut().take_channel_moves();
         let received = link.take_received();
         player.due = player.clock.when(node_link.node().next_deadline());
         player.stepped = Some(now);

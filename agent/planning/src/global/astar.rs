@@ -1,11 +1,11 @@
 //! A*, and A* combined with an artificial potential field (Wang 2023).
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::f64::consts::SQRT_2;
 
 use nalgebra::Vector3;
 
-use super::Potential;
+use super::{Effort, Potential, Search, Unsolved};
+use crate::grid::{Lattice, MOVES, SQRT_3, moved};
 use crate::map::{ClearanceMap, VoxelIndex};
 use crate::path::Path;
 
@@ -118,59 +118,14 @@ pub enum PlanError {
     },
 }
 
-/// Memory that searches reuse, so that a replan allocates nothing and clears nothing.
-#[derive(Clone, Debug, Default)]
-pub struct AstarScratch {
-    nodes: Vec<Node>,
-    generation: u32,
-    open: BinaryHeap<Open>,
-}
-
-/// What a search knows of a voxel; valid if `generation` is the search's own.
-#[derive(Clone, Copy, Debug, Default)]
-struct Node {
-    g: f64,
-    generation: u32,
-    /// Index of the move that led here, or [`ROOT`].
-    arrived_by: u8,
-    closed: bool,
-}
-
-/// Room in a voxel that is occupied.
+/// Room in a voxel that is occupied or outside.
 const BLOCKED: i32 = i32::MIN;
 /// How finely depth in a disc is told apart.
 const DISC_STEPS: f64 = 64.0;
-/// Mark of the start, which no move led to.
-const ROOT: u8 = u8::MAX;
-
-/// An entry of the open list: least `f` first, then greatest `g`, then lowest index, so that ties have one
-/// answer.
-#[derive(Clone, Copy, Debug)]
-struct Open {
-    f: f64,
-    g: f64,
-    index: usize,
-}
-
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.f.total_cmp(&self.f).then(self.g.total_cmp(&other.g)).then(other.index.cmp(&self.index))
-    }
-}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Open {}
+/// Beginning to track a layer takes as long as so many expansions in one layer.
+const LAYER_EXPANSIONS: usize = 4000;
+/// An expansion with 26 neighbours takes as long as so many with 8.
+const SPACE_EXPANSIONS: usize = 4;
 
 /// Finds the path of least cost from start to goal.
 ///
@@ -202,95 +157,192 @@ impl Eq for Open {}
 ///     potential: &Potential::default(),
 ///     discs: &[],
 /// };
-/// let plan = astar::plan(&mut map, &request, &astar::AstarConfig::default(), &mut astar::AstarScratch::default()).unwrap();
+/// let plan = astar::plan(&mut map, &request, &astar::AstarConfig::default(), &mut astar::Astar::default()).unwrap();
 /// assert!((plan.cost - 6.0).abs() < 1e-9);
 /// ```
 pub fn plan(
     map: &mut ClearanceMap,
     request: &Request<'_>,
     config: &AstarConfig,
-    scratch: &mut AstarScratch,
+    search: &mut Astar,
 ) -> Result<Plan, PlanError> {
-    let planar = (request.goal.z - request.start.z).abs() <= config.planar_band_m;
-    let voxels = map.voxels();
-    let start = voxels.index_of(&request.start).ok_or(PlanError::StartOutside { start: request.start })?;
-    let outside = PlanError::GoalOutside { goal: request.goal };
-    let mut goal = voxels.index_of(&request.goal).ok_or(outside)?;
-    let layers = if planar {
-        goal.z = start.z;
-        start.z..start.z + 1
-    } else {
-        let margin = (config.vertical_margin_m / voxels.config().resolution_m).ceil().max(0.0) as usize;
-        start.z.min(goal.z).saturating_sub(margin)..(start.z.max(goal.z) + margin + 1).min(voxels.counts()[2])
-    };
-    for z in layers.clone() {
-        map.track_layer(z);
-    }
-    let [nx, ny, _] = map.voxels().counts();
-    let mut search = Search {
-        map,
-        request,
-        config,
-        required: map.required(config.clearance_m),
-        moves: moves(planar),
-        box_low: [0, 0, layers.start],
-        box_size: [nx, ny, layers.len()],
-        start,
-        goal,
-        scratch,
-    };
-    search.check_goal()?;
-    search.run(planar)
-}
-
-/// A step to a neighbour.
-struct Move {
-    by: [i32; 3],
-    /// Length in voxels.
-    length: f64,
-    /// The other voxels of the box between here and there.
-    swept: Vec<[i32; 3]>,
-}
-
-fn moves(planar: bool) -> Vec<Move> {
-    let heights: &[i32] = if planar { &[0] } else { &[-1, 0, 1] };
-    let mut moves = Vec::new();
-    for dz in heights {
-        for (dy, dx) in [-1, 0, 1].into_iter().flat_map(|dy| [-1, 0, 1].map(|dx| (dy, dx))) {
-            let by = [dx, dy, *dz];
-            if by == [0, 0, 0] {
-                continue;
-            }
-            let squared: i32 = by.iter().map(|c| c * c).sum();
-            // Each subset of the axes moved along is a corner of the box; all and none are the step's ends.
-            let swept = (1..7)
-                .map(|axes| [0, 1, 2].map(|axis: usize| if axes >> axis & 1 == 1 { by[axis] } else { 0 }))
-                .filter(|corner| *corner != by && *corner != [0, 0, 0])
-                .collect::<std::collections::BTreeSet<_>>();
-            moves.push(Move { by, length: f64::from(squared).sqrt(), swept: swept.into_iter().collect() });
+    search.begin(map, request, config)?;
+    loop {
+        if let Some(answer) = search.advance(map, request, config, &mut usize::MAX.clone()) {
+            return answer;
         }
     }
-    moves
 }
 
-struct Search<'a> {
+/// A search that can be done a little at a time, and the memory that searches reuse.
+#[derive(Clone, Debug, Default)]
+pub struct Astar {
+    search: Search,
+    extent: Extent,
+    /// Whether the layers are tracked and the search has begun.
+    is_begun: bool,
+}
+
+/// What is searched.
+#[derive(Clone, Copy, Debug, Default)]
+struct Extent {
+    start: VoxelIndex,
+    goal: VoxelIndex,
+    /// Lowest layer.
+    low: usize,
+    /// Number of layers; one in planar mode.
+    layers: usize,
+    /// Whether height changes evenly along the path.
+    planar: bool,
+}
+
+impl Astar {
+    /// Begins a search, in place of any before. [`Astar::advance`] does the work, given the same request and configuration.
+    ///
+    /// # Errors
+    /// Start or goal is outside the map.
+    pub fn begin(
+        &mut self,
+        map: &ClearanceMap,
+        request: &Request<'_>,
+        config: &AstarConfig,
+    ) -> Result<(), PlanError> {
+        let planar = (request.goal.z - request.start.z).abs() <= config.planar_band_m;
+        let voxels = map.voxels();
+        let start =
+            voxels.index_of(&request.start).ok_or(PlanError::StartOutside { start: request.start })?;
+        let mut goal = voxels.index_of(&request.goal).ok_or(PlanError::GoalOutside { goal: request.goal })?;
+        let layers = if planar {
+            goal.z = start.z;
+            start.z..start.z + 1
+        } else {
+            let margin = (config.vertical_margin_m / voxels.config().resolution_m).ceil().max(0.0) as usize;
+            let top = start.z.max(goal.z).saturating_add(margin).saturating_add(1);
+            start.z.min(goal.z).saturating_sub(margin)..top.min(voxels.counts()[2])
+        };
+        self.extent = Extent { start, goal, low: layers.start, layers: layers.len(), planar };
+        self.is_begun = false;
+        Ok(())
+    }
+
+    /// Goes on with a search, for about as long as `allowance` expansions in one layer take, and takes what was used from
+    /// it; a last layer or expansion may cost more than is left. `None` if there is no answer yet.
+    ///
+    /// What the map has learnt meanwhile counts for what is still to be expanded. If its window has moved, begin again.
+    pub fn advance(
+        &mut self,
+        map: &mut ClearanceMap,
+        request: &Request<'_>,
+        config: &AstarConfig,
+        allowance: &mut usize,
+    ) -> Option<Result<Plan, PlanError>> {
+        let Extent { start, goal, low, layers, planar } = self.extent;
+        for z in low..low + layers {
+            if *allowance == 0 {
+                return None;
+            }
+            if map.track_layer(z) {
+                *allowance = allowance.saturating_sub(LAYER_EXPANSIONS);
+            }
+        }
+        let [nx, ny, _] = map.voxels().counts();
+        let rooms = Rooms {
+            map,
+            request,
+            config,
+            required: map.required(config.clearance_m),
+            low,
+            size: [nx, ny, layers],
+            start,
+        };
+        if !self.is_begun {
+            self.is_begun = true;
+            if let Err(error) = rooms.check_goal(goal) {
+                return Some(Err(error));
+            }
+            let effort = Effort { budget: config.budget, ..Effort::OPTIMAL };
+            self.search.begin(&rooms, rooms.cell(start), rooms.cell(goal), effort);
+        }
+        let each = if layers == 1 { 1 } else { SPACE_EXPANSIONS };
+        let before = self.search.expanded();
+        let answer = self.search.advance(&rooms, allowance.div_ceil(each));
+        *allowance = allowance.saturating_sub(each * (self.search.expanded() - before));
+        Some(match answer? {
+            Ok(route) => Ok(Plan {
+                path: rooms.path(&route.cells, request.goal, planar),
+                cost: route.cost * rooms.resolution_m(),
+                expanded: route.expanded,
+            }),
+            Err(Unsolved::Unreachable { expanded }) => Err(PlanError::Unreachable { expanded }),
+            Err(Unsolved::Spent { expanded, partial }) => {
+                let last = partial.last().map_or(start, |last| rooms.voxel(*last));
+                let partial = rooms.path(&partial, map.voxels().centre_of(last), planar);
+                Err(PlanError::BudgetExhausted { budget: expanded, partial })
+            }
+        })
+    }
+}
+
+/// A map's layers as a lattice: its steps keep the clearance, and cost what comfort and potential add.
+struct Rooms<'a> {
     map: &'a ClearanceMap,
     request: &'a Request<'a>,
     config: &'a AstarConfig,
     /// Squared distance to the nearest occupied voxel that is enough.
     required: i32,
-    moves: Vec<Move>,
-    box_low: [usize; 3],
-    box_size: [usize; 3],
+    /// The map's layer that is the lattice's lowest.
+    low: usize,
+    size: [usize; 3],
     start: VoxelIndex,
-    goal: VoxelIndex,
-    scratch: &'a mut AstarScratch,
 }
 
-impl Search<'_> {
-    fn check_goal(&self) -> Result<(), PlanError> {
-        let room = self.room(self.goal);
-        if room >= self.required || self.start == self.goal {
+impl Lattice for Rooms<'_> {
+    fn size(&self) -> [usize; 3] {
+        self.size
+    }
+
+    fn least_costs(&self) -> [f64; 3] {
+        [1.0, SQRT_2, SQRT_3]
+    }
+
+    fn steps_from(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
+        let here = self.voxel(cell);
+        let room = self.room(here);
+        let (mut rooms, mut passable) = ([BLOCKED; MOVES.len()], 0);
+        for (there_room, step) in rooms.iter_mut().zip(&MOVES) {
+            let there = moved(cell, step.by);
+            if self.contains(there) {
+                *there_room = self.room(self.voxel(there));
+                passable |= if self.may_enter(here, room, *there_room) { step.end } else { 0 };
+            }
+        }
+        let cost = self.cost(here, room);
+        for (number, (step, there_room)) in MOVES.iter().zip(rooms).enumerate() {
+            if step.swept & !passable == 0 {
+                let there = self.voxel(moved(cell, step.by));
+                visit(number, step.length * 0.5 * (cost + self.cost(there, there_room)));
+            }
+        }
+    }
+
+    fn steps_into(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
+        for step in &MOVES {
+            let before = moved(cell, step.by);
+            if self.contains(before) {
+                self.steps_from(before, |number, cost| {
+                    if moved(before, MOVES[number].by) == cell {
+                        visit(number, cost);
+                    }
+                });
+            }
+        }
+    }
+}
+
+impl Rooms<'_> {
+    fn check_goal(&self, goal: VoxelIndex) -> Result<(), PlanError> {
+        let room = self.room(goal);
+        if room >= self.required || self.start == goal {
             return Ok(());
         }
         Err(PlanError::GoalBlocked {
@@ -298,88 +350,6 @@ impl Search<'_> {
             clearance_m: self.map.clearance_of(room.max(0)),
             required_m: self.config.clearance_m,
         })
-    }
-
-    fn run(&mut self, planar: bool) -> Result<Plan, PlanError> {
-        let count = self.box_size.iter().product();
-        let scratch = &mut *self.scratch;
-        scratch.open.clear();
-        if scratch.nodes.len() < count {
-            scratch.nodes.resize(count, Node::default());
-        }
-        scratch.generation = match scratch.generation.checked_add(1) {
-            Some(generation) => generation,
-            None => {
-                scratch.nodes.fill(Node::default());
-                1
-            }
-        };
-        let mut best = self.start;
-        let mut best_h = self.heuristic(self.start);
-        self.open(self.start, 0.0, ROOT);
-        let mut expanded = 0;
-        while let Some(next) = self.scratch.open.pop() {
-            let node = &mut self.scratch.nodes[next.index];
-            if node.closed || next.g > node.g {
-                continue;
-            }
-            node.closed = true;
-            let here = self.voxel(next.index);
-            if here == self.goal {
-                let path = self.path_to(here, self.request.goal, planar);
-                return Ok(Plan { path, cost: next.g * self.resolution_m(), expanded });
-            }
-            let h = self.heuristic(here);
-            if h < best_h {
-                (best, best_h) = (here, h);
-            }
-            if expanded == self.config.budget {
-                let end = self.map.voxels().centre_of(best);
-                return Err(PlanError::BudgetExhausted {
-                    budget: expanded,
-                    partial: self.path_to(best, end, planar),
-                });
-            }
-            expanded += 1;
-            self.expand(here, next.g);
-        }
-        Err(PlanError::Unreachable { expanded })
-    }
-
-    fn expand(&mut self, here: VoxelIndex, g: f64) {
-        let room = self.room(here);
-        let cost = self.cost(here, room);
-        for index in 0..self.moves.len() {
-            let Some(there) = self.step(here, self.moves[index].by) else { continue };
-            let node = self.scratch.nodes[self.index(there)];
-            let seen = node.generation == self.scratch.generation;
-            if seen && node.closed {
-                continue;
-            }
-            let there_room = self.room(there);
-            if !self.may_enter(here, room, there_room) {
-                continue;
-            }
-            let swept_free = self.moves[index].swept.iter().all(|by| {
-                self.step(here, *by).is_some_and(|voxel| self.may_enter(here, room, self.room(voxel)))
-            });
-            if !swept_free {
-                continue;
-            }
-            let step_cost = self.moves[index].length * 0.5 * (cost + self.cost(there, there_room));
-            let g = g + step_cost;
-            if !seen || g < node.g {
-                self.open(there, g, index as u8);
-            }
-        }
-    }
-
-    fn open(&mut self, voxel: VoxelIndex, g: f64, arrived_by: u8) {
-        let index = self.index(voxel);
-        let f = g + self.heuristic(voxel);
-        self.scratch.nodes[index] =
-            Node { g, generation: self.scratch.generation, arrived_by, closed: false };
-        self.scratch.open.push(Open { f, g, index });
     }
 
     /// Squared distance, in voxels, to the nearest obstacle; inside a disc negative, and less the nearer to
@@ -426,59 +396,31 @@ impl Search<'_> {
         cost
     }
 
-    /// Shortest way on an empty grid, in voxels.
-    fn heuristic(&self, voxel: VoxelIndex) -> f64 {
-        let mut apart =
-            [voxel.x.abs_diff(self.goal.x), voxel.y.abs_diff(self.goal.y), voxel.z.abs_diff(self.goal.z)];
-        apart.sort_unstable();
-        let [least, middle, most] = apart.map(|count| count as f64);
-        // Diagonals through space, then through a face, then along an axis.
-        least * 3.0_f64.sqrt() + (middle - least) * 2.0_f64.sqrt() + (most - middle)
-    }
-
-    /// The way to `last`, the start's and the end's voxels replaced by the exact places.
-    fn path_to(&self, last: VoxelIndex, end: Vector3<f64>, planar: bool) -> Path {
-        let mut points = vec![end];
-        let mut voxel = last;
-        loop {
-            let arrived_by = self.scratch.nodes[self.index(voxel)].arrived_by;
-            let Some(Move { by, .. }) = self.moves.get(usize::from(arrived_by)) else { break };
-            let Some(previous) = self.step(voxel, by.map(|c| -c)) else { break };
-            voxel = previous;
-            points.push(self.map.voxels().centre_of(voxel));
-        }
-        if let Some(first) = points.last_mut()
-            && last != self.start
-        {
-            *first = self.request.start;
-        }
-        if last == self.start {
-            points.push(self.request.start);
-        }
-        points.reverse();
+    /// The way through cells, the first and the last replaced by the exact places.
+    fn path(&self, cells: &[VoxelIndex], end: Vector3<f64>, planar: bool) -> Path {
+        let inner = cells.get(1..cells.len().saturating_sub(1)).unwrap_or_default();
+        let centres = inner.iter().map(|cell| self.map.voxels().centre_of(self.voxel(*cell)));
+        let mut points: Vec<Vector3<f64>> =
+            std::iter::once(self.request.start).chain(centres).chain([end]).collect();
         if planar {
             spread_height(&mut points, self.request);
         }
         Path::new(points).unwrap_or_else(|| Path::at(self.request.start))
     }
 
-    fn step(&self, from: VoxelIndex, by: [i32; 3]) -> Option<VoxelIndex> {
-        let x = from.x.checked_add_signed(by[0] as isize)?;
-        let y = from.y.checked_add_signed(by[1] as isize)?;
-        let z = from.z.checked_add_signed(by[2] as isize)?;
-        let inside = x < self.box_size[0]
-            && y < self.box_size[1]
-            && (self.box_low[2]..self.box_low[2] + self.box_size[2]).contains(&z);
-        inside.then_some(VoxelIndex { x, y, z })
+    fn contains(&self, cell: VoxelIndex) -> bool {
+        let [nx, ny, nz] = self.size;
+        cell.x < nx && cell.y < ny && cell.z < nz
     }
 
-    fn index(&self, voxel: VoxelIndex) -> usize {
-        ((voxel.z - self.box_low[2]) * self.box_size[1] + voxel.y) * self.box_size[0] + voxel.x
+    /// The map's voxel that a cell is.
+    fn voxel(&self, cell: VoxelIndex) -> VoxelIndex {
+        VoxelIndex { z: cell.z + self.low, ..cell }
     }
 
-    fn voxel(&self, index: usize) -> VoxelIndex {
-        let [nx, ny, _] = self.box_size;
-        VoxelIndex { x: index % nx, y: index / nx % ny, z: index / (nx * ny) + self.box_low[2] }
+    /// The cell that a voxel of the layers searched is.
+    fn cell(&self, voxel: VoxelIndex) -> VoxelIndex {
+        VoxelIndex { z: voxel.z - self.low, ..voxel }
     }
 
     fn resolution_m(&self) -> f64 {

@@ -1,8 +1,13 @@
 //! Paths through the whole map.
 
+mod anytime;
 pub mod astar;
+mod dstar_lite;
+mod open_list;
 mod potential;
 mod simplify;
 
+pub use anytime::{Effort, Route, Search, Unsolved, cost_of};
+pub use dstar_lite::DStarLite;
 pub use potential::{Potential, PotentialObstacle, is_in_field};
-pub use simplify::{elide_collinear, simplify};
+pub use simplify::{elide_collinear, simplify, simplify_around};

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::astar::Disc;
 use crate::map::ClearanceMap;
 use crate::path::Path;
 
@@ -31,6 +32,12 @@ pub fn elide_collinear(path: &Path) -> Path {
 /// that it replaces has, if that is less: the way out of a tight place is not made tighter.
 #[must_use]
 pub fn simplify(map: &ClearanceMap, path: &Path, clearance_m: f64) -> Path {
+    simplify_around(map, path, clearance_m, &[])
+}
+
+/// As [`simplify`], and leads no deeper into a disc than the path does.
+#[must_use]
+pub fn simplify_around(map: &ClearanceMap, path: &Path, clearance_m: f64, discs: &[Disc]) -> Path {
     let path = elide_collinear(path);
     let points = path.points();
     let wanted = map.required(clearance_m);
@@ -40,9 +47,15 @@ pub fn simplify(map: &ClearanceMap, path: &Path, clearance_m: f64) -> Path {
         let from = points[anchor];
         let mut reached = anchor + 1;
         let mut floor = wanted.min(map.segment_clearance(&from, &points[reached]));
+        let mut depths: Vec<f64> = discs.iter().map(|disc| depth_m(disc, &from, &points[reached])).collect();
         for candidate in anchor + 2..points.len() {
-            floor = floor.min(map.segment_clearance(&points[candidate - 1], &points[candidate]));
-            if map.segment_clearance(&from, &points[candidate]) >= floor {
+            let (before, to) = (&points[candidate - 1], &points[candidate]);
+            floor = floor.min(map.segment_clearance(before, to));
+            for (depth, disc) in depths.iter_mut().zip(discs) {
+                *depth = depth.max(depth_m(disc, before, to));
+            }
+            let is_no_deeper = |(depth, disc): (&f64, &Disc)| depth_m(disc, &from, to) <= *depth;
+            if depths.iter().zip(discs).all(is_no_deeper) && map.segment_clearance(&from, to) >= floor {
                 reached = candidate;
             }
         }
@@ -50,4 +63,33 @@ pub fn simplify(map: &ClearanceMap, path: &Path, clearance_m: f64) -> Path {
         anchor = reached;
     }
     Path::new(kept).unwrap_or(path)
+}
+
+/// How deep in a disc a straight line leads, metres; 0 outside.
+fn depth_m(disc: &Disc, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
+    let (offset, leg) = ((disc.centre - from).xy(), (to - from).xy());
+    let along = offset.dot(&leg) / leg.norm_squared();
+    let nearest = if along.is_finite() { leg * along.clamp(0.0, 1.0) } else { leg };
+    (disc.radius_m - (offset - nearest).norm()).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::VoxelMapConfig;
+
+    #[test]
+    fn a_way_around_a_disc_is_not_straightened_through_it() {
+        let map = ClearanceMap::new(VoxelMapConfig::default(), Vector3::new(0.0, 0.0, 5.0), 2.5).unwrap();
+        let around = [[-4.0, 0.0], [-3.0, 2.0], [-1.0, 3.0], [1.0, 3.0], [3.0, 2.0], [4.0, 0.0]];
+        let path = Path::new(around.map(|[x, y]| Vector3::new(x, y, 3.0)).to_vec()).unwrap();
+        assert_eq!(simplify(&map, &path, 0.5).points().len(), 2, "nothing is in the way");
+        let disc = Disc { centre: Vector3::new(0.0, 0.0, 3.0), radius_m: 2.5 };
+        let kept = simplify_around(&map, &path, 0.5, &[disc]);
+        let deepest = |path: &Path| {
+            path.points().windows(2).map(|leg| depth_m(&disc, &leg[0], &leg[1])).fold(0.0, f64::max)
+        };
+        assert!(deepest(&kept) <= deepest(&path), "{kept:?}");
+        assert!(kept.points().len() > 2);
+    }
 }

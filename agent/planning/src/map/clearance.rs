@@ -241,12 +241,11 @@ impl ClearanceMap {
         (f64::from(squared).sqrt() - 0.5).max(0.0) * self.voxels.config().resolution_m
     }
 
-    pub(crate) fn track_layer(&mut self, z: usize) {
-        if let Some(slot) = self.layers.get_mut(z)
-            && slot.is_none()
-        {
-            *slot = Some(Layer::of(&self.voxels, &self.brush, z));
-        }
+    /// As [`ClearanceMap::track`], for a layer by its number; whether that took work.
+    pub(crate) fn track_layer(&mut self, z: usize) -> bool {
+        let Some(slot @ None) = self.layers.get_mut(z) else { return false };
+        *slot = Some(Layer::of(&self.voxels, &self.brush, z));
+        true
     }
 
     /// Squared distance, in voxels, to the nearest occupied voxel; `i32::MAX` beyond the truncation.

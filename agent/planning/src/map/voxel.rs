@@ -98,7 +98,7 @@ pub struct RayEnd {
 }
 
 /// A voxel of the window: counts from its lowest corner along east, north and up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct VoxelIndex {
     /// East.
     pub x: usize,

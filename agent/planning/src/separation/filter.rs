@@ -4,6 +4,12 @@ use nalgebra::{Vector2, Vector3};
 
 use super::Neighbour;
 use super::halfspace::{HalfSpace, nearest_2d, nearest_3d};
+use crate::local::braking::stopping_speed;
+
+/// Violations smaller than this are rounding, m/s.
+const TOLERANCE_M_S: f64 = 1e-9;
+/// A vehicle that needs no time to stop is taken to need this, seconds.
+const LEAST_STOP_S: f64 = 0.05;
 
 /// Distances to keep, and how the vehicle moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,8 +33,7 @@ pub struct FilterConfig {
     pub hull_radius_m: f64,
     /// Standard deviations of the relative position by which the distance is widened.
     pub sigmas: f64,
-    /// Age at which a neighbour's state is no longer fresh, seconds: it is then taken to keep its velocity,
-    /// whatever happens.
+    /// Age at which a neighbour's state is no longer fresh, seconds: from then on its ghost grows.
     pub fresh_s: f64,
     /// Speed with which the ghost of a neighbour grows that has fallen silent, m/s.
     pub ghost_growth_m_s: f64,
@@ -55,6 +60,15 @@ impl Default for FilterConfig {
             ghost_max_m: 3.0,
             vertical_stretch: 1.5,
         }
+    }
+}
+
+impl FilterConfig {
+    /// Two vehicles that know of one another's place and keep their distance both do not limit one another beyond this, centre to centre, metres:
+    /// `separation + 2 v (t + v / 2a)` at the greatest speed `v`.
+    #[must_use]
+    pub fn reach_m(&self) -> f64 {
+        self.separation_m + 2.0 * self.max_speed_m_s * stop_s(self.max_speed_m_s, self)
     }
 }
 
@@ -121,25 +135,27 @@ struct Limit {
 
 /// The velocity nearest to the desired one with which this vehicle can still stop in time.
 ///
-/// Each neighbour and obstacle, at distance `d` in the unit direction `n`, bounds the velocity towards it, `n
-/// . v <= b`, so that braking with `a` after the latency `t` ends before the gap `g` is used up (`v t + v^2 /
-/// 2a = share of g`):
+/// A vehicle that is told to brake flies on for the latency `t` and then stops along its own velocity `v` with
+/// the deceleration `a`. On the way it comes nearer to what lies in the unit direction `n` by its *stop*, `S = n . v (t
+/// + |v| / 2a)`, at most. Since it is no faster than `s = min(v_max, |v| + a t)` when it brakes, its stop stays
+/// within the reach `h` if `n . v <= h / (t + s / 2a)`: a half-space. Nor is it told to fly faster than it could stop straight on,
+/// `n . v <= sqrt((a t)^2 + 2 a h) - a t`. With `g` for the gap:
 ///
-/// | what | gap | bound `b` for `g >= 0` |
+/// | what, at distance `d` | gap | reach `h` for `g >= 0` |
 /// |---|---|---|
-/// | obstacle | `g = d - r` | `sqrt((a t)^2 + 2 a g) - a t` |
-/// | neighbour that keeps its distance too | `g = d - D` | `sqrt((a t)^2 + a g + w^2 / 2) - a t`: half the gap is for each; `w` is the speed with which it leads away |
-/// | neighbour that does not, or is silent | `g = d - D` | `n . v_j + sqrt((a t)^2 + 2 a g) - a t` |
+/// | obstacle | `g = d - r` | `g` |
+/// | neighbour that keeps its distance too | `g = d - D` | `min(g / 2, g - S_j) + w^2 / 4a`: half the gap for each, less if the neighbour has come to need more; `w` is the speed with which it leads away, less `a t` |
+/// | neighbour that does not | `g = d - D` | `g`, and `n . v_j` added to the bound if it comes nearer |
 ///
-/// For `g < 0`, `b = g / t` (half that when shared): the vehicle must leave. `D` is widened by the position
-/// errors, and for a neighbour that has been silent by the growth of its ghost. Distances between vehicles
-/// are stretched vertically.
+/// For `g < 0` the bound is `g / t` (half that when shared): the vehicle must leave. `D` is widened by what is not
+/// known of the neighbour, see [`distance_kept_m`]. Distances between vehicles are stretched vertically.
 ///
-/// **Guarantee.** If every vehicle brakes with at least `a`, begins to within `t`, and filters its velocity
-/// in this way, then for vehicles at `d >= D` the gap shrinks no faster than the sum of both bounds, and that
-/// sum falls to zero with the gap: `g` stays at or above zero, short of what lag and noise beyond `t` and the
-/// position errors take. Zero velocity satisfies every bound with `g >= 0` against what stands or cooperates,
-/// so there is a feasible velocity as long as distances have been kept.
+/// **Guarantee.** As long as `S_i + S_j <= g` for each two vehicles, all of them can brake at once and none comes nearer
+/// to another than `D`: `d` shrinks by no more than both stops, and `a` is needed in one direction only, so all
+/// limits are kept by the same braking. The reaches of two add up to the gap at most, so vehicles that follow the filter stay in
+/// such states; one that cannot take on what satisfies its limits within `t` brakes along its own velocity, by which every stop grows shorter by the way that it flies. Zero velocity satisfies every bound with `g >= 0` against what stands or cooperates: there is a feasible
+/// velocity as long as distances have been kept. What is flown beyond `t` of lag, below `a` of braking and outside
+/// the position errors is not covered.
 ///
 /// When no velocity is feasible, limits are relaxed in this order, each by as little as possible and equally:
 /// those of neighbours (obstacles do not give way), then all. The caller should climb or land by rank. If the
@@ -173,23 +189,37 @@ pub fn filter(
     if !sound || !neighbours.iter().all(Neighbour::is_sound) {
         return Filtered { velocity: Vector3::zeros(), outcome: Outcome::Unsound };
     }
+    let stop = motion.stop_s(config);
     let mut limits: Vec<Limit> = Vec::with_capacity(neighbours.len() + 16);
-    limits.extend(neighbours.iter().map(|neighbour| neighbour_limit(motion, neighbour, config)));
+    limits.extend(neighbours.iter().map(|neighbour| neighbour_limit(motion, neighbour, stop, config)));
     limits.extend(
-        obstacles.iter().enumerate().filter_map(|(at, point)| obstacle_limit(motion, at, point, config)),
+        obstacles
+            .iter()
+            .enumerate()
+            .filter_map(|(at, point)| obstacle_limit(motion, at, point, stop, config)),
     );
     if motion.planar { solve_planar(motion, &limits, config) } else { solve(motion, &limits, config) }
 }
 
-/// Fastest approach to something when `share` of the gap is there to brake in, and it leads away at
-/// `lead_m_s`.
-fn approach(gap_m: f64, share: f64, lead_m_s: f64, config: &FilterConfig) -> f64 {
-    let (a, t) = (config.decel_m_s2, config.latency_s);
-    if gap_m < 0.0 {
-        return share * gap_m / t.max(0.05);
+impl Motion {
+    /// Seconds of its present approach that a vehicle needs to stop: `t + s / 2a`.
+    fn stop_s(&self, config: &FilterConfig) -> f64 {
+        let fastest = (self.velocity.norm() + config.decel_m_s2 * config.latency_s).min(config.max_speed_m_s);
+        stop_s(fastest, config)
     }
-    let lag = a * t;
-    (lag * lag + 2.0 * a * share * gap_m + 0.5 * lead_m_s * lead_m_s).sqrt() - lag
+}
+
+/// How far a vehicle of this speed comes, until it stands, for each m/s of its velocity in a direction: `t + |v| / 2a`, seconds.
+fn stop_s(speed_m_s: f64, config: &FilterConfig) -> f64 {
+    config.latency_s + speed_m_s / (2.0 * config.decel_m_s2)
+}
+
+/// Fastest approach that can be stopped within `reach_m`; negative if that is.
+fn approach(reach_m: f64, stop_s: f64, config: &FilterConfig) -> f64 {
+    if reach_m < 0.0 {
+        return reach_m / config.latency_s.max(LEAST_STOP_S);
+    }
+    (reach_m / stop_s.max(LEAST_STOP_S)).min(stopping_speed(reach_m, config.decel_m_s2, config.latency_s))
 }
 
 /// A bound for a vehicle that lags behind its commands: while it is faster than the bound, it is told to be
@@ -199,17 +229,29 @@ fn led(bound: f64, speed: f64) -> f64 {
 }
 
 /// The distance that a vehicle whose position has the standard deviation `sigma_m` keeps from a neighbour, centre to
-/// centre, metres: it grows with both errors, with the size of the neighbour, and with its silence.
+/// centre, metres:
+///
+/// `D = separation + k sqrt(sigma_i^2 + sigma_j^2) + a_j u^2 / 2 + min(g_max, c (age - fresh)) + larger`
+///
+/// `k` standard deviations for the errors of both positions; what the neighbour may have done since it was heard that straight on does not
+/// foretell, with an acceleration of `a_j` for `u = min(age, fresh)`; the growth `c` of the ghost of one that is silent; and what
+/// the neighbour's hull is larger.
 #[must_use]
 pub fn distance_kept_m(sigma_m: f64, neighbour: &Neighbour, config: &FilterConfig) -> f64 {
-    let silent_s = (neighbour.age_s - config.fresh_s).max(0.0);
-    let ghost = (config.ghost_growth_m_s * silent_s).min(config.ghost_max_m);
+    let unheard_s = neighbour.age_s.clamp(0.0, config.fresh_s);
+    let swerve = 0.5 * config.decel_m_s2 * unheard_s * unheard_s;
+    let ghost = (config.ghost_growth_m_s * silent_s(neighbour, config)).min(config.ghost_max_m);
     let error = (sigma_m * sigma_m + neighbour.sigma_m * neighbour.sigma_m).sqrt();
     let larger = (neighbour.radius_m - config.hull_radius_m).max(0.0);
-    config.separation_m + config.sigmas * error + ghost + larger
+    config.separation_m + config.sigmas * error + swerve + ghost + larger
 }
 
-fn neighbour_limit(motion: &Motion, neighbour: &Neighbour, config: &FilterConfig) -> Limit {
+/// For how long a neighbour's state has no longer been fresh, seconds.
+fn silent_s(neighbour: &Neighbour, config: &FilterConfig) -> f64 {
+    (neighbour.age_s - config.fresh_s).max(0.0)
+}
+
+fn neighbour_limit(motion: &Motion, neighbour: &Neighbour, stop: f64, config: &FilterConfig) -> Limit {
     let offset = neighbour.predicted() - motion.position;
     let stretch = config.vertical_stretch.max(1.0);
     let squashed = Vector3::new(offset.x, offset.y, offset.z / stretch);
@@ -218,37 +260,55 @@ fn neighbour_limit(motion: &Motion, neighbour: &Neighbour, config: &FilterConfig
     let towards = squashed.try_normalize(1e-6).unwrap_or_else(Vector3::x);
     // Gradient of the stretched distance.
     let gradient = Vector3::new(towards.x, towards.y, towards.z / stretch);
-    let normal = gradient.normalize();
     let steepness = gradient.norm();
-
-    let silent_s = (neighbour.age_s - config.fresh_s).max(0.0);
+    let normal = gradient / steepness;
     let gap = distance - distance_kept_m(motion.sigma_m, neighbour, config);
 
-    let its_speed = gradient.dot(&neighbour.velocity);
-    let bound = if neighbour.cooperative && silent_s == 0.0 {
-        approach(gap, 0.5, its_speed.max(0.0), config)
+    let leads_away = gradient.dot(&neighbour.velocity);
+    let bound = if neighbour.cooperative {
+        approach(shared_reach(gap, leads_away, neighbour.velocity.norm(), config), stop, config)
     } else {
-        its_speed.min(0.0) + approach(gap, 1.0, 0.0, config)
+        leads_away.min(0.0) + approach(gap, stop, config)
     };
-    let bound = led(bound, gradient.dot(&motion.velocity));
     Limit { space: HalfSpace { normal, bound: bound / steepness }, cause: Cause::Neighbour(neighbour.id) }
 }
 
+/// This vehicle's reach towards a neighbour that keeps its distance too, flies at `speed_m_s`, and leads away at
+/// `leads_away_m_s`, negative if it comes nearer; metres.
+fn shared_reach(gap_m: f64, leads_away_m_s: f64, speed_m_s: f64, config: &FilterConfig) -> f64 {
+    let half = 0.5 * gap_m;
+    if gap_m < 0.0 {
+        return half;
+    }
+    if leads_away_m_s > 0.0 {
+        // What is left of it if the neighbour brakes from now on, when this vehicle begins to.
+        let left_m_s = (leads_away_m_s - config.decel_m_s2 * config.latency_s).max(0.0);
+        return half + left_m_s * left_m_s / (4.0 * config.decel_m_s2);
+    }
+    let its_stop = -leads_away_m_s * stop_s(speed_m_s, config);
+    half.min(gap_m - its_stop).max(0.0)
+}
+
 /// `None` for points that are too far away to matter, or not finite.
-fn obstacle_limit(motion: &Motion, at: usize, point: &Vector3<f64>, config: &FilterConfig) -> Option<Limit> {
+fn obstacle_limit(
+    motion: &Motion,
+    at: usize,
+    point: &Vector3<f64>,
+    stop: f64,
+    config: &FilterConfig,
+) -> Option<Limit> {
     let mut offset = point - motion.position;
     let above = offset.z.abs() - config.obstacle_half_height_m;
     offset.z = if above > 0.0 { above.copysign(offset.z) } else { 0.0 };
-    let (a, v) = (config.decel_m_s2, config.max_speed_m_s);
-    let reach = config.obstacle_clearance_m + v * config.latency_s + v * v / (2.0 * a);
+    let fastest = config.max_speed_m_s;
+    let reach = config.obstacle_clearance_m + fastest * stop_s(fastest, config);
     let squared = offset.norm_squared();
     if squared.is_nan() || squared > reach * reach {
         return None;
     }
     let distance = squared.sqrt();
     let normal = offset.try_normalize(1e-6)?;
-    let bound = approach(distance - config.obstacle_clearance_m, 1.0, 0.0, config);
-    let bound = led(bound, normal.dot(&motion.velocity));
+    let bound = approach(distance - config.obstacle_clearance_m, stop, config);
     Some(Limit { space: HalfSpace { normal, bound }, cause: Cause::Obstacle(at) })
 }
 
@@ -262,27 +322,63 @@ fn solve_planar(motion: &Motion, limits: &[Limit], config: &FilterConfig) -> Fil
         // finite.
         if share > 0.05 {
             let bound = (space.bound - space.normal.z * motion.velocity.z) / share;
-            flat.push((HalfSpace { normal: level / share, bound: bound.max(-config.max_speed_m_s) }, *cause));
+            if bound < config.max_speed_m_s {
+                let bound = bound.max(-config.max_speed_m_s);
+                flat.push((HalfSpace { normal: level / share, bound }, *cause));
+            }
         }
     }
     let wanted = Vector2::new(motion.desired.x, motion.desired.y);
-    let (velocity, outcome) = relax(wanted, &flat, config, nearest_2d);
+    let now = Vector2::new(motion.velocity.x, motion.velocity.y);
+    let (velocity, outcome) = choose(now, wanted, &flat, config, nearest_2d);
     Filtered { velocity: Vector3::new(velocity.x, velocity.y, motion.desired.z), outcome }
 }
 
 fn solve(motion: &Motion, limits: &[Limit], config: &FilterConfig) -> Filtered {
     let limits: Vec<_> = limits
         .iter()
+        .filter(|limit| limit.space.bound < config.max_speed_m_s)
         .map(|limit| {
             let bound = limit.space.bound.max(-config.max_speed_m_s);
             (HalfSpace { bound, ..limit.space }, limit.cause)
         })
         .collect();
-    let (velocity, outcome) = relax(motion.desired, &limits, config, nearest_3d);
+    let (velocity, outcome) = choose(motion.velocity, motion.desired, &limits, config, nearest_3d);
     Filtered { velocity, outcome }
 }
 
 type Vector<const D: usize> = nalgebra::SVector<f64, D>;
+
+/// The velocity to fly for one that is flying at `now`: what satisfies the limits, and braking where that cannot be had in
+/// time.
+fn choose<const D: usize>(
+    now: Vector<D>,
+    wanted: Vector<D>,
+    limits: &[(HalfSpace<D>, Cause)],
+    config: &FilterConfig,
+    nearest: impl Fn(Vector<D>, f64, &[HalfSpace<D>]) -> Option<Vector<D>>,
+) -> (Vector<D>, Outcome) {
+    let change_m_s = config.decel_m_s2 * config.latency_s;
+    let ahead: Vec<_> = limits
+        .iter()
+        .map(|(space, cause)| {
+            (HalfSpace { bound: led(space.bound, space.normal.dot(&now)), ..*space }, *cause)
+        })
+        .collect();
+    let (velocity, outcome) = relax(wanted, &ahead, config, nearest);
+    let reached = now + shortened(velocity - now, change_m_s);
+    match worst(limits, &reached) {
+        Some((excess, cause)) if excess > TOLERANCE_M_S && matches!(outcome, Outcome::Limited(_)) => {
+            (now - shortened(now, change_m_s), Outcome::Limited(cause))
+        }
+        _ => (velocity, outcome),
+    }
+}
+
+fn shortened<const D: usize>(vector: Vector<D>, length: f64) -> Vector<D> {
+    let norm = vector.norm();
+    if norm > length { vector * (length / norm) } else { vector }
+}
 
 /// Solves, and if there is no solution relaxes the neighbours' limits, then all.
 fn relax<const D: usize>(
@@ -304,7 +400,7 @@ fn relax<const D: usize>(
     };
     if let Some(velocity) = relaxed(0.0, 0.0) {
         let outcome = match worst(limits, &wanted) {
-            Some((excess, cause)) if excess > 1e-9 => Outcome::Limited(cause),
+            Some((excess, cause)) if excess > TOLERANCE_M_S => Outcome::Limited(cause),
             _ if wanted.norm() > radius => Outcome::Limited(Cause::Speed),
             _ => Outcome::Clear,
         };

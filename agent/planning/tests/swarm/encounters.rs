@@ -24,8 +24,20 @@ fn place(rng: &mut ChaCha8Rng, half_m: f64, taken: &[Vehicle], obstacles: &[Vect
     }
 }
 
-/// Vehicles in a small space that are given new goals all the time, with nothing but the filter between them.
+/// How vehicles hear one another.
+struct Hearing {
+    /// Share of broadcasts that reach nobody.
+    loss: f64,
+    /// Ticks of 20 ms that a broadcast takes.
+    delay_ticks: u32,
+}
+
 fn chaos(count: usize, half_m: f64, planar: bool, posts: usize, loss: f64, seed: u64) -> Flight {
+    chaos_heard(count, half_m, planar, posts, Hearing { loss, delay_ticks: 5 }, seed)
+}
+
+/// Vehicles in a small space that are given new goals all the time, with nothing but the filter between them.
+fn chaos_heard(count: usize, half_m: f64, planar: bool, posts: usize, hearing: Hearing, seed: u64) -> Flight {
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(0x9e37_79b9));
     let mut obstacles: Vec<Vector3<f64>> = Vec::new();
     for _ in 0..posts {
@@ -44,7 +56,8 @@ fn chaos(count: usize, half_m: f64, planar: bool, posts: usize, loss: f64, seed:
     swarm.repulsion = None;
     swarm.planar = planar;
     swarm.obstacles = obstacles;
-    swarm.loss = loss;
+    swarm.loss = hearing.loss;
+    swarm.delay_ticks = hearing.delay_ticks;
     let mut flight = Flight::default();
     for _ in 0..30 {
         for vehicle in &mut swarm.vehicles {
@@ -139,5 +152,18 @@ fn vehicles_keep_their_distance_when_half_of_what_they_say_is_lost() {
     report("6 in 5 m, half lost", &flights);
     for (seed, flight) in flights.iter().enumerate() {
         assert!(flight.min_separation_m >= SEPARATION_M, "seed {seed}: {flight:?}");
+    }
+}
+
+#[test]
+fn vehicles_keep_their_distance_when_they_hear_late_and_lose_a_third() {
+    for (planar, count) in [(true, 6), (false, 8)] {
+        let flights: Vec<_> = (0..6)
+            .map(|seed| chaos_heard(count, 5.0, planar, 0, Hearing { loss: 0.3, delay_ticks: 15 }, seed))
+            .collect();
+        report(&format!("{count} in 5 m, 300 ms late, planar {planar}"), &flights);
+        for (seed, flight) in flights.iter().enumerate() {
+            assert!(flight.min_separation_m >= SEPARATION_M, "planar {planar}, seed {seed}: {flight:?}");
+        }
     }
 }

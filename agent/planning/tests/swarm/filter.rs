@@ -1,6 +1,8 @@
 //! The safety filter's answers, one velocity at a time.
 
 use nalgebra::Vector3;
+use proptest::prelude::*;
+use skein_planning::local::apf::limited;
 use skein_planning::separation::{FilterConfig, Motion, Neighbour, Outcome, filter};
 
 fn hovering(desired: Vector3<f64>) -> Motion {
@@ -108,4 +110,60 @@ fn nonsense_in_is_standstill_out() {
     assert_eq!((lost.velocity, lost.outcome), (Vector3::zeros(), Outcome::Unsound));
     let odd_point = filter(&hovering(Vector3::x()), &[], &[Vector3::new(f64::NAN, 0.0, 0.0)], &config);
     assert_eq!(odd_point.outcome, Outcome::Clear, "a lidar ray without return is no obstacle");
+}
+
+/// Where a vehicle is that flies on for the latency and then brakes along its own velocity.
+fn braking(
+    start: &Vector3<f64>,
+    velocity: &Vector3<f64>,
+    after_s: f64,
+    config: &FilterConfig,
+) -> Vector3<f64> {
+    let (a, speed) = (config.decel_m_s2, velocity.norm());
+    let brakes_s = (after_s - config.latency_s).clamp(0.0, speed / a);
+    let straight_s = after_s.min(config.latency_s);
+    let braked = if speed > 0.0 { brakes_s - a * brakes_s * brakes_s / (2.0 * speed) } else { 0.0 };
+    start + velocity * (straight_s + braked)
+}
+
+proptest! {
+    #[test]
+    fn whatever_the_filter_lets_through_all_can_brake_at_once_and_keep_their_distance(
+        places in prop::collection::vec(prop::array::uniform3(-3.0..3.0_f64), 2..6),
+        goals in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 6),
+    ) {
+        let tick_s = 0.1;
+        let config = FilterConfig { vertical_stretch: 1.0, latency_s: tick_s, ..FilterConfig::default() };
+        let mut places: Vec<Vector3<f64>> = places.into_iter().map(Vector3::from).collect();
+        let least_m = |places: &[Vector3<f64>]| places.iter().enumerate()
+            .flat_map(|(at, one)| places[..at].iter().map(move |other| (one - other).norm()))
+            .fold(f64::INFINITY, f64::min);
+        prop_assume!(least_m(&places) >= config.separation_m);
+        let mut velocities = vec![Vector3::zeros(); places.len()];
+        // They crowd together, as fast as they are let.
+        for _ in 0..25 {
+            let all: Vec<Neighbour> = places.iter().zip(&velocities).map(|(position, velocity)| Neighbour {
+                sigma_m: 0.0, position: *position, velocity: *velocity, ..neighbour([0.0; 3], 0.0)
+            }).collect();
+            velocities = (0..places.len()).map(|at| {
+                let mut others = all.clone();
+                others.remove(at);
+                let desired = limited((Vector3::from(goals[at]) - places[at]) * 9.0, config.max_speed_m_s);
+                let (position, velocity) = (places[at], velocities[at]);
+                let motion = Motion { position, velocity, sigma_m: 0.0, desired, planar: false };
+                let change = filter(&motion, &others, &[], &config).velocity - velocity;
+                velocity + limited(change, config.decel_m_s2 * tick_s)
+            }).collect();
+            for after in 0..40 {
+                let after_s = 0.05 * f64::from(after);
+                let braking: Vec<_> = places.iter().zip(&velocities)
+                    .map(|(place, velocity)| braking(place, velocity, after_s, &config)).collect();
+                let least_m = least_m(&braking);
+                prop_assert!(least_m >= config.separation_m - 0.01, "{least_m} m, {after_s} s after");
+            }
+            for (place, velocity) in places.iter_mut().zip(&velocities) {
+                *place += velocity * tick_s;
+            }
+        }
+    }
 }

@@ -13,8 +13,6 @@ const STEP_S: f64 = 0.004;
 const STEPS_PER_TICK: u32 = 5;
 /// Ticks of 20 ms from one broadcast, and position fix, to the next.
 const TICKS_PER_STATE: u32 = 5;
-/// Time a broadcast takes.
-const DELAY_TICKS: u32 = 5;
 const TICK_S: f64 = 0.02;
 
 pub const LAG_S: f64 = 0.3;
@@ -72,6 +70,8 @@ pub struct Swarm {
     pub repulsion: Option<RepulsionConfig>,
     /// Share of broadcasts that reach nobody.
     pub loss: f64,
+    /// Ticks that a broadcast takes.
+    pub delay_ticks: u32,
     rng: ChaCha8Rng,
     ticks: u32,
 }
@@ -108,6 +108,7 @@ impl Swarm {
             filter: FilterConfig::default(),
             repulsion: Some(RepulsionConfig::default()),
             loss: 0.0,
+            delay_ticks: 5,
             rng: ChaCha8Rng::seed_from_u64(seed),
             ticks: 0,
         }
@@ -197,7 +198,7 @@ impl Swarm {
             .sent
             .iter()
             .rev()
-            .find(|(sent, ..)| sent + DELAY_TICKS <= self.ticks)
+            .find(|(sent, ..)| sent + self.delay_ticks <= self.ticks)
             .or(vehicle.sent.first())?;
         Some(Neighbour {
             id: other as u32,

@@ -164,10 +164,20 @@ impl Config {
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let file: File = toml::from_str(&text).with_context(|| path.display().to_string())?;
-        file.check(folder).with_context(|| path.display().to_string())
+        Self::parse(&text, folder).with_context(|| path.display().to_string())
+    }
+
+    /// The configuration that `agent/agent.toml` shows.
+    pub fn example() -> anyhow::Result<Self> {
+        Self::parse(EXAMPLE, Path::new("")).context("agent/agent.toml")
+    }
+
+    fn parse(text: &str, folder: &Path) -> anyhow::Result<Self> {
+        toml::from_str::<File>(text)?.check(folder)
     }
 }
+
+const EXAMPLE: &str = include_str!("../../../agent.toml");
 
 impl File {
     fn check(self, folder: &Path) -> anyhow::Result<Config> {
@@ -311,10 +321,8 @@ fn positive(field: &str, number: f64) -> anyhow::Result<f64> {
 mod tests {
     use super::*;
 
-    const EXAMPLE: &str = include_str!("../../../agent.toml");
-
     fn check(text: &str) -> anyhow::Result<Config> {
-        toml::from_str::<File>(text)?.check(Path::new("/etc/skein"))
+        Config::parse(text, Path::new("/etc/skein"))
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod autopilot_link;
 mod config;
 mod run;
+mod verify;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -11,7 +12,11 @@ use clap::{Parser, Subcommand};
 
 /// Skein's agent: one vehicle's behavioural program, its navigation, and its autopilot's link.
 #[derive(Parser)]
-#[command(name = "skein-agent", version, after_help = "Exit codes: 0 done, 2 wrong usage or input.")]
+#[command(
+    name = "skein-agent",
+    version,
+    after_help = "Exit codes: 0 done, 1 `verify` has found a violation, 2 wrong usage or input."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -25,6 +30,8 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         config: PathBuf,
     },
+    /// Look at every run of a vehicle's b-threads, with the world around them abstracted, or of a small network.
+    Verify(verify::Verify),
 }
 
 fn main() -> ExitCode {
@@ -37,9 +44,14 @@ fn main() -> ExitCode {
                 .unwrap_or_else(|_| "info,zenoh=error".into()),
         )
         .init();
-    let Command::Run { config } = Cli::parse().command;
-    match config::Config::read(&config).and_then(run::run) {
-        Ok(()) => ExitCode::SUCCESS,
+    let done = match Cli::parse().command {
+        Command::Run { config } => {
+            config::Config::read(&config).and_then(run::run).map(|()| ExitCode::SUCCESS)
+        }
+        Command::Verify(verify) => verify.run(),
+    };
+    match done {
+        Ok(code) => code,
         Err(error) => {
             eprintln!("skein-agent: {error:#}");
             ExitCode::from(2)

@@ -156,7 +156,11 @@ impl Verification {
             Some(ViolationKind::HotBThread) => Verdict::HotBThread,
             Some(ViolationKind::HotSystem) if asked(Verdict::HotSystem) => Verdict::HotSystem,
             Some(ViolationKind::HotRun | ViolationKind::HotSystem) => Verdict::HotRun,
-            Some(ViolationKind::Invariant { .. }) => return None,
+            Some(
+                ViolationKind::Invariant { .. } | ViolationKind::Unsettled | ViolationKind::OutOfReach { .. },
+            ) => {
+                return None;
+            }
         })
     }
 }

@@ -141,7 +141,7 @@ impl Parameter {
     }
 
     /// A value that fits, to try a script with.
-    pub(super) fn example(&self) -> Argument {
+    pub fn example(&self) -> Argument {
         let number = self.min.or(self.max).unwrap_or(1.0);
         self.default.clone().unwrap_or_else(|| match self.kind {
             ParameterKind::Number => Argument::Number(number),

@@ -55,18 +55,27 @@ fn after(trace: &[Event]) -> String {
 }
 
 impl Script {
+    /// Events that the script blocks somewhere: for each of its sets some, as far as it distinguishes them.
+    pub fn blocked(&self) -> BTreeSet<Event> {
+        let blocks: Vec<&EventSet> = self.bids().map(Bid::blocks).collect();
+        samples(&blocks).filter(|event| blocks.iter().any(|set| set.contains(event))).collect()
+    }
+
+    /// Events that the script waits for or is ended by somewhere: for each of its sets some, as far as it distinguishes
+    /// them.
+    pub fn listened_to(&self) -> BTreeSet<Event> {
+        let hears: Vec<&EventSet> = self.bids().flat_map(|bid| [bid.waits(), bid.interrupts()]).collect();
+        samples(&hears).filter(|event| hears.iter().any(|set| set.contains(event))).collect()
+    }
+
     /// Tries the script in no more than `most_states` states.
     ///
     /// # Errors
     /// [`TrialFault`]: the script can get into a state that it should not.
     pub fn try_out(&self, most_states: usize) -> Result<Trial, TrialFault> {
-        let blocks: Vec<&EventSet> = self.bids().map(Bid::blocks).collect();
-        let hears: Vec<&EventSet> = self.bids().flat_map(|bid| [bid.waits(), bid.interrupts()]).collect();
         let own: BTreeSet<&str> = self.bids().flat_map(Bid::requests).map(Event::name).collect();
-        let held: BTreeSet<Event> =
-            samples(&blocks).filter(|event| blocks.iter().any(|set| set.contains(event))).collect();
-        let heard = samples(&hears).filter(|event| hears.iter().any(|set| set.contains(event)));
-        let world: BTreeSet<Event> = heard.chain(held.iter().cloned()).collect();
+        let held = self.blocked();
+        let world: BTreeSet<Event> = self.listened_to().union(&held).cloned().collect();
 
         let mut program = Program::new(ProgramConfig::default());
         program.add("script", self.clone());

@@ -1,4 +1,5 @@
-//! Hot cycles: runs that go on for ever while someone must not stay where it is.
+//! Hot cycles: runs that go on for ever while someone must not stay where it is. And bursts, which must not go on for
+//! ever: what a program selects between two rests.
 
 use std::collections::VecDeque;
 
@@ -47,13 +48,23 @@ impl<T> Rows<T> {
 }
 
 impl HotGraph {
-    pub(super) fn of<M: Model>(model: &mut M, store: &Store) -> Self {
+    /// Of the states in which somebody must not stay for ever.
+    pub(super) fn of_hot<M: Model>(model: &mut M, store: &Store) -> Self {
+        Self::of(model, store, |model, state, hot| model.hot(state, hot))
+    }
+
+    /// Of the states in which the program does not rest; whoever keeps it from resting counts as hot.
+    pub(super) fn of_busy<M: Model>(model: &mut M, store: &Store) -> Self {
+        Self::of(model, store, M::busy)
+    }
+
+    fn of<M: Model>(model: &mut M, store: &Store, is_hot: impl Fn(&mut M, &[u32], &mut Vec<u32>)) -> Self {
         let mut graph = Self { states: Vec::new(), hot: Rows::new(), moves: Rows::new() };
         let mut place = vec![UNSEEN; store.len()];
         let mut hot = Vec::new();
         for (number, place) in (0_u32..).zip(&mut place) {
             hot.clear();
-            model.hot(store.state(number), &mut hot);
+            is_hot(model, store.state(number), &mut hot);
             if !hot.is_empty() {
                 hot.sort_unstable();
                 *place = graph.states.len() as u32;
@@ -84,13 +95,17 @@ impl HotGraph {
         inspection: &Inspection,
     ) -> Option<Violation> {
         match inspection {
-            Inspection::HotSystem => {
+            Inspection::HotSystem | Inspection::Unsettled => {
                 let lasso = self.lasso(store, |_| true)?;
                 let mut hot: Vec<u32> =
                     lasso.states.iter().flat_map(|state| self.hot.get(*state)).copied().collect();
                 hot.sort_unstable();
                 hot.dedup();
-                Some(lasso.violation(model, store, self, ViolationKind::HotSystem, &hot))
+                let kind = match inspection {
+                    Inspection::Unsettled => ViolationKind::Unsettled,
+                    _ => ViolationKind::HotSystem,
+                };
+                Some(lasso.violation(model, store, self, kind, &hot))
             }
             Inspection::HotRun(group) => {
                 let mut members: Vec<u32> = self.hot.items.clone();
@@ -116,6 +131,26 @@ impl HotGraph {
             }
             Inspection::Deadlock | Inspection::FailedAssertion | Inspection::HotTermination => None,
         }
+    }
+
+    /// The most moves in a row that begin in these states. There must be no cycle.
+    pub(super) fn longest_burst(&self) -> u32 {
+        let mut longest = vec![UNSEEN; self.states.len()];
+        let mut path = Vec::new();
+        for root in 0..self.states.len() as u32 {
+            path.push(root);
+            while let Some(state) = path.last().copied() {
+                let targets = || self.moves.get(state).iter().map(|(_, target)| *target);
+                let before = path.len();
+                path.extend(targets().filter(|target| get(&longest, *target as usize) == UNSEEN));
+                if path.len() == before {
+                    path.pop();
+                    let beyond = targets().map(|target| get(&longest, target as usize)).max();
+                    set(&mut longest, state as usize, 1 + beyond.unwrap_or(0));
+                }
+            }
+        }
+        longest.into_iter().max().unwrap_or(0)
     }
 
     /// The shortest way into and round a cycle all of whose states are hot in the sense of `is_hot`.

@@ -1,10 +1,12 @@
 //! The local states of a program's b-threads and proxies, and what each means for each event.
 
+use std::collections::BTreeSet;
 use std::hash::Hasher;
 use std::sync::Arc;
 
 use rustc_hash::{FxHashMap, FxHasher};
 
+use super::BidRule;
 use super::interner::Interner;
 use crate::bid::Bid;
 use crate::board::{Owner, rank};
@@ -48,6 +50,10 @@ pub(super) struct Local {
     pub(super) rank: Option<i32>,
     /// Numbers of the requested events that have their home here, in order.
     pub(super) requests: Vec<u32>,
+    /// Whether it stands for the world, so that what it requests counts as external.
+    pub(super) is_world: bool,
+    /// Which rule the bid breaks, and how.
+    pub(super) fault: Option<(String, String)>,
     /// Known outcomes, sorted by cause.
     outcomes: Vec<(Cause, Outcome)>,
 }
@@ -66,6 +72,10 @@ pub(super) struct Rules {
     pub(super) protected: EventSet,
     /// Events that may be selected here.
     pub(super) home: EventSet,
+    /// The b-threads that stand for the world.
+    pub(super) world: BTreeSet<Arc<str>>,
+    /// What must hold of every bid.
+    pub(super) of_bids: Vec<BidRule>,
 }
 
 /// The sets of events that a local state has to do with.
@@ -136,6 +146,11 @@ impl Locals {
         names
     }
 
+    /// All local states met so far, each with what it was moved by.
+    pub(super) fn all(&self) -> impl Iterator<Item = (&Local, impl Iterator<Item = Cause>)> {
+        self.locals.iter().map(|local| (local, local.outcomes.iter().map(|(cause, _)| *cause)))
+    }
+
     /// A set of events that a local state has to do with.
     pub(super) fn bits(&self, id: LocalId, kind: Kind) -> &[u64] {
         let start = ((id as usize).saturating_sub(1) * KINDS + kind as usize) * self.width;
@@ -172,8 +187,17 @@ impl Locals {
             bid.requests().iter().filter(|event| self.rules.home.contains(event)).collect();
         let requests = home.into_iter().map(|event| self.event(event)).collect();
         let rank = rank(self.rules.strategy, &owner, bid);
-        let local =
-            Local { slot, name: name.clone(), owner, bid: bid.clone(), rank, requests, outcomes: Vec::new() };
+        let local = Local {
+            is_world: self.rules.world.contains(name),
+            fault: self.rules.of_bids.iter().find_map(|rule| rule.broken_by(name, bid)),
+            slot,
+            name: name.clone(),
+            owner,
+            bid: bid.clone(),
+            rank,
+            requests,
+            outcomes: Vec::new(),
+        };
         let at = self.locals.len();
         self.locals.push(local);
         self.bits.resize(self.locals.len() * KINDS * self.width, 0);

@@ -35,7 +35,9 @@
 //! limit on selections. Where [`ProgramConfig::externals_after`](crate::ProgramConfig::externals_after) is set, an external
 //! event may come at any time.
 
+mod coverage;
 mod cycle;
+mod goals;
 mod graph;
 mod interner;
 mod locals;
@@ -48,11 +50,14 @@ mod store;
 mod two_threads;
 mod view;
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::Arc;
 
+use crate::bid::Bid;
 use crate::event::Event;
 use crate::program::Program;
+pub use coverage::{BThreadCoverage, Coverage};
 pub use graph::{Graph, GraphEdge, GraphState};
 pub use interner::Interner;
 pub use model::{Model, Moves};
@@ -70,6 +75,9 @@ pub enum Timers {
     Never,
     /// Any open one may fire at any time, also before an earlier one. In a trace this is `timeout{bthread: ".."}`.
     AnyTime,
+    /// Any open one may fire whenever nothing internal can be selected: a program that runs to rest much faster than its
+    /// deadlines are far.
+    AtRest,
 }
 
 /// Something that must hold in every state.
@@ -79,7 +87,32 @@ struct Invariant {
     holds: Arc<InvariantFn>,
 }
 
+/// Something that must hold of every bid, whatever the others state.
+#[derive(Clone)]
+struct BidRule {
+    name: String,
+    holds: Arc<BidRuleFn>,
+}
+
+/// What must stay within reach.
+#[derive(Clone)]
+struct Goal {
+    name: String,
+    is_met: Arc<GoalFn>,
+}
+
+/// What a verification asks of a program besides its [`Inspection`]s, and who is not part of the program.
+#[derive(Clone, Debug, Default)]
+struct Requirements {
+    world: BTreeSet<Arc<str>>,
+    of_bids: Vec<BidRule>,
+    invariants: Vec<Invariant>,
+    goals: Vec<Goal>,
+}
+
 type InvariantFn = dyn Fn(&View<'_>) -> Result<(), String> + Send + Sync;
+type BidRuleFn = dyn Fn(&str, &Bid) -> Result<(), String> + Send + Sync;
+type GoalFn = dyn Fn(&View<'_>) -> bool + Send + Sync;
 type OnProgress = Box<dyn FnMut(&Progress)>;
 
 /// A verification of one program, to be set up and run.
@@ -90,7 +123,7 @@ pub struct Verifier {
     threads: usize,
     timers: Timers,
     feed: Vec<Event>,
-    invariants: Vec<Invariant>,
+    requirements: Requirements,
     on_progress: OnProgress,
 }
 
@@ -104,7 +137,7 @@ impl Verifier {
             threads: 2,
             timers: Timers::default(),
             feed: Vec::new(),
-            invariants: Vec::new(),
+            requirements: Requirements::default(),
             on_progress: Box::new(|_| {}),
         }
     }
@@ -123,7 +156,37 @@ impl Verifier {
         name: impl Into<String>,
         holds: impl Fn(&View<'_>) -> Result<(), String> + Send + Sync + 'static,
     ) -> Self {
-        self.invariants.push(Invariant { name: name.into(), holds: Arc::new(holds) });
+        self.requirements.invariants.push(Invariant { name: name.into(), holds: Arc::new(holds) });
+        self
+    }
+
+    /// Looks besides for a b-thread, given by name, that states a bid for which `holds` gives an error.
+    #[must_use]
+    pub fn every_bid(
+        mut self,
+        name: impl Into<String>,
+        holds: impl Fn(&str, &Bid) -> Result<(), String> + Send + Sync + 'static,
+    ) -> Self {
+        self.requirements.of_bids.push(BidRule { name: name.into(), holds: Arc::new(holds) });
+        self
+    }
+
+    /// Looks besides for a state from which no run leads to one in which `is_met`, if no other violation is found.
+    #[must_use]
+    pub fn always_within_reach(
+        mut self,
+        goal: impl Into<String>,
+        is_met: impl Fn(&View<'_>) -> bool + Send + Sync + 'static,
+    ) -> Self {
+        self.requirements.goals.push(Goal { name: goal.into(), is_met: Arc::new(is_met) });
+        self
+    }
+
+    /// The b-threads that stand for the world around the program: what they request may happen whenever an external event
+    /// may, whatever its priority.
+    #[must_use]
+    pub fn world<N: Into<Arc<str>>>(mut self, bthreads: impl IntoIterator<Item = N>) -> Self {
+        self.requirements.world.extend(bthreads.into_iter().map(Into::into));
         self
     }
 
@@ -178,7 +241,12 @@ impl Verifier {
     }
 
     /// Looks at every state until a violation is found or a bound is reached.
-    pub fn run(mut self) -> Report {
+    pub fn run(self) -> Report {
+        self.run_and_cover().0
+    }
+
+    /// The same, and tells what of the program was met on the way.
+    pub fn run_and_cover(mut self) -> (Report, Coverage) {
         let (mut report, mut product) = self.check(false);
         if product.order_is_lost() {
             (report, product) = self.check(true);
@@ -188,7 +256,7 @@ impl Verifier {
             let what = format!("the deadlines of {}, which never fire here", waiting.join(", "));
             report.not_covered.push(Omission::NotModelled { what });
         }
-        report
+        (report, product.coverage())
     }
 
     fn check(&mut self, in_order: bool) -> (Report, Product) {
@@ -213,14 +281,14 @@ impl Verifier {
     }
 
     fn product(&self, in_order: bool) -> Product {
-        let (feed, invariants) = (self.feed.clone(), self.invariants.clone());
-        Product::new(self.program.clone(), self.timers, feed, invariants, in_order)
+        let (feed, requirements) = (self.feed.clone(), self.requirements.clone());
+        Product::new(self.program.clone(), self.timers, feed, requirements, in_order)
     }
 }
 
 impl fmt::Debug for Verifier {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { program, inspections, limits, threads, timers, feed, invariants, .. } = self;
+        let Self { program, inspections, limits, threads, timers, feed, requirements, .. } = self;
         f.debug_struct("Verifier")
             .field("program", program)
             .field("inspections", inspections)
@@ -228,8 +296,27 @@ impl fmt::Debug for Verifier {
             .field("threads", threads)
             .field("timers", timers)
             .field("feed", feed)
-            .field("invariants", invariants)
+            .field("requirements", requirements)
             .finish_non_exhaustive()
+    }
+}
+
+impl BidRule {
+    /// The rule's name, and what is wrong with a bid.
+    fn broken_by(&self, bthread: &str, bid: &Bid) -> Option<(String, String)> {
+        (self.holds)(bthread, bid).err().map(|message| (self.name.clone(), message))
+    }
+}
+
+impl fmt::Debug for BidRule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("BidRule").field(&self.name).finish()
+    }
+}
+
+impl fmt::Debug for Goal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Goal").field(&self.name).finish()
     }
 }
 

@@ -24,7 +24,23 @@ pub trait Model {
     /// Adds the numbers of the b-threads that are hot in `state`, each once.
     fn hot(&self, state: &[u32], bthreads: &mut Vec<u32>);
 
-    /// The name of a b-thread that [`Model::hot`] gave by number.
+    /// Adds the numbers of the b-threads that keep the system from resting in `state`, each once.
+    fn busy(&mut self, state: &[u32], bthreads: &mut Vec<u32>) {
+        let _ = (state, bthreads);
+    }
+
+    /// The names of the goals that must stay within reach.
+    fn goals(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Whether `state` meets the goal of this number.
+    fn meets(&self, goal: usize, state: &[u32]) -> bool {
+        let _ = (goal, state);
+        true
+    }
+
+    /// The name of a b-thread that [`Model::hot`] or [`Model::busy`] gave by number.
     fn bthread(&self, number: u32) -> Arc<str>;
 
     /// The event that a move of this label shows in a trace.

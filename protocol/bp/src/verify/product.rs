@@ -10,7 +10,7 @@ use std::time::Duration;
 use super::interner::Interner;
 use super::locals::{Cause, ENDED, Kind, Local, Locals, Rules};
 use super::model::{Model, Moves};
-use super::{Fault, Inspection, Invariant, Timers, View, ViolationKind};
+use super::{Coverage, Fault, Goal, Inspection, Invariant, Requirements, Timers, View, ViolationKind};
 use crate::event::Event;
 use crate::program::{Program, Rest};
 use crate::strategy::Strategy;
@@ -28,6 +28,7 @@ pub(super) struct Product {
     timers: Timers,
     feed: Vec<Event>,
     invariants: Vec<Invariant>,
+    goals: Vec<Goal>,
     /// Whether external events may come although internal ones can be selected.
     externals_any_time: bool,
     /// Whether rows keep b-threads in the order in which they were added, not in that of their slots.
@@ -63,6 +64,8 @@ struct Beside {
 struct Scratch {
     blocked: Vec<u64>,
     open: Vec<u64>,
+    /// Local states that do not stand for the world.
+    own: Vec<u32>,
     /// Places in the row that an event moves.
     movers: Vec<usize>,
     movers_by_event: Vec<Vec<usize>>,
@@ -75,7 +78,7 @@ impl Product {
         mut program: Program,
         timers: Timers,
         feed: Vec<Event>,
-        invariants: Vec<Invariant>,
+        requirements: Requirements,
         in_order: bool,
     ) -> Self {
         // A failure is part of the state.
@@ -85,6 +88,8 @@ impl Product {
             strategy: config.strategy,
             protected: config.protected.clone(),
             home: program.home().clone(),
+            world: requirements.world,
+            of_bids: requirements.of_bids,
         };
         Self {
             externals_any_time: config.externals_after.is_some(),
@@ -93,7 +98,8 @@ impl Product {
             rests: Interner::default(),
             timers,
             feed,
-            invariants,
+            invariants: requirements.invariants,
+            goals: requirements.goals,
             in_order,
             order: OrderWatch::default(),
             scratch: Scratch::default(),
@@ -108,9 +114,28 @@ impl Product {
     /// The b-threads of which a deadline was met that never fires.
     pub(super) fn unfired_deadlines(&self) -> Vec<Arc<str>> {
         match self.timers {
-            Timers::AnyTime => Vec::new(),
+            Timers::AnyTime | Timers::AtRest => Vec::new(),
             Timers::Never => self.locals.names_of(|local| local.bid.given_deadline().is_some()),
         }
+    }
+
+    /// What of the program was met so far.
+    pub(super) fn coverage(&self) -> Coverage {
+        let mut coverage = Coverage::default();
+        for (local, causes) in self.locals.all() {
+            let seen = coverage.bthreads.entry(local.name.clone()).or_default();
+            seen.states += 1;
+            if !seen.bids.contains(&local.bid) {
+                seen.bids.push(local.bid.clone());
+            }
+            for cause in causes {
+                match cause {
+                    Cause::Event(number) => coverage.happened.extend(self.locals.events.get(number).cloned()),
+                    Cause::Deadline => seen.timed_out = true,
+                }
+            }
+        }
+        coverage
     }
 
     fn beside(&self, state: &[u32]) -> Option<&Beside> {
@@ -182,12 +207,15 @@ impl Product {
         self.row_of(&program, self.fed(state))
     }
 
-    /// Fills `scratch.open` with the internal events that may be selected.
+    /// Fills `scratch.blocked`, and `scratch.open` with the internal events that may be selected.
     fn find_open(&mut self, state: &[u32]) {
-        let Scratch { blocked, open, .. } = &mut self.scratch;
+        let Scratch { blocked, open, own, .. } = &mut self.scratch;
         let locals = &self.locals;
         let ids = state.get(1..).unwrap_or_default();
         union(blocked, locals.width(), ids.iter().map(|id| locals.bits(*id, Kind::Blocks)));
+        own.clear();
+        own.extend(ids.iter().filter(|id| !locals.get(**id).is_some_and(|local| local.is_world)));
+        let ids = own;
         match locals.rules.strategy {
             Strategy::Simple => {
                 union(open, locals.width(), ids.iter().map(|id| locals.bits(*id, Kind::Requests)));
@@ -214,6 +242,16 @@ impl Product {
                 open.iter_mut().zip(&*blocked).for_each(|(open, blocked)| *open &= !blocked);
             }
         }
+    }
+
+    /// Fills `scratch.open` with what the world requests and nobody blocks. Needs `scratch.blocked`.
+    fn find_open_to_world(&mut self, state: &[u32]) {
+        let Scratch { blocked, open, .. } = &mut self.scratch;
+        let locals = &self.locals;
+        let ids = state.iter().skip(1);
+        let world = ids.filter(|id| locals.get(**id).is_some_and(|local| local.is_world));
+        union(open, locals.width(), world.map(|id| locals.bits(*id, Kind::Requests)));
+        open.iter_mut().zip(&*blocked).for_each(|(open, blocked)| *open &= !blocked);
     }
 
     /// The position in the queue of the external event whose turn it is. Needs `scratch.blocked`.
@@ -404,6 +442,13 @@ impl Product {
         }
     }
 
+    fn broken_by_bid(&self, state: &[u32]) -> Option<Fault> {
+        let (name, (rule, message)) =
+            self.locals(state).find_map(|local| Some((&local.name, local.fault.as_ref()?)))?;
+        let kind = ViolationKind::Invariant { invariant: rule.clone(), message: message.clone() };
+        Some(Fault { kind, violators: vec![name.clone()] })
+    }
+
     fn broken_invariant(&self, state: &[u32]) -> Option<Fault> {
         let view = View::new(self, state);
         self.invariants.iter().find_map(|invariant| {
@@ -437,15 +482,20 @@ impl Model for Product {
         let external = self.next_external(state);
         let before = moves.len();
         self.select_open(state, moves);
-        if let Some(at) = external.filter(|_| moves.len() == before || self.externals_any_time)
+        let at_rest = moves.len() == before;
+        if let Some(at) = external.filter(|_| at_rest || self.externals_any_time)
             && let Some(event) = self.beside(state).and_then(|beside| beside.externals.get(at)).copied()
         {
             self.select(state, event, Some(at), moves);
         }
+        if !self.locals.rules.world.is_empty() && (at_rest || self.externals_any_time) {
+            self.find_open_to_world(state);
+            self.select_open(state, moves);
+        }
         if moves.len() == before {
             self.feed(state, moves);
         }
-        if self.timers == Timers::AnyTime {
+        if self.timers == Timers::AnyTime || self.timers == Timers::AtRest && at_rest {
             self.fire_deadlines(state, moves);
         }
     }
@@ -454,7 +504,23 @@ impl Model for Product {
         inspections
             .iter()
             .find_map(|inspection| self.fault_by(inspection, state, stuck))
+            .or_else(|| self.broken_by_bid(state))
             .or_else(|| self.broken_invariant(state))
+    }
+
+    fn busy(&mut self, state: &[u32], bthreads: &mut Vec<u32>) {
+        self.find_open(state);
+        let open = &self.scratch.open;
+        let is_open = |local: &&Local| local.requests.iter().any(|event| has(open, *event));
+        bthreads.extend(self.locals(state).filter(|l| !l.is_world).filter(is_open).map(|l| l.slot));
+    }
+
+    fn goals(&self) -> Vec<String> {
+        self.goals.iter().map(|goal| goal.name.clone()).collect()
+    }
+
+    fn meets(&self, goal: usize, state: &[u32]) -> bool {
+        self.goals.get(goal).is_none_or(|goal| (goal.is_met)(&View::new(self, state)))
     }
 
     fn hot(&self, state: &[u32], bthreads: &mut Vec<u32>) {

@@ -22,6 +22,9 @@ pub enum Inspection {
     HotRun(BTreeSet<Arc<str>>),
     /// A cycle in which at every synchronisation point some b-thread is hot.
     HotSystem,
+    /// The program can go round on its own requests and never come to rest, so that it would hear nothing any more. Meant
+    /// for programs in which external events and deadlines wait for rest.
+    Unsettled,
 }
 
 impl Inspection {
@@ -49,6 +52,13 @@ pub enum ViolationKind {
     HotRun,
     /// See [`Inspection::HotSystem`].
     HotSystem,
+    /// See [`Inspection::Unsettled`].
+    Unsettled,
+    /// From a state on, whatever happens, a goal is out of reach.
+    OutOfReach {
+        /// The goal's name.
+        goal: String,
+    },
     /// A state breaks an invariant.
     Invariant {
         /// Its name.
@@ -121,6 +131,9 @@ pub struct Report {
     pub edges: u64,
     /// Length of the longest way from the start that the search has gone.
     pub depth: u32,
+    /// The most events that the program can select between two rests, if [`Inspection::Unsettled`] was asked for and it
+    /// always comes to rest.
+    pub longest_burst: Option<u32>,
     /// What was not looked at.
     pub not_covered: Vec<Omission>,
 }
@@ -167,6 +180,8 @@ impl fmt::Display for ViolationKind {
             Self::HotBThread => f.write_str("cycle with a b-thread that is always hot"),
             Self::HotRun => f.write_str("cycle with a group in which someone is always hot"),
             Self::HotSystem => f.write_str("cycle in which someone is always hot"),
+            Self::Unsettled => f.write_str("it goes round without coming to rest"),
+            Self::OutOfReach { goal } => write!(f, "from here on `{goal}` is out of reach"),
             Self::Invariant { invariant, message } => write!(f, "`{invariant}` does not hold: {message}"),
         }
     }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::cycle::HotGraph;
+use super::goals::{Unexplored, out_of_reach};
 use super::model::{Model, Moves};
 use super::report::{Fault, Inspection, Omission, Progress, Report, Violation};
 use super::rows::hash;
@@ -77,7 +78,7 @@ fn hot_cycle<M: Model>(model: &mut M, store: &Store, inspections: &[Inspection])
     };
     let mut asked = inspections.iter().filter(is_cycles).peekable();
     asked.peek()?;
-    let graph = HotGraph::of(model, store);
+    let graph = HotGraph::of_hot(model, store);
     asked.find_map(|inspection| graph.violation(model, store, inspection))
 }
 
@@ -164,8 +165,40 @@ impl Exploration {
             }
             None => hot_cycle(model, &self.store, inspections),
         };
+        let mut longest_burst = None;
+        let verdict = verdict.or_else(|| {
+            if !inspections.contains(&Inspection::Unsettled) {
+                return None;
+            }
+            let busy = HotGraph::of_busy(model, &self.store);
+            let endless = busy.violation(model, &self.store, &Inspection::Unsettled);
+            if endless.is_none() {
+                longest_burst = Some(busy.longest_burst());
+            }
+            endless
+        });
+        let verdict = verdict.or_else(|| out_of_reach(model, &self.store, self.unexplored()));
         let not_covered = self.take_not_covered();
-        Report { verdict, states: self.store.len(), edges: self.edges, depth: self.depth, not_covered }
+        Report {
+            verdict,
+            states: self.store.len(),
+            edges: self.edges,
+            depth: self.depth,
+            longest_burst,
+            not_covered,
+        }
+    }
+
+    /// The states that were not gone on from, or not with all their moves.
+    fn unexplored(&self) -> Unexplored {
+        let cut = !self.not_covered.is_empty();
+        match &self.frontier {
+            // The last that was looked at may lack moves.
+            _ if self.too_deep > 0 => Unexplored::Any,
+            Frontier::Queue { next, .. } if cut => Unexplored::From(next.saturating_sub(1)),
+            Frontier::Stack { .. } if cut => Unexplored::Any,
+            _ => Unexplored::None,
+        }
     }
 
     /// What was not looked at.

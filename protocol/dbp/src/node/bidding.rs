@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use skein_bp::{Bid, Event, EventSet};
 
 use crate::facts;
+use crate::held_blocks::Block;
 use crate::node::{Home, Node, NodeError, confirmation};
 use crate::{NodeName, OnLoss, RemoteBid, Roster};
 
@@ -42,7 +43,7 @@ impl Node {
             outcome = outcome.and(self.check_one_home(&bid));
             if !bid.blocked_homes.is_empty() || bid.awaits_confirmation {
                 stated.insert(bid.bthread.clone(), bid.sync);
-                self.held.state(&bid.bthread, bid.sync, bid.blocked_homes.clone());
+                self.held.state(&bid.bthread, bid.sync, bid.held_block());
             }
             for (home, remote) in bid.into_remote_bids() {
                 by_home.entry(home).or_default().push(remote);
@@ -132,6 +133,10 @@ impl Node {
 }
 
 impl BidAbroad {
+    fn held_block(&self) -> Block {
+        Block { set: self.block.clone(), on_loss: self.on_loss, homes: self.blocked_homes.clone() }
+    }
+
     /// The bid as each home it concerns is to know it.
     fn into_remote_bids(mut self) -> Vec<(NodeName, RemoteBid)> {
         let homes: BTreeSet<NodeName> = self.requests.keys().chain(&self.blocked_homes).cloned().collect();
@@ -142,6 +147,7 @@ impl BidAbroad {
                 sync: self.sync,
                 requests: self.requests.remove(&home).unwrap_or_default(),
                 block: if blocks { self.block.clone() } else { EventSet::None },
+                block_since: self.sync,
                 priority: self.priority,
                 on_loss: if blocks { self.on_loss } else { OnLoss::Release },
             };

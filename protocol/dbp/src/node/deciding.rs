@@ -7,7 +7,7 @@ use skein_bp::{Bid, Event, EventSet};
 
 use crate::facts::{self, count};
 use crate::joint::Joint;
-use crate::node::{Delivery, Node};
+use crate::node::{BoardChange, Delivery, Node};
 use crate::outbox::Outbox;
 use crate::{JointWord, Message, NodeName, Occurrence, Presence, ROSTER, Recipient, Repair, Roster};
 
@@ -98,8 +98,10 @@ impl Node {
             let event = stays.flat_map(|(_, bid, _)| bid.requests()).find(joint).cloned();
             let Some(event) = event else { continue };
             let coordinator = self.joint.as_ref().map(|joint| &joint.roster.coordinator);
-            if let Some(outbox) = coordinator.and_then(|coordinator| self.outboxes.get_mut(coordinator)) {
-                outbox.leave_unknown(&bthread, sync);
+            match coordinator.and_then(|coordinator| self.outboxes.get_mut(coordinator)) {
+                Some(outbox) => outbox.leave_unknown(&bthread, sync),
+                // From now on it would be decided here.
+                None => self.change_board(BoardChange::Withdrawn(bthread.as_str().into())),
             }
             self.fact(facts::UNKNOWN, |fact| {
                 fact.with("event", event.name()).with("bthread", bthread).with("home", home.as_str())
@@ -224,6 +226,12 @@ impl Node {
             });
         }
     }
+}
+
+/// The events by which an operator rules `node`. Who has the right may request them, and nobody from afar can block them:
+/// a block must not outlast the order that ends it, nor keep a node in a term that is over.
+pub(super) fn orders(node: &NodeName) -> EventSet {
+    EventSet::any_of([ROSTER, LIFT].map(|order| node.event_name(order)))
 }
 
 /// Events that are selected wherever they are requested, and do not travel.

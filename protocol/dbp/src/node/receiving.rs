@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use crate::facts::{self, count};
-use crate::node::{Delivery, LEAST_LEASE, Node, ProxyMove, REPEAT_DOUBLE};
+use crate::node::{BoardChange, Delivery, LEAST_LEASE, Node, REPEAT_DOUBLE};
 use crate::peers::Word;
 use crate::stream::{Heard, REPAIR_CHUNK, Stream};
 use crate::table::{Past, ProxyChange, TakenIn};
@@ -70,17 +70,11 @@ impl Node {
     }
 
     pub(super) fn change_proxies(&mut self, changes: Vec<ProxyChange>) {
-        self.stalls_due |= !changes.is_empty();
         for (proxy, bid) in changes {
-            match &bid {
-                Some(bid) => self.program.put_proxy(proxy.clone(), bid),
-                None => {
-                    self.program.remove_proxy(&proxy);
-                }
-            }
-            if let Some(moves) = &mut self.proxy_moves {
-                moves.push(ProxyMove { after: self.selections.len(), proxy, bid });
-            }
+            self.change_board(match bid {
+                Some(bid) => BoardChange::Put(proxy, bid),
+                None => BoardChange::Gone(proxy),
+            });
         }
     }
 

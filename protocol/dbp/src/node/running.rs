@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use skein_bp::{Origin, Rival, Selection};
+use skein_bp::{Event, Origin, Rival, Selection};
 
 use crate::board::shorten;
 use crate::facts::{self, tell};
@@ -79,11 +79,10 @@ impl Node {
         }
         while let Some(delivery) = self.deliveries.pop_front() {
             match delivery {
-                Delivery::Fact(_, Some((bthread, sync))) if self.sync_of(&bthread) != Some(sync) => {}
-                Delivery::Fact(event, _) => {
-                    self.program.occurred(event);
-                    if let Some(selection) = self.program.step(self.now)? {
-                        self.publish(selection);
+                Delivery::Fact(event) => self.tell_fact(event)?,
+                Delivery::Block(news) => {
+                    if let Some(event) = self.block_fact(news) {
+                        self.tell_fact(event)?;
                     }
                 }
                 Delivery::Occurrence(occurrence) => self.apply(occurrence)?,
@@ -105,6 +104,31 @@ impl Node {
             }
         }
         Ok(())
+    }
+
+    /// Tells the program a fact, which counts as an event of this node.
+    fn tell_fact(&mut self, event: Event) -> Result<(), NodeError> {
+        self.program.occurred(event);
+        if let Some(selection) = self.program.step(self.now)? {
+            self.publish(selection);
+        }
+        Ok(())
+    }
+
+    /// What is to be told of a block. Its holder may have moved on meanwhile: a confirmation was for the synchronisation
+    /// point that it has left, but that the block has lapsed concerns it for as long as it blocks anything.
+    fn block_fact(&self, news: BlockNews) -> Option<Event> {
+        match news {
+            BlockNews::Confirmed { bthread, sync } => (self.sync_of(&bthread) == Some(sync))
+                .then(|| confirmation(&self.config.name, &bthread, sync)),
+            BlockNews::Lapsed { bthread, home } => {
+                let blocks = self.program.bid(&bthread).is_some_and(|bid| !bid.blocks().is_none());
+                blocks.then(|| {
+                    let fact = tell(&self.config.name, facts::BLOCK_LAPSED);
+                    fact.with("bthread", bthread).with("home", home.as_str())
+                })
+            }
+        }
     }
 
     /// Tells the program what has occurred elsewhere.
@@ -201,21 +225,9 @@ impl Node {
 
     fn check_held_blocks(&mut self) {
         let (outboxes, lease) = (&self.outboxes, self.config.lease);
-        let news = self
-            .held
-            .check(self.now, |home, bthread, sync| outboxes.get(home)?.kept_until(bthread, sync, lease));
-        for news in news {
-            let (fact, bthread, sync) = match news {
-                BlockNews::Confirmed { bthread, sync } => {
-                    (confirmation(&self.config.name, &bthread, sync), bthread, sync)
-                }
-                BlockNews::Lapsed { bthread, sync, home } => {
-                    let fact = tell(&self.config.name, facts::BLOCK_LAPSED);
-                    (fact.with("bthread", bthread.as_str()).with("home", home.as_str()), bthread, sync)
-                }
-            };
-            self.deliveries.push_back(Delivery::Fact(fact, Some((bthread, sync))));
-        }
+        let news =
+            self.held.check(self.now, |home, bthread, sync| outboxes.get(home)?.upheld(bthread, sync, lease));
+        self.deliveries.extend(news.into_iter().map(Delivery::Block));
     }
 
     fn check_stalls(&mut self) {

@@ -31,8 +31,8 @@ impl Node {
         row.list(&self.held.0, |row, (bthread, held)| {
             row.text(bthread);
             row.number(sync(bthread), held.sync);
-            row.part(Part::Homes(held.homes.clone()));
-            row.flag(held.confirmed);
+            row.part(Part::Homes(held.block.homes.clone()));
+            row.plain(held.standing as u64);
         });
         self.write_outboxes(row);
         self.write_table(row);
@@ -53,20 +53,19 @@ impl Node {
             row.number(epoch(), outbox.acked_epoch);
             row.flag(self.is_sure_of(home));
             row.list(&outbox.bids, |row, bid| row.bid(own, life, bid));
-            row.list(&outbox.since, |row, (bthread, (at, entered))| {
+            row.list(&outbox.blocks, |row, (bthread, statement)| {
                 row.text(bthread);
-                row.number(sync(bthread), *at);
-                row.number(epoch(), *entered);
+                row.number(sync(bthread), statement.sync);
+                row.number(sync(bthread), statement.since);
+                row.number(epoch(), statement.entered);
+                row.number(epoch(), statement.held_since);
+                row.number(sync(bthread), statement.durable.unwrap_or(0));
             });
             row.list(&outbox.unknown, |row, (bthread, at)| {
                 row.text(bthread);
                 row.number(sync(bthread), *at);
             });
             row.list(&outbox.refused, |row, refusal| row.refusal(own, life, refusal));
-            row.list(&outbox.durable, |row, (bthread, at)| {
-                row.text(bthread);
-                row.number(sync(bthread), *at);
-            });
         }
     }
 

@@ -2,8 +2,8 @@
 //!
 //! What is explored are [`Node`](crate::Node)s themselves. A move lets one message arrive, or one lease lapse, or a node
 //! restart, and then the node goes on until it has settled, in every way in which its ties may fall. Messages take any
-//! time; records of bids are lost, repeated and, if so set, overtaken; occurrences come in order, since holes are repaired.
-//! A partition is messages that take long while leases lapse. Time has no length: a lease lapses at a move, at its holder
+//! time; records of bids are lost and, if so set, overtaken; so many messages as are set arrive again; occurrences come in
+//! order, since holes are repaired. While a partition lasts nothing arrives across it, and leases lapse. Time has no length: a lease lapses at a move, at its holder
 //! before its home, as the protocol sees to it (G3); deadlines of b-threads do not fire.
 //!
 //! ```
@@ -48,6 +48,11 @@ pub struct Faults {
     pub lapses: u32,
     /// How many restarts there may be, of members that may.
     pub restarts: u32,
+    /// How many messages may arrive once more than they should; then also older ones may arrive after newer ones.
+    pub repeats: u32,
+    /// How often two nodes may be cut off from one another, each time until the cut is healed. What lapses meanwhile does
+    /// not count as a lapse.
+    pub partitions: u32,
     /// Whether what a node tells itself of the fleet, its facts, takes time to arrive at others, like all that occurs. It is
     /// of interest only where a b-thread waits for another node's facts.
     pub late_facts: bool,
@@ -57,9 +62,20 @@ pub struct Faults {
 
 impl Default for Faults {
     fn default() -> Self {
-        Self { delay: true, lapses: 1, restarts: 0, late_facts: false, most_under_way: 16 }
+        Self {
+            delay: true,
+            lapses: 1,
+            restarts: 0,
+            repeats: 0,
+            partitions: 0,
+            late_facts: false,
+            most_under_way: 16,
+        }
     }
 }
+
+/// How many moves of each kind a verification has made, by the kind's name.
+pub type MoveCounts = BTreeMap<&'static str, u64>;
 
 /// The programs of all nodes in one state, as an invariant sees them.
 #[derive(Clone, Debug)]
@@ -136,12 +152,19 @@ impl NetworkVerifier {
     }
 
     /// Looks at every state, until a b-thread fails, an invariant is broken, a node cannot go on, or a bound is reached.
-    pub fn run(mut self) -> Report {
+    pub fn run(self) -> Report {
+        self.run_and_count().0
+    }
+
+    /// The same, and tells how many moves of each kind were made.
+    pub fn run_and_count(mut self) -> (Report, MoveCounts) {
         let mut model = NetworkModel::new(self.members, self.faults, self.invariants);
         let inspections = [Inspection::FailedAssertion];
         let mut report = check(&mut model, &self.limits, &inspections, &mut self.on_progress);
-        let Faults { delay, lapses, restarts, late_facts, most_under_way } = self.faults;
-        let mut left_out = vec![format!("more than {lapses} lapses and {restarts} restarts")];
+        let Faults { delay, lapses, restarts, repeats, partitions, late_facts, most_under_way } = self.faults;
+        let mut left_out = vec![format!(
+            "more than {lapses} lapses, {restarts} restarts, {repeats} repetitions and {partitions} partitions"
+        )];
         if !delay {
             left_out.push("records of bids that arrive after a newer one was sent".to_owned());
         }
@@ -155,7 +178,7 @@ impl NetworkVerifier {
             left_out.push("some of the ways in which one node's ties may fall".to_owned());
         }
         report.not_covered.extend(left_out.into_iter().map(|what| Omission::NotModelled { what }));
-        report
+        (report, model.moves)
     }
 }
 

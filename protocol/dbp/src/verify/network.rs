@@ -1,6 +1,6 @@
 //! A network of real nodes as a model.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,9 +11,9 @@ use skein_bp::{Event, Program, ProgramError, Selection};
 
 use super::row::{Family, Part, Row};
 use super::wire::Wire;
-use super::{Faults, Invariant, Member, NetworkView};
+use super::{Faults, Invariant, Member, MoveCounts, NetworkView};
 use crate::node::Node;
-use crate::{Message, NodeConfig, NodeError, NodeName, Presence, Recipient, facts};
+use crate::{BidRecord, Kept, Message, NodeConfig, NodeError, NodeName, Presence, Recipient, facts};
 
 /// When the network starts: later than any lease, so that what was last heard at time zero has lapsed.
 const START: Duration = Duration::from_secs(1 << 20);
@@ -29,6 +29,10 @@ struct Network {
     wires: BTreeMap<(NodeName, NodeName), Rc<Wire>>,
     lapses: u32,
     restarts: u32,
+    repeats: u32,
+    partitions: u32,
+    /// Pairs of nodes that are cut off from one another, each in the order of their names.
+    cut: BTreeSet<(NodeName, NodeName)>,
     now: Duration,
     /// Why a node could not go on.
     broken: Option<(NodeName, NodeError)>,
@@ -53,6 +57,12 @@ enum Step {
         from: NodeName,
         to: NodeName,
     },
+    /// What this step delivers arrives, and will arrive again.
+    Twice(Box<Step>),
+    /// Nothing arrives between two nodes any more.
+    Cut(NodeName, NodeName),
+    /// It does again.
+    Heal(NodeName, NodeName),
     /// A sign of life.
     Presence {
         from: NodeName,
@@ -88,6 +98,8 @@ pub(super) struct NetworkModel {
     /// Whether a bound of the model, not of the search, was reached.
     pub(super) ways_cut: bool,
     pub(super) queue_cut: bool,
+    /// How many moves of each kind were made.
+    pub(super) moves: MoveCounts,
 }
 
 impl NetworkModel {
@@ -103,6 +115,7 @@ impl NetworkModel {
             present: None,
             ways_cut: false,
             queue_cut: false,
+            moves: MoveCounts::new(),
         }
     }
 
@@ -110,7 +123,7 @@ impl NetworkModel {
     fn formed(&self) -> Network {
         let roster = self.roster();
         let nodes = self.members.iter().map(|member| {
-            let mut node = member.node(&roster, member.config.incarnation);
+            let mut node = member.node(&roster, member.config.incarnation, Kept::default());
             for other in self.members.iter().filter(|other| other.config.name != member.config.name) {
                 node.handle(START, presence(other, other.config.incarnation, Duration::ZERO, 0));
             }
@@ -121,6 +134,9 @@ impl NetworkModel {
             wires: BTreeMap::new(),
             lapses: self.faults.lapses,
             restarts: self.faults.restarts,
+            repeats: self.faults.repeats,
+            partitions: self.faults.partitions,
+            cut: BTreeSet::new(),
             now: START,
             broken: None,
         }
@@ -144,6 +160,12 @@ impl NetworkModel {
         }
         row.plain(network.lapses.into());
         row.plain(network.restarts.into());
+        row.plain(network.repeats.into());
+        row.plain(network.partitions.into());
+        row.list(&network.cut, |row, (one, other)| {
+            row.text(one.as_str());
+            row.text(other.as_str());
+        });
         if let Some((node, error)) = &network.broken {
             row.text(&format!("{node}: {error}"));
         }
@@ -159,24 +181,24 @@ impl NetworkModel {
         let mut steps = Vec::new();
         for (from, to) in pairs(network) {
             let (from, to) = (from.clone(), to.clone());
-            if let Some(wire) = network.wires.get(&(from.clone(), to.clone())) {
-                let records =
-                    (0..wire.records.len()).map(|at| Step::Record { from: from.clone(), to: to.clone(), at });
-                steps.extend(records);
-                steps.extend(wire.ack.as_ref().map(|_| Step::Ack { from: from.clone(), to: to.clone() }));
-                let next = wire.occurrences.front();
-                steps.extend(next.map(|_| Step::Occurrence { from: from.clone(), to: to.clone() }));
-                let presence = wire.presence.as_ref();
-                steps.extend(presence.map(|_| Step::Presence { from: from.clone(), to: to.clone() }));
+            let is_cut = network.are_cut_off(&from, &to);
+            if !is_cut {
+                let arrivals = network.arrivals(&from, &to);
+                if network.repeats > 0 {
+                    let again = arrivals.iter().filter(|step| !matches!(step, Step::Presence { .. }));
+                    steps.extend(again.map(|step| Step::Twice(Box::new(step.clone()))));
+                }
+                steps.extend(arrivals);
             }
+            steps.extend(self.cuts(network, &from, &to));
             let (Some(holder), Some(home)) = (network.nodes.get(&from), network.nodes.get(&to)) else {
                 continue;
             };
             if holder.is_sure_of(&to) {
-                if network.lapses > 0 {
+                if network.lapses > 0 || is_cut {
                     steps.push(Step::HoldLapses { holder: from, home: to });
                 }
-            } else if home.hears(&from) && network.lapses < self.faults.lapses {
+            } else if home.hears(&from) && (network.lapses < self.faults.lapses || is_cut) {
                 steps.push(Step::LeaseLapses { holder: from, home: to });
             }
         }
@@ -191,6 +213,17 @@ impl NetworkModel {
             }
         }
         steps
+    }
+
+    /// A cut between two nodes, or its end; of each pair once.
+    fn cuts(&self, network: &Network, one: &NodeName, other: &NodeName) -> Option<Step> {
+        if one > other {
+            None
+        } else if network.are_cut_off(one, other) {
+            Some(Step::Heal(one.clone(), other.clone()))
+        } else {
+            (network.partitions > 0).then(|| Step::Cut(one.clone(), other.clone()))
+        }
     }
 
     /// The states to which a step may lead, each with what was selected on the way.
@@ -250,8 +283,26 @@ impl NetworkModel {
                 network.hand_over(to, now, presence.map(Message::Presence));
                 self.go_on(network, to, choices)
             }
+            Step::Twice(step) => {
+                let wires = network.wires.clone();
+                network.repeats -= 1;
+                let selected = self.take(network, step, choices);
+                network.put_again(step, wires);
+                selected
+            }
+            Step::Cut(one, other) => {
+                network.partitions -= 1;
+                network.cut.insert((one.clone(), other.clone()));
+                Vec::new()
+            }
+            Step::Heal(one, other) => {
+                network.cut.remove(&(one.clone(), other.clone()));
+                Vec::new()
+            }
             Step::HoldLapses { holder, home } => {
-                network.lapses -= 1;
+                if !network.are_cut_off(holder, home) {
+                    network.lapses -= 1;
+                }
                 network.with(holder, |node| node.let_hold_lapse(home));
                 // An acknowledgement on its way is of a copy sent before.
                 network.wire(home, holder).ack = None;
@@ -277,7 +328,8 @@ impl NetworkModel {
     fn restart(&self, network: &mut Network, name: &NodeName) {
         let Some(member) = self.members.iter().find(|member| member.config.name == *name) else { return };
         let incarnation = network.nodes.get(name).map_or(0, |node| node.incarnation()) + 1;
-        let mut node = member.node(&self.roster(), incarnation);
+        let kept = network.nodes.get(name).filter(|_| member.config.durable).map(|node| node.kept());
+        let mut node = member.node(&self.roster(), incarnation, kept.unwrap_or_default());
         for other in self.members.iter().filter(|other| other.config.name != *name) {
             let Some(peer) = network.nodes.get(&other.config.name) else { continue };
             let (life, seq) = (peer.incarnation(), peer.latest_seq());
@@ -329,19 +381,49 @@ impl NetworkModel {
     }
 
     fn label(&mut self, step: &Step, selected: &[String]) -> u32 {
-        let what = match step {
+        let what = step.what();
+        let what = if selected.is_empty() { what } else { what.with("then", selected.join(", ")) };
+        self.labels.number(what)
+    }
+}
+
+impl Step {
+    /// What happens, for people.
+    fn what(&self) -> Event {
+        match self {
             Step::Begin(node) => Event::new(format!("{node} begins")),
             Step::Record { from, to, .. } => Event::new(format!("{to} takes in what {from} bids")),
             Step::Ack { from, to } => Event::new(format!("{to} hears that {from} has taken in its bids")),
             Step::Occurrence { from, to } => Event::new(format!("{to} hears what occurred at {from}")),
             Step::Presence { from, to } => Event::new(format!("{to} hears that {from} lives")),
+            Step::Twice(step) => {
+                let what = step.what();
+                Event::new(format!("{} (and may again)", what.name()))
+            }
+            Step::Cut(one, other) => Event::new(format!("{one} and {other} are cut off from one another")),
+            Step::Heal(one, other) => Event::new(format!("{one} and {other} are joined again")),
             Step::HoldLapses { holder, home } => Event::new(format!("{holder} is no longer sure of {home}")),
             Step::LeaseLapses { holder, home } => Event::new(format!("{home} lets go of what {holder} bids")),
             Step::GuardEnds(node) => Event::new(format!("{node} has waited for the longest lease")),
             Step::Restart(node) => Event::new(format!("{node} restarts")),
-        };
-        let what = if selected.is_empty() { what } else { what.with("then", selected.join(", ")) };
-        self.labels.number(what)
+        }
+    }
+
+    /// The kind of move that it is.
+    fn kind(&self) -> &'static str {
+        match self {
+            Step::Begin(_) => "beginning",
+            Step::Record { at: 1.., .. } => "loss of older bids",
+            Step::Record { .. } | Step::Ack { .. } | Step::Occurrence { .. } | Step::Presence { .. } => {
+                "arrival"
+            }
+            Step::Twice(_) => "repetition",
+            Step::Cut(..) => "partition",
+            Step::Heal(..) => "end of a partition",
+            Step::HoldLapses { .. } | Step::LeaseLapses { .. } => "lapse",
+            Step::GuardEnds(_) => "end of a guard",
+            Step::Restart(_) => "restart",
+        }
     }
 }
 
@@ -361,6 +443,7 @@ impl Model for NetworkModel {
         }
         for step in self.steps(&network) {
             for (selected, next) in self.outcomes(&network, &step) {
+                *self.moves.entry(step.kind()).or_default() += 1;
                 let row = self.row(&next);
                 let label = self.label(&step, &selected);
                 moves.push(label, row.iter().copied());
@@ -403,8 +486,8 @@ impl Model for NetworkModel {
 }
 
 impl Member {
-    fn node(&self, roster: &[NodeName], incarnation: u64) -> Node {
-        let config = NodeConfig { incarnation, roster: roster.to_vec(), ..self.config.clone() };
+    fn node(&self, roster: &[NodeName], incarnation: u64, kept: Kept) -> Node {
+        let config = NodeConfig { incarnation, roster: roster.to_vec(), kept, ..self.config.clone() };
         Node::new(config, self.program.clone())
     }
 }
@@ -426,13 +509,67 @@ impl Network {
         }
     }
 
+    fn are_cut_off(&self, one: &NodeName, other: &NodeName) -> bool {
+        let pair = if one < other { (one.clone(), other.clone()) } else { (other.clone(), one.clone()) };
+        self.cut.contains(&pair)
+    }
+
+    /// What may arrive next at `to` from `from`.
+    fn arrivals(&self, from: &NodeName, to: &NodeName) -> Vec<Step> {
+        let pair = (from.clone(), to.clone());
+        let Some(wire) = self.wires.get(&pair) else { return Vec::new() };
+        let (from, to) = pair;
+        let records =
+            (0..wire.records.len()).map(|at| Step::Record { from: from.clone(), to: to.clone(), at });
+        let mut arrivals: Vec<Step> = records.collect();
+        arrivals.extend(wire.ack.as_ref().map(|_| Step::Ack { from: from.clone(), to: to.clone() }));
+        let next = wire.occurrences.front();
+        arrivals.extend(next.map(|_| Step::Occurrence { from: from.clone(), to: to.clone() }));
+        let presence = wire.presence.as_ref();
+        arrivals.extend(presence.map(|_| Step::Presence { from: from.clone(), to: to.clone() }));
+        arrivals
+    }
+
+    /// Puts what a step has delivered back on its way, as it was `before`: with what it had overtaken, and behind it what
+    /// was sent since.
+    fn put_again(&mut self, step: &Step, before: BTreeMap<(NodeName, NodeName), Rc<Wire>>) {
+        let (Step::Record { from, to, .. } | Step::Ack { from, to } | Step::Occurrence { from, to }) = step
+        else {
+            return;
+        };
+        let Some(before) = before.get(&(from.clone(), to.clone())) else { return };
+        let wire = self.wire(from, to);
+        match step {
+            Step::Record { .. } => {
+                let since = std::mem::take(&mut wire.records);
+                wire.records.clone_from(&before.records);
+                let is_new = |record: &BidRecord| {
+                    !before
+                        .records
+                        .iter()
+                        .any(|old| old.epoch == record.epoch && old.incarnation == record.incarnation)
+                };
+                wire.records.extend(since.into_iter().filter(is_new));
+            }
+            Step::Ack { .. } => wire.ack = wire.ack.take().or_else(|| before.ack.clone()),
+            _ => {
+                if let Some(again) = before.occurrences.front() {
+                    wire.occurrences.push_front(again.clone());
+                }
+            }
+        }
+    }
+
     /// Two nodes of which the first has told a fact that is the next thing the other hears of it.
     fn next_fact(&self) -> Option<(NodeName, NodeName)> {
         let is_fact = |wire: &Wire, from: &NodeName| {
             wire.occurrences.front().is_some_and(|next| facts::all(from).contains(&next.event))
         };
         let has_begun = |name: &NodeName| self.nodes.get(name).is_some_and(|node| has_begun(node));
-        let next = self.wires.iter().find(|((from, to), wire)| is_fact(wire, from) && has_begun(to));
+        let next = self
+            .wires
+            .iter()
+            .find(|((from, to), wire)| is_fact(wire, from) && has_begun(to) && !self.are_cut_off(from, to));
         next.map(|(pair, _)| pair.clone())
     }
 
@@ -537,7 +674,7 @@ mod tests {
     /// What a row leaves out, such as times and how far the counters have come, must make no difference.
     #[test]
     fn networks_of_one_row_go_on_alike() {
-        let faults = Faults { lapses: 1, restarts: 1, ..Faults::default() };
+        let faults = Faults { lapses: 1, restarts: 1, repeats: 1, partitions: 1, ..Faults::default() };
         for network in programs::sound().unwrap() {
             let network_name = network.name;
             let mut model = NetworkModel::new(network.members, faults, Vec::new());

@@ -1,4 +1,5 @@
-//! Small networks that show the rules of b-programs across nodes at work.
+//! Small networks that show the rules of b-programs across nodes at work: those by which the fleet flies, and beside some of
+//! them how it is not to be written.
 
 use std::sync::Arc;
 
@@ -14,6 +15,12 @@ use crate::{NodeConfig, NodeName, NodeNameError, facts};
 pub struct Network {
     /// What it is called.
     pub name: &'static str,
+    /// What happens in it, in one line.
+    pub about: &'static str,
+    /// Whether its requirement holds. Those that are not sound show that the verifier finds it.
+    pub is_sound: bool,
+    /// What may go wrong in it unless told otherwise: what its states can be counted with in reasonable time.
+    pub faults: Faults,
     /// Its nodes.
     pub members: Vec<Member>,
     /// What must hold in every state, besides that no b-thread's assertion fails.
@@ -45,13 +52,44 @@ impl Network {
     }
 }
 
+/// All of them.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn all() -> Result<Vec<Network>, NetworkError> {
+    Ok(vec![
+        alternating_gate()?,
+        held_launch()?,
+        hold()?,
+        kept_hold()?,
+        guarded_resource(2)?,
+        guarded_resource(3)?,
+        naive_resource(2)?,
+        asked_once()?,
+        asked_again()?,
+    ])
+}
+
 /// Those that are sound, as they are to be written.
 ///
 /// # Errors
 /// None but for a mistake in this file.
 pub fn sound() -> Result<Vec<Network>, NetworkError> {
-    Ok(vec![alternating_gate()?, guarded_resource(2)?, held_launch()?, asked_once()?])
+    Ok(all()?.into_iter().filter(|network| network.is_sound).collect())
 }
+
+/// Nothing goes wrong; records come late, and newer ones may overtake them.
+const CALM: Faults = Faults {
+    delay: true,
+    lapses: 0,
+    restarts: 0,
+    repeats: 0,
+    partitions: 0,
+    late_facts: false,
+    most_under_way: 16,
+};
+/// One of each thing that can go wrong.
+const ONE_OF_EACH: Faults = Faults { lapses: 1, restarts: 1, repeats: 1, partitions: 1, ..CALM };
 
 /// Two nodes pass a gate by turns: `uav/1`, where the gate is, never lets one pass twice in a row.
 ///
@@ -77,7 +115,14 @@ pub fn alternating_gate() -> Result<Network, NetworkError> {
     ];
     let members =
         vec![scripts("uav/1", &here)?, scripts("uav/2", &[("passes", vec![passes(other), passes(other)])])?];
-    Ok(Network { name: "alternating gate", members, requirement: None })
+    Ok(Network {
+        name: "alternating gate",
+        about: "two nodes pass a gate by turns, which its home keeps",
+        is_sound: true,
+        faults: ONE_OF_EACH,
+        members,
+        requirement: None,
+    })
 }
 
 /// A shared place that at most one of `count` vehicles may be in: each blocks the others, awaits confirmation, then
@@ -89,7 +134,7 @@ pub fn guarded_resource(count: usize) -> Result<Network, NetworkError> {
     let members = (1..=count).map(|number| {
         let (name, mut program) = vehicle(number)?;
         let others = EventSet::from("uav/*/enter").and(EventSet::named(name.event_name("enter")).not());
-        // It stays where it is while the block is to hold, since every synchronisation point is a new block.
+        // It stays where it is until the block lapses.
         let claim = Bid::new().block(others).wait_for(facts::block_lapsed(&name, "claim"));
         program.add("claim", Script::new(&[Op::forever([Op::Sync(claim)])])?);
         program.add("entrance", Entrance { node: name.clone(), place: Place::Outside, careful: true });
@@ -101,7 +146,10 @@ pub fn guarded_resource(count: usize) -> Result<Network, NetworkError> {
         })
     });
     Ok(Network {
-        name: "guarded resource",
+        name: if count == 2 { "right of way" } else { "right of way of three" },
+        about: "each blocks the others, awaits confirmation, then enters; it leaves when its block lapses",
+        is_sound: true,
+        faults: if count == 2 { ONE_OF_EACH } else { CALM },
         members: members.collect::<Result<_, NetworkError>>()?,
         requirement: Some(("at most one is inside", Arc::new(at_most_one_inside))),
     })
@@ -120,7 +168,10 @@ pub fn naive_resource(count: usize) -> Result<Network, NetworkError> {
         Ok(Member { config: NodeConfig::new(name, 1, Vec::new()), program, may_restart: true })
     });
     Ok(Network {
-        name: "naive resource",
+        name: "naive right of way",
+        about: "each blocks the others and enters without awaiting confirmation",
+        is_sound: false,
+        faults: CALM,
         members: members.collect::<Result<_, NetworkError>>()?,
         requirement: Some(("at most one is inside", Arc::new(at_most_one_inside))),
     })
@@ -153,8 +204,70 @@ pub fn held_launch() -> Result<Network, NetworkError> {
     };
     Ok(Network {
         name: "held launch",
+        about: "the ground asks for take-off and holds it back until it says go",
+        is_sound: true,
+        faults: ONE_OF_EACH,
         members: vec![scripts("ground/main", &scripts_here)?, scripts("uav/1", &flight)?],
         requirement: Some(("nobody takes off while held", Arc::new(holds))),
+    })
+}
+
+/// The ground holds `uav/1`, whose leave to move is blocked for as long as the ground counts on it: the holder hears that
+/// its block lapses before the home lets go.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn hold() -> Result<Network, NetworkError> {
+    holding("hold", "the ground holds a vehicle until its lease lapses, of which it hears first", false)
+}
+
+/// The same hold, stated to outlive its holder: once confirmed it stays through lapses, partitions and restarts of the
+/// vehicle.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn kept_hold() -> Result<Network, NetworkError> {
+    holding(
+        "kept hold",
+        "a hold that is stated to outlive its holder stays through lapses and restarts",
+        true,
+    )
+}
+
+fn holding(name: &'static str, about: &'static str, outlives: bool) -> Result<Network, NetworkError> {
+    const ADVANCE: &str = "uav/1/advance";
+    let ground = NodeName::new("ground/main")?;
+    let lapsed = facts::block_lapsed(&ground, "hold");
+    // It stays where it is while the block is to hold, since every synchronisation point is a new block.
+    let block = Bid::new().block(ADVANCE).wait_for(facts::of(&ground, "enough"));
+    let block = if outlives { block.hold_when_lost() } else { block };
+    let trust = [
+        Op::Sync(Bid::new().wait_for(facts::confirmed(&ground, "hold"))),
+        Op::Sync(Bid::new().wait_for(lapsed)),
+    ];
+    let here = [("hold", vec![Op::Sync(block)]), ("trust", vec![Op::forever(trust)])];
+    let mut vehicle = scripts("uav/1", &[("moves", vec![Op::Sync(Bid::new().request(ADVANCE))])])?;
+    vehicle.config.durable = outlives;
+    let holds = |view: &NetworkView<'_>| {
+        let trusts = |ground: &Program| {
+            ground.bids().any(|(name, bid, _)| {
+                name == "trust" && bid.waits().may_hold_named("ground/main/block_lapsed")
+            })
+        };
+        let is_trusted = view.program("ground/main").is_some_and(trusts);
+        let is_held = |uav: &Program| uav.blockers(&ADVANCE.into()).next().is_some();
+        if is_trusted && !view.program("uav/1").is_some_and(is_held) {
+            return Err("the ground counts on its hold, and nothing blocks `advance`".to_owned());
+        }
+        Ok(())
+    };
+    Ok(Network {
+        name,
+        about,
+        is_sound: true,
+        faults: ONE_OF_EACH,
+        members: vec![scripts("ground/main", &here)?, vehicle],
+        requirement: Some(("a hold that is counted on holds", Arc::new(holds))),
     })
 }
 
@@ -163,7 +276,8 @@ pub fn held_launch() -> Result<Network, NetworkError> {
 /// # Errors
 /// None but for a mistake in this file.
 pub fn asked_once() -> Result<Network, NetworkError> {
-    drops("asked once", vec![Op::Sync(Bid::new().request("uav/1/drop"))])
+    let about = "the ground asks once for a drop, and asks no more when it cannot know";
+    drops("asked once", about, true, vec![Op::Sync(Bid::new().request("uav/1/drop"))])
 }
 
 /// The same request, asked again when it is unknown whether it was served. It is not safe.
@@ -174,10 +288,16 @@ pub fn asked_again() -> Result<Network, NetworkError> {
     let unknown = facts::of(&NodeName::new("ground/main")?, facts::UNKNOWN);
     let ask = Op::Sync(Bid::new().request("uav/1/drop").wait_for(unknown));
     let again = Op::On([("ground/main/unknown".to_owned(), vec![ask.clone()])].into());
-    drops("asked again", vec![ask, again])
+    let about = "the ground asks again when it is unknown whether it was served";
+    drops("asked again", about, false, vec![ask, again])
 }
 
-fn drops(name: &'static str, asking: Vec<Op>) -> Result<Network, NetworkError> {
+fn drops(
+    name: &'static str,
+    about: &'static str,
+    is_sound: bool,
+    asking: Vec<Op>,
+) -> Result<Network, NetworkError> {
     let heard = || Op::Sync(Bid::new().wait_for("uav/1/drop"));
     let log = [("at most one", vec![heard(), heard(), Op::AssertFail("dropped twice".to_owned())])];
     let members = vec![
@@ -185,7 +305,8 @@ fn drops(name: &'static str, asking: Vec<Op>) -> Result<Network, NetworkError> {
         scripts("ground/log", &log)?,
         scripts("uav/1", &[])?,
     ];
-    Ok(Network { name, members, requirement: None })
+    let faults = Faults { restarts: 1, ..CALM };
+    Ok(Network { name, about, is_sound, faults, members, requirement: None })
 }
 
 fn vehicle(number: usize) -> Result<(NodeName, Program), NetworkError> {
@@ -255,6 +376,7 @@ impl std::fmt::Debug for Network {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Network")
             .field("name", &self.name)
+            .field("faults", &self.faults)
             .field("members", &self.members)
             .finish_non_exhaustive()
     }

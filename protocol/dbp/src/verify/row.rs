@@ -93,6 +93,7 @@ impl<'a> Row<'a> {
     pub(crate) fn bid(&mut self, node: &NodeName, life: u64, bid: &RemoteBid) {
         self.text(&bid.bthread);
         self.number(Family::Sync(node.clone(), life, bid.bthread.clone()), bid.sync);
+        self.number(Family::Sync(node.clone(), life, bid.bthread.clone()), bid.block_since);
         self.part(Part::Bid(bid.requests.clone(), bid.block.clone(), bid.priority));
     }
 

@@ -1,9 +1,10 @@
-//! G3: from `confirmed` until its withdrawal or `block_lapsed`, no event of a block occurs at any home it concerns.
+//! G3: from `confirmed` until its withdrawal or `block_lapsed`, no event of a block occurs at any home it concerns. A
+//! b-thread that moves on with the same block, or with a part of it, withdraws no more than the rest.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use skein_bp::{Event, EventSet, Origin, Program};
+use skein_bp::{Bid, Event, EventSet, Origin, Program};
 use skein_dbp::facts;
 
 use super::{Findings, Oracle};
@@ -19,10 +20,13 @@ pub(super) struct ConfirmedBlock {
     received: BTreeMap<(usize, usize, u64, String, u64), Duration>,
 }
 
-/// A block that its holder was told is confirmed.
+/// A block that its holder was told is confirmed, at its present synchronisation point or before.
 struct Sure {
     sync: u64,
+    /// The first synchronisation point of which it was told, since when it blocks no less than now.
+    first: u64,
     set: EventSet,
+    hold: bool,
     /// The homes that it concerned.
     homes: Vec<usize>,
     since: Duration,
@@ -57,8 +61,21 @@ impl Oracle for ConfirmedBlock {
         // What its b-threads have left is withdrawn.
         self.sure.retain(|(holder, bthread), sure| {
             *holder != step.node
-                || step.program.bids().any(|(name, _, sync)| name == bthread && sync == sure.sync)
+                || step
+                    .program
+                    .bids()
+                    .find(|(name, ..)| name == bthread)
+                    .is_some_and(|(_, bid, sync)| sync == sure.sync || sure.goes_on(bid, sync))
         });
+        for ((_, bthread), sure) in self.sure.iter().filter(|((holder, _), _)| *holder == step.node) {
+            // A larger roster: the fact comes in the step after the order at the latest.
+            let stranger = concerned(knowledge, step.node, &sure.set).find(|home| !sure.homes.contains(home));
+            if let Some(home) = stranger {
+                let name = &knowledge.member(home).name;
+                let what = format!("{bthread} was not told that {name} has yet to hear of its block");
+                findings.broken(Promise::G3, step.node, what);
+            }
+        }
     }
 
     fn ends(&mut self, at: Duration, knowledge: &Knowledge, findings: &mut Findings) {
@@ -126,8 +143,15 @@ impl ConfirmedBlock {
                 findings.broken(Promise::G3, step.node, format!("{fact}, which {name} has not heard of"));
             }
         }
-        let sure = Sure { sync, set: bid.blocks().clone(), homes, since: step.at, overtaken: None };
-        self.sure.insert((step.node, bthread.to_owned()), sure);
+        let (set, hold) = (bid.blocks().clone(), bid.holds_when_lost());
+        let mut sure = Sure { sync, first: sync, set, hold, homes, since: step.at, overtaken: None };
+        let key = (step.node, bthread.to_owned());
+        if let Some(mut before) = self.sure.remove(&key)
+            && (before.sync == sync || before.goes_on(bid, sync))
+        {
+            (sure.first, sure.overtaken) = (before.first, before.overtaken);
+        }
+        self.sure.insert(key, sure);
     }
 
     /// An event has been selected at its home: no confirmed block of another node may hold it.
@@ -143,7 +167,7 @@ impl ConfirmedBlock {
             }
             let concerned = sure.homes.contains(&step.node) && who.concerns(&sure.set, &home.name);
             // Its holder is told of that with the next acknowledgement.
-            let lifted = home.has_lifted(*holder, bthread, (who.incarnation(), sure.sync));
+            let lifted = home.has_lifted(*holder, bthread, (who.incarnation(), sure.first));
             if !concerned || lifted || !sure.set.contains(event) || !home.lets_block(event) {
                 continue;
             }
@@ -160,6 +184,16 @@ impl ConfirmedBlock {
                 findings.broken(Promise::G3, step.node, what);
             }
         }
+    }
+}
+
+impl Sure {
+    /// Its holder has moved on to a synchronisation point with this bid: whether the block goes on, as far as the bid still
+    /// states it.
+    fn goes_on(&mut self, bid: &Bid, sync: u64) -> bool {
+        let blocks = !bid.blocks().is_none() && bid.blocks().is_within(&self.set);
+        (self.sync, self.set) = (sync, bid.blocks().clone());
+        blocks && bid.holds_when_lost() == self.hold
     }
 }
 

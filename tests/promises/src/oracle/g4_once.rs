@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use skein_bp::{Origin, Program};
+use skein_bp::{Event, Origin, Program};
 use skein_dbp::{Happened, facts};
 
 use super::{Findings, Oracle};
-use crate::knowledge::{Knowledge, Step};
+use crate::knowledge::{Knowledge, Member, Step};
 use crate::promise::Promise;
 
 /// A b-thread's stay at a synchronisation point: its node, life, name and the point.
@@ -63,7 +63,10 @@ impl Once {
         let home = knowledge.member(step.node);
         let event = &happened.event;
         for requester in &happened.requested_by {
-            let Some((node, bthread)) = requester.split_once('#') else { continue };
+            let Some((node, bthread)) = requester.split_once('#') else {
+                self.serves_itself(step, event, requester, home, findings);
+                continue;
+            };
             let heard = knowledge.number(node).and_then(|bidder| Some((bidder, home.table.get(&bidder)?)));
             let Some((bidder, heard)) = heard else { continue };
             let record = &heard.record;
@@ -86,6 +89,24 @@ impl Once {
             if happened.term == 0 && occurred.iter().any(|occurred| bid.requests.contains(occurred)) {
                 broken("which an earlier occurrence had satisfied".to_owned());
             }
+        }
+    }
+
+    /// A node decides at its own request; it may have asked another one before, when that was the coordinator.
+    fn serves_itself(
+        &self,
+        step: &Step<'_>,
+        event: &Event,
+        bthread: &str,
+        home: &Member,
+        findings: &mut Findings,
+    ) {
+        let stated = home.bids.get(bthread).filter(|stated| stated.bid.requests().contains(event));
+        let Some(sync) = stated.map(|stated| stated.sync) else { return };
+        if self.served.contains(&(step.node, home.incarnation(), bthread.to_owned(), sync)) {
+            let what =
+                format!("{event} occurred for {bthread} at its point {sync}, which was served elsewhere");
+            findings.broken(Promise::G4, step.node, what);
         }
     }
 

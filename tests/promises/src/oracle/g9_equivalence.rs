@@ -59,18 +59,15 @@ fn replay(program: &mut Program, step: &Step<'_>, knowledge: &Knowledge) -> Resu
     let me = &member.name;
     let mut term = member.former_roster.as_ref().map_or(0, |roster| roster.term);
     let mut moves = step.moves.iter().peekable();
-    let mut move_proxies = |program: &mut Program, before: usize| {
+    let mut change_board = |program: &mut Program, before: usize| {
         while let Some(next) = moves.next_if(|next| next.after <= before) {
-            match &next.bid {
-                Some(bid) => program.put_proxy(next.proxy.clone(), bid),
-                None => drop(program.remove_proxy(&next.proxy)),
-            }
+            next.change.apply(program);
         }
     };
     step.enqueued.iter().for_each(|event| program.enqueue(event.clone()));
     let mut selected_here = None;
     for (number, happened) in step.happened.iter().enumerate() {
-        move_proxies(program, number);
+        change_board(program, number);
         let Happened { event, home, origin, .. } = happened;
         match origin {
             Origin::Occurred => {
@@ -91,7 +88,7 @@ fn replay(program: &mut Program, step: &Step<'_>, knowledge: &Knowledge) -> Resu
             program.set_home(self::home(member, Some(&roster)));
         }
     }
-    move_proxies(program, step.happened.len());
+    change_board(program, step.happened.len());
     expect(program, step.clock, None)
 }
 

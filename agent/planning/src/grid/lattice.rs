@@ -1,0 +1,122 @@
+//! What a search must know of a grid: its size, its steps, and what they cost.
+
+use std::f64::consts::SQRT_2;
+
+use super::{CENTRE, MOVES, OccupancyGrid, SQRT_3, moved};
+use crate::map::VoxelIndex;
+
+/// A box of cells with steps between neighbours.
+///
+/// A step is told by the number of its move in [`MOVES`]. No step costs less than [`Lattice::least_costs`], and those must
+/// be such that the octile distance is what the shortest way on an empty grid costs ([`super::octile`]). The cost of the
+/// steps from a cell depends on that cell and its 26 neighbours alone.
+pub trait Lattice {
+    /// Cells along x, y and z.
+    fn size(&self) -> [usize; 3];
+
+    /// The least that a step through a face, across an edge and across a corner can cost.
+    fn least_costs(&self) -> [f64; 3];
+
+    /// Tells `visit` every step that leads from `cell`: its move and its cost.
+    fn steps_from(&self, cell: VoxelIndex, visit: impl FnMut(usize, f64));
+
+    /// Tells `visit` every step that leads into `cell`: its move and its cost, to the last bit as
+    /// [`Lattice::steps_from`] tells it.
+    fn steps_into(&self, cell: VoxelIndex, visit: impl FnMut(usize, f64));
+}
+
+/// What steps cost on a [`Grid`], and which there are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepCosts {
+    /// Cost of a step through a face, across an edge and across a corner.
+    pub lengths: [f64; 3],
+    /// Whether a diagonal step may pass between blocked cells. What flies never may: otherwise every cell of the box that
+    /// the step sweeps must be free.
+    pub cuts_corners: bool,
+    /// The collision factor `Ob` (Zhang 2019): a step from a cell with a blocked one among its straight neighbours costs so
+    /// much more, with one among its diagonal neighbours half as much more, with both the sum. Zhang searches from the
+    /// goal to the start, so that the *child* of a step is the cell that the vehicle leaves.
+    pub collision_factor: f64,
+}
+
+impl StepCosts {
+    /// Lengths in cells, no corners cut: what published optimal lengths hold for (Sturtevant 2012).
+    pub const EUCLIDEAN: StepCosts =
+        StepCosts { lengths: [1.0, SQRT_2, SQRT_3], cuts_corners: false, collision_factor: 0.0 };
+
+    /// Zhang's plain D*: straight 10, diagonal 14, corners cut.
+    pub const ZHANG_PLAIN: StepCosts =
+        StepCosts { lengths: [10.0, 14.0, 17.0], cuts_corners: true, collision_factor: 0.0 };
+
+    /// Zhang's improved D*: the same with `Ob = 8`.
+    pub const ZHANG_IMPROVED: StepCosts = StepCosts { collision_factor: 8.0, ..Self::ZHANG_PLAIN };
+
+    /// Zhang's collision factor for what flies: lengths in cells, `Ob` in the same proportion to them, no corners cut.
+    pub const FLYING: StepCosts = StepCosts { collision_factor: 0.8, ..Self::EUCLIDEAN };
+}
+
+/// The straight neighbours, through the cell's faces, as bits of its neighbourhood.
+const STRAIGHT: u32 = 0o020_252_020;
+
+/// Cells that are free or blocked, with one cost for steps of each kind.
+///
+/// A step leads from a free cell to a free cell. In a grid of one layer there are 8 neighbours, else 26.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    /// Which cells are blocked.
+    pub cells: OccupancyGrid,
+    /// What steps cost.
+    pub costs: StepCosts,
+}
+
+impl Grid {
+    /// What a step from `cell` costs beyond its length.
+    fn penalty(&self, cell: VoxelIndex) -> f64 {
+        let factor = self.costs.collision_factor;
+        if factor == 0.0 {
+            return 0.0;
+        }
+        let blocked = self.cells.blocked_around(cell) & !self.cells.outside_around(cell);
+        let straight = if blocked & STRAIGHT == 0 { 0.0 } else { factor };
+        let diagonal = if blocked & !STRAIGHT & !CENTRE == 0 { 0.0 } else { factor / 2.0 };
+        straight + diagonal
+    }
+
+    /// The moves that lead from a free cell, or, reversed, into it, with their lengths.
+    #[inline]
+    fn passable(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
+        let blocked = self.cells.blocked_around(cell);
+        if blocked & CENTRE != 0 {
+            return;
+        }
+        for (number, step) in MOVES.iter().enumerate() {
+            let needed = if self.costs.cuts_corners { step.end } else { step.swept };
+            if blocked & needed == 0 {
+                visit(number, self.costs.lengths[step.kind]);
+            }
+        }
+    }
+}
+
+impl Lattice for Grid {
+    fn size(&self) -> [usize; 3] {
+        self.cells.size()
+    }
+
+    fn least_costs(&self) -> [f64; 3] {
+        self.costs.lengths
+    }
+
+    #[inline]
+    fn steps_from(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
+        let penalty = self.penalty(cell);
+        self.passable(cell, |number, length| visit(number, length + penalty));
+    }
+
+    #[inline]
+    fn steps_into(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
+        self.passable(cell, |number, length| {
+            visit(25 - number, length + self.penalty(moved(cell, MOVES[number].by)));
+        });
+    }
+}

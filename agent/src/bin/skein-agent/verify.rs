@@ -1,0 +1,363 @@
+//! `skein-agent verify`: looks at every run of the program that flies, or of small networks.
+
+use std::cell::Cell;
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::{Context as _, bail, ensure};
+use serde_json::{Value, json};
+use skein_agent::bthreads::LinkLossPolicy;
+use skein_agent::verify::{NotCovered, Scene, SceneReport, VehicleVerifier};
+use skein_agent::{AgentConfig, AgentError};
+use skein_bp::script::{Argument, Assignment, ParameterKind, ScriptFile};
+use skein_bp::verify::{Progress, Report, Violation};
+use skein_dbp::verify::programs::{self, Network};
+use skein_dbp::verify::{Faults, MoveCounts};
+
+use crate::config::Config;
+
+/// States of a scene that are looked at unless told otherwise.
+const STATES_OF_SCENE: usize = 300_000;
+/// States of a network that are looked at unless told otherwise.
+const STATES_OF_NETWORK: usize = 20_000;
+/// States that are drawn unless told otherwise.
+const STATES_DRAWN: usize = 1_000;
+
+/// The arguments of `skein-agent verify`.
+#[derive(clap::Args)]
+pub struct Verify {
+    /// The vehicle's configuration; the one in agent/agent.toml, with a return when the ground is lost, unless given.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// A script that runs besides. Parameters without a default are given values that fit.
+    #[arg(long, value_name = "FILE")]
+    script: Vec<PathBuf>,
+    /// Only this scene; may be given more than once.
+    #[arg(long, value_name = "NAME")]
+    scene: Vec<String>,
+    /// Instead of a vehicle: programs on up to three nodes, all or the one of this name.
+    #[arg(long, value_name = "NAME", num_args = 0..=1, conflicts_with_all = ["config", "script", "scene", "dot"])]
+    network: Option<Option<String>>,
+    /// Look at no more states of each scene or network; 0: at all, whatever it takes.
+    #[arg(long, value_name = "N")]
+    states: Option<usize>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Draw the states of one scene, for Graphviz, instead of judging them.
+    #[arg(long, value_name = "FILE", requires = "scene")]
+    dot: Option<PathBuf>,
+}
+
+impl Verify {
+    /// Verifies, prints what was found, and says whether all is well.
+    pub fn run(self) -> anyhow::Result<ExitCode> {
+        let is_well = match (&self.network, &self.dot) {
+            (Some(name), _) => self.networks(name.as_deref())?,
+            (None, Some(file)) => self.draw(file)?,
+            (None, None) => self.vehicle()?,
+        };
+        Ok(if is_well { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    }
+
+    fn most_states(&self, unless_told: usize) -> usize {
+        match self.states {
+            Some(0) => usize::MAX,
+            states => states.unwrap_or(unless_told),
+        }
+    }
+
+    /// Of the vehicle with its scripts; why not, if one of these is refused.
+    fn verifier(&self, unless_told: usize) -> anyhow::Result<Result<VehicleVerifier, String>> {
+        let mut config = match &self.config {
+            Some(path) => Config::read(path)?.agent,
+            None => AgentConfig { link_loss: LinkLossPolicy::Return, ..Config::example()?.agent },
+        };
+        for path in &self.script {
+            let script = assignment(path, &config)?;
+            config.scripts.push(script);
+        }
+        match VehicleVerifier::new(&config) {
+            Ok(verifier) => Ok(Ok(verifier.most_states(self.most_states(unless_told)))),
+            Err(AgentError::Script { name, why }) => Ok(Err(format!("script `{name}` is refused: {why}"))),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn tell_refusal(&self, why: &str) {
+        if self.json {
+            println!("{}", json!({ "verified": false, "refused": why }));
+        } else {
+            println!("{why}");
+        }
+    }
+
+    fn scenes(&self, verifier: &VehicleVerifier) -> anyhow::Result<Vec<Scene>> {
+        let scenes: Vec<Scene> = verifier.scenes().collect();
+        if self.scene.is_empty() {
+            return Ok(scenes);
+        }
+        let named = |name: &String| {
+            let names = || scenes.iter().map(|scene| scene.name()).collect::<Vec<_>>().join(", ");
+            let scene = scenes.iter().copied().find(|scene| scene.name() == name);
+            scene.with_context(|| format!("`--scene {name}`: expected one of {}", names()))
+        };
+        self.scene.iter().map(named).collect()
+    }
+
+    fn vehicle(&self) -> anyhow::Result<bool> {
+        let verifier = match self.verifier(STATES_OF_SCENE)? {
+            Ok(verifier) => verifier,
+            Err(why) => {
+                self.tell_refusal(&why);
+                return Ok(false);
+            }
+        };
+        let mut reports = Vec::new();
+        for scene in self.scenes(&verifier)? {
+            let began = Instant::now();
+            let report = verifier.verify(scene, progress_line(scene.name()));
+            clear_line();
+            if !self.json {
+                print_scene(&report, began.elapsed().as_secs_f64());
+            }
+            reports.push(report);
+        }
+        let not_covered = verifier.not_covered(&reports);
+        let is_well = reports.iter().all(|report| report.report.verdict.is_none());
+        if self.json {
+            println!("{}", vehicle_json(&verifier, &reports, &not_covered, is_well));
+        } else {
+            print_rules(&verifier);
+            print_not_covered(&not_covered);
+            let bounded = reports.iter().any(|scene| !scene.report.is_complete());
+            println!(
+                "\n{}",
+                match (is_well, bounded) {
+                    (true, false) => "verified: every run of every scene holds",
+                    (true, true) => "no violation as far as was looked; see what was not covered",
+                    (false, _) => "violated",
+                }
+            );
+        }
+        Ok(is_well)
+    }
+
+    fn draw(&self, file: &Path) -> anyhow::Result<bool> {
+        let verifier = match self.verifier(STATES_DRAWN)? {
+            Ok(verifier) => verifier,
+            Err(why) => {
+                self.tell_refusal(&why);
+                return Ok(false);
+            }
+        };
+        let [scene] = self.scenes(&verifier)?[..] else {
+            bail!("`--dot`: expected one `--scene`, because each has states of its own");
+        };
+        let graph = verifier.verifier(scene).graph();
+        std::fs::write(file, graph.to_dot()).with_context(|| file.display().to_string())?;
+        let (states, edges) = (graph.states.len(), graph.edges.len());
+        let omitted: Vec<String> = graph.not_covered.iter().map(ToString::to_string).collect();
+        if self.json {
+            println!(
+                "{}",
+                json!({ "scene": scene.name(), "states": states, "edges": edges, "not_covered": omitted })
+            );
+        } else {
+            println!("{}: {states} states, {edges} edges of the scene `{scene}`", file.display());
+            omitted.iter().for_each(|what| println!("not covered: {what}"));
+        }
+        Ok(true)
+    }
+
+    fn networks(&self, name: Option<&str>) -> anyhow::Result<bool> {
+        let all = programs::all()?;
+        let names = all.iter().map(|network| network.name).collect::<Vec<_>>().join(", ");
+        let chosen: Vec<&Network> =
+            all.iter().filter(|network| name.is_none_or(|name| network.name == name)).collect();
+        ensure!(!chosen.is_empty(), "`--network {}`: expected one of {names}", name.unwrap_or_default());
+        let mut is_well = true;
+        let mut results = Vec::new();
+        for network in chosen {
+            let verifier = network.verifier(network.faults).most_states(self.most_states(STATES_OF_NETWORK));
+            let began = Instant::now();
+            let (report, moves) = verifier.on_progress(progress_line(network.name)).run_and_count();
+            clear_line();
+            // What is not sound must be found out, unless the search has ended before.
+            let as_expected = report.verdict.is_none() == network.is_sound;
+            is_well &= as_expected;
+            if self.json {
+                results.push(network_json(network, &report, &moves, as_expected));
+            } else {
+                print_network(network, &report, &moves, began.elapsed().as_secs_f64());
+            }
+        }
+        if self.json {
+            println!("{}", json!({ "verified": is_well, "networks": results }));
+        } else {
+            println!("{}", if is_well { "every program is as it should be" } else { "violated" });
+        }
+        Ok(is_well)
+    }
+}
+
+/// A script from a file, whose parameters without a default get values that fit.
+fn assignment(path: &Path, config: &AgentConfig) -> anyhow::Result<Assignment> {
+    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    let script = ScriptFile::parse(&path.display().to_string(), &text)?;
+    let other = config.roster.iter().find(|node| node.starts_with("uav/") && **node != config.node);
+    let value = |parameter: &skein_bp::script::Parameter| match (parameter.kind, other) {
+        (ParameterKind::Node, Some(other)) => Argument::Text(other.clone()),
+        _ => parameter.example(),
+    };
+    let open = script.parameters.iter().filter(|(_, parameter)| parameter.default.is_none());
+    let with = open.map(|(name, parameter)| (name.clone(), value(parameter))).collect();
+    Ok(Assignment { script, with, called: None })
+}
+
+/// Shows on a terminal how far a search has come.
+fn progress_line(what: &str) -> impl FnMut(&Progress) + 'static {
+    let what = what.to_owned();
+    let is_terminal = std::io::stderr().is_terminal();
+    let told: Cell<Option<Instant>> = Cell::new(None);
+    move |progress| {
+        if is_terminal && told.get().is_none_or(|at| at.elapsed().as_millis() > 200) {
+            told.set(Some(Instant::now()));
+            // Nobody is told if the terminal is gone.
+            let _ = write!(std::io::stderr(), "\r\x1b[K{what}: {progress}");
+        }
+    }
+}
+
+fn clear_line() {
+    if std::io::stderr().is_terminal() {
+        let _ = write!(std::io::stderr(), "\r\x1b[K");
+    }
+}
+
+fn print_scene(scene: &SceneReport, seconds: f64) {
+    let SceneReport { scene, report, .. } = scene;
+    println!("scene `{scene}`: {}", scene.about());
+    print_report(report, seconds);
+}
+
+fn print_report(report: &Report, seconds: f64) {
+    for line in report.to_string().lines() {
+        println!("  {line}");
+    }
+    if let Some(longest) = report.longest_burst {
+        println!("  at most {longest} events from one rest to the next");
+    }
+    println!("  {seconds:.1} s\n");
+}
+
+fn print_rules(verifier: &VehicleVerifier) {
+    println!("looked for, in every state of every scene:");
+    verifier.rules().for_each(|rule| println!("  {rule}"));
+}
+
+fn print_not_covered(not_covered: &NotCovered) {
+    println!("\nnot covered by any of these scenes:");
+    for (event, bthreads) in &not_covered.never_told {
+        println!("  {event}, for which waits: {}", bthreads.join(", "));
+    }
+    for event in &not_covered.never_selected {
+        println!("  {event}, requested and never selected");
+    }
+    not_covered.left_out.iter().for_each(|what| println!("  {what}"));
+}
+
+fn print_network(network: &Network, report: &Report, moves: &MoveCounts, seconds: f64) {
+    let should = if network.is_sound { "" } else { " (must be found to fail)" };
+    println!("`{}`{should}: {}", network.name, network.about);
+    let nodes: Vec<&str> = network.members.iter().map(|member| member.config.name.as_str()).collect();
+    println!("  nodes: {}; may go wrong: {}", nodes.join(", "), faults(&network.faults).join(", "));
+    if let Some((requirement, _)) = &network.requirement {
+        println!("  must hold: {requirement}");
+    }
+    let made: Vec<String> = moves.iter().map(|(kind, count)| format!("{count} x {kind}")).collect();
+    println!("  moves: {}", made.join(", "));
+    print_report(report, seconds);
+}
+
+fn faults(faults: &Faults) -> Vec<String> {
+    let Faults { delay, lapses, restarts, repeats, partitions, .. } = faults;
+    let counted =
+        [(lapses, "lapse"), (restarts, "restart"), (repeats, "repetition"), (partitions, "partition")];
+    let counted = counted.into_iter().filter(|(count, _)| **count > 0);
+    let delay = if *delay { "delay and loss of bids" } else { "loss of bids" };
+    std::iter::once(delay.to_owned()).chain(counted.map(|(count, what)| format!("{count} {what}"))).collect()
+}
+
+fn violation_json(violation: &Violation) -> Value {
+    let texts = |events: &[skein_bp::Event]| events.iter().map(ToString::to_string).collect::<Vec<_>>();
+    json!({
+        "what": violation.kind.to_string(),
+        "bthreads": violation.violators,
+        "trace": texts(violation.stem()),
+        "again_and_again": violation.cycle().map(texts),
+    })
+}
+
+fn report_json(report: &Report) -> Value {
+    json!({
+        "violation": report.verdict.as_ref().map(violation_json),
+        "states": report.states,
+        "edges": report.edges,
+        "depth": report.depth,
+        "complete": report.is_complete(),
+        "not_covered": report.not_covered.iter().map(ToString::to_string).collect::<Vec<_>>(),
+    })
+}
+
+fn vehicle_json(
+    verifier: &VehicleVerifier,
+    reports: &[SceneReport],
+    not_covered: &NotCovered,
+    is_well: bool,
+) -> Value {
+    let scene = |scene: &SceneReport| {
+        let SceneReport { scene, report, coverage } = scene;
+        let bthreads = coverage.bthreads.iter().map(|(name, seen)| {
+            let bids: Vec<String> = seen.bids.iter().map(ToString::to_string).collect();
+            json!({ "name": name, "states": seen.states, "bids": bids })
+        });
+        let mut result = report_json(report);
+        if let Value::Object(fields) = &mut result {
+            fields.insert("scene".to_owned(), scene.name().into());
+            fields.insert("about".to_owned(), scene.about().into());
+            fields.insert("longest_burst".to_owned(), report.longest_burst.into());
+            fields.insert("bthreads".to_owned(), bthreads.collect());
+        }
+        result
+    };
+    let never_told = not_covered.never_told.iter();
+    json!({
+        "verified": is_well,
+        "vehicle": verifier.vehicle(),
+        "rules": verifier.rules().collect::<Vec<_>>(),
+        "scenes": reports.iter().map(scene).collect::<Vec<_>>(),
+        "never_told": never_told
+            .map(|(event, bthreads)| json!({ "event": event, "bthreads": bthreads }))
+            .collect::<Vec<_>>(),
+        "never_selected": not_covered.never_selected.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "left_out": not_covered.left_out,
+    })
+}
+
+fn network_json(network: &Network, report: &Report, moves: &MoveCounts, as_expected: bool) -> Value {
+    let mut result = report_json(report);
+    if let Value::Object(fields) = &mut result {
+        let requirement = network.requirement.as_ref().map(|(name, _)| *name);
+        fields.insert("network".to_owned(), network.name.into());
+        fields.insert("about".to_owned(), network.about.into());
+        fields.insert("requirement".to_owned(), requirement.into());
+        fields.insert("must_hold".to_owned(), network.is_sound.into());
+        fields.insert("as_expected".to_owned(), as_expected.into());
+        fields.insert("may_go_wrong".to_owned(), faults(&network.faults).into());
+        fields.insert("moves".to_owned(), json!(moves));
+    }
+    result
+}

@@ -1,0 +1,122 @@
+//! `campaign separation`: swarms that hear one another late and not always, in lockstep; nobody may touch anybody, or anything.
+
+use std::io::{IsTerminal as _, Write as _};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use serde::Serialize;
+use serde_json::json;
+
+use crate::cli::SeparationCampaign;
+use crate::fly;
+use crate::scenario::{Network, Scenario};
+use crate::summary::Summary;
+
+/// One flight of the campaign.
+#[derive(Debug, Clone, Serialize)]
+struct Run {
+    scenario: String,
+    seed: u64,
+    collisions: u64,
+    min_separation_m: Option<f64>,
+    min_clearance_m: Option<f64>,
+    arrived: bool,
+    reason: Option<String>,
+}
+
+impl Run {
+    fn of(summary: Summary) -> Self {
+        Self {
+            collisions: summary.collisions.vehicle + summary.collisions.obstacle,
+            min_separation_m: summary.min_separation_m,
+            min_clearance_m: summary.min_clearance_m,
+            arrived: summary.succeeded,
+            reason: summary.reason,
+            scenario: summary.scenario,
+            seed: summary.seed,
+        }
+    }
+}
+
+/// Runs the campaign, and prints what came of it. Returns whether nobody touched anything.
+pub(super) fn run(args: &SeparationCampaign, as_json: bool) -> anyhow::Result<bool> {
+    let runs = fly_all(args)?;
+    let collided: Vec<&Run> = runs.iter().filter(|run| run.collisions > 0).collect();
+    let late: Vec<&Run> = runs.iter().filter(|run| run.collisions == 0 && !run.arrived).collect();
+    let least = |of: fn(&Run) -> Option<f64>| runs.iter().filter_map(of).reduce(f64::min);
+    let separation_m = least(|run| run.min_separation_m);
+    let clearance_m = least(|run| run.min_clearance_m);
+    if as_json {
+        let object = json!({
+            "runs": runs.len(),
+            "vehicles": args.vehicles,
+            "latency_ms": args.latency_ms,
+            "loss": args.loss,
+            "collisions": collided.iter().map(|run| run.collisions).sum::<u64>(),
+            "arrived": runs.iter().filter(|run| run.arrived).count(),
+            "min_separation_m": separation_m,
+            "min_clearance_m": clearance_m,
+            "collided": collided,
+            "not_arrived": late,
+        });
+        println!("{object}");
+    } else {
+        for Run { scenario, seed, reason, .. } in collided.iter().chain(&late) {
+            println!("{scenario}, seed {seed}: {}", reason.as_deref().unwrap_or_default());
+        }
+        let metres = |length: Option<f64>| length.map_or("-".to_owned(), |length| format!("{length:.3} m"));
+        println!("{:<20} {:>10}", "flights", runs.len());
+        println!("{:<20} {:>10}", "with a collision", collided.len());
+        println!("{:<20} {:>10}", "all arrived", runs.iter().filter(|run| run.arrived).count());
+        println!("{:<20} {:>10}", "least separation", metres(separation_m));
+        println!("{:<20} {:>10}", "least clearance", metres(clearance_m));
+    }
+    Ok(collided.is_empty())
+}
+
+/// Every scenario with every seed, in that order whichever ends first.
+fn fly_all(args: &SeparationCampaign) -> anyhow::Result<Vec<Run>> {
+    let seeds = args.from..args.from + args.seeds;
+    let flights: Vec<(&str, u64)> = args
+        .scenarios
+        .iter()
+        .flat_map(|scenario| seeds.clone().map(move |seed| (scenario.as_str(), seed)))
+        .collect();
+    let (next, results) = (AtomicU64::new(0), Mutex::new(Vec::new()));
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    let work = || {
+        while let Some((at, (scenario, seed))) = {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            usize::try_from(at).ok().and_then(|at| Some((at, *flights.get(at)?)))
+        } {
+            let run = fly_one(args, scenario, seed);
+            let mut results = results.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            results.push((at, run));
+            tell(results.len(), flights.len());
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..args.jobs.unwrap_or(processors).max(1) {
+            scope.spawn(work);
+        }
+    });
+    let mut results = results.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    results.sort_by_key(|(at, _)| *at);
+    results.into_iter().map(|(_, run)| run).collect()
+}
+
+fn fly_one(args: &SeparationCampaign, scenario: &str, seed: u64) -> anyhow::Result<Run> {
+    let mut scenario = Scenario::built_in(scenario, Some(args.vehicles), seed)?;
+    scenario.network = Network { latency_ms: args.latency_ms, loss: args.loss };
+    scenario.validate()?;
+    fly::in_memory(&scenario).map(Run::of)
+}
+
+fn tell(done: usize, of: usize) {
+    let mut stderr = std::io::stderr().lock();
+    if stderr.is_terminal() {
+        // Nobody misses a line of progress that cannot be written.
+        let _ = write!(stderr, "\r{done} of {of} flights");
+        let _ = if done == of { writeln!(stderr) } else { stderr.flush() };
+    }
+}
