@@ -158,14 +158,6 @@ fn events_per_s(mut program: Program, cpu_time: Duration) -> anyhow::Result<f64>
     }
 }
 
-<<<<<<< HEAD
-/// CPU time of this thread so far.
-pub(crate) fn this_threads_cpu_time() -> anyhow::Result<Duration> {
-    Ok(clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID)?.into())
-}
-
-=======
->>>>>>> main
 /// What the verifier did.
 struct Verified {
     states: usize,

@@ -16,7 +16,6 @@ pub(crate) mod quantile;
 
 use std::time::Duration;
 
-pub(crate) use self::bp::this_threads_cpu_time;
 use crate::cli::Bench;
 
 /// Measures what the command line asks for, and prints it.

@@ -26,9 +26,6 @@ pub struct Experiment {
 }
 
 /// Every experiment.
-<<<<<<< HEAD
-pub const EXPERIMENTS: &[Experiment] = &[lsc::EXPERIMENT];
-=======
 pub const EXPERIMENTS: &[Experiment] = &[
     Experiment {
         name: "sphere",
@@ -40,8 +37,12 @@ pub const EXPERIMENTS: &[Experiment] = &[
         about: "D* with a collision factor on the marker grid, and re-planning by D* Lite (Zhang 2019)",
         run: dstar_grid::run,
     },
+    Experiment {
+        name: "lsc",
+        about: "LSC-DR's ten-agent missions in forests and dense mazes (Park 2022)",
+        run: lsc::run,
+    },
 ];
->>>>>>> main
 
 /// What the command line says to an experiment. What is not given is the experiment's own.
 #[derive(Debug, Clone, Default, PartialEq)]

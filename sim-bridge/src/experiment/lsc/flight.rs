@@ -17,7 +17,7 @@ use skein_world::{
 };
 
 use super::pilot::Pilot;
-use crate::bench::this_threads_cpu_time;
+use crate::cpu_time;
 use crate::mission::{LscAgent, LscMission};
 
 /// Cells of the lattice, as of the missions' starts and goals, m.
@@ -159,7 +159,6 @@ impl Flight {
             }
             self.deliver();
             let since = *hovered_since.get_or_insert(now);
-            if std::env::var("DBG").is_ok() && (now.as_millis() / 20) % 50 == 0 { eprintln!("{now:?} {}", self.pilots.iter().map(|p| p.dbg()).collect::<Vec<_>>().join(" ")); }
             if !all {
                 hovered_since = None;
             } else if now.saturating_sub(since) >= Duration::from_secs(1) {
@@ -215,11 +214,8 @@ impl Flight {
     /// A vehicle plans, and commits itself by one step.
     fn plan(&mut self, speaker: usize, step: u32) -> anyhow::Result<()> {
         let Some(pilot) = self.pilots.get_mut(speaker) else { return Ok(()) };
-        let began = this_threads_cpu_time()?;
-        if pilot.traveller.take_turn(step).is_some() {
-            let took = this_threads_cpu_time()? - began;
-            self.flown.plan_ms.push(took.as_secs_f64() * 1e3);
-        }
+        let (turn, took_ms) = cpu_time::measured_ms(|| pilot.traveller.take_turn(step))?;
+        self.flown.plan_ms.extend(turn.map(|_| took_ms));
         Ok(())
     }
 

@@ -12,13 +12,9 @@ use serde_json::{Value, json};
 use skein_world::{Aabb, Scene};
 
 use self::flight::{Flown, Space, fly};
-use super::{Bound, Experiment, Figure, Line, Options, Report, Style};
+use super::{Bound, Figure, Line, Options, Report, Style};
 use crate::mission::LscMission;
 use crate::scenario::read_world;
-
-/// The experiment.
-pub const EXPERIMENT: Experiment =
-    Experiment { name: "lsc", about: "LSC-DR's ten-agent missions in forests and dense mazes", run };
 
 /// Families of missions: their name, where missions and worlds are, and how many there are.
 const FAMILIES: [Family; 2] = [
@@ -44,7 +40,11 @@ struct Setting {
     scene: Scene,
 }
 
-fn run(options: &Options) -> anyhow::Result<Report> {
+/// Flies the missions, at the height of their starts and at any.
+///
+/// # Errors
+/// No folder of missions, or something wrong in one.
+pub fn run(options: &Options) -> anyhow::Result<Report> {
     let dir = options.dir.as_deref().context("say where LSC-DR's missions and worlds are with --dir")?;
     let settings = settings(dir, options.runs.unwrap_or(MISSIONS_PER_FAMILY))?;
     let planar = fly_all(&settings, Space::Planar)?;

@@ -66,7 +66,7 @@ impl Pilot {
             self.companion.command(now, command);
             self.asked = Some(now);
         }
-        let flies = telemetry_mode(&self.companion) == FlightMode::Offboard;
+        let flies = self.companion.telemetry().mode == FlightMode::Offboard;
         if flies || self.is_up() {
             self.steer(now, &Reference::resting(self.agent.start));
         }
@@ -100,7 +100,6 @@ impl Pilot {
         self.companion.set_point(now, set_point);
     }
 
-    pub fn dbg(&self) -> String { format!("[{:?} e{:.3} v{:.3} z{:.2}]", self.companion.telemetry().mode, self.tracker.error_m(), self.speed_m_s(), self.companion.telemetry().position.map_or(0.0, |p| p.value.z)) }
     fn is_up(&self) -> bool {
         let position = self.companion.telemetry().position;
         position.is_some_and(|position| (position.value.z - self.agent.start.z).abs() < 0.15)
@@ -114,8 +113,4 @@ impl Pilot {
     pub fn tracker(&self) -> &Tracker {
         &self.tracker
     }
-}
-
-fn telemetry_mode(companion: &Companion) -> FlightMode {
-    companion.telemetry().mode
 }
