@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use serde::Deserialize;
 use skein_bp::script::Assignment;
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
@@ -17,14 +18,26 @@ pub struct Fence {
     pub max: [f64; 3],
 }
 
-/// Which b-threads an agent runs.
+/// What decides on board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Controller {
     /// The behavioural program.
     #[default]
     Bp,
+    /// One loop around the same pipeline, without b-threads: see [`Sequential`](crate::sequential::Sequential).
+    Sequential,
     /// No b-thread at all: everything else runs, and nothing flies (Wang 2023, feasibility).
     None,
+}
+
+/// How a vehicle decides that it may enter a narrow passage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PassageRule {
+    /// It blocks everyone else's entering, and enters once all homes have confirmed that.
+    #[default]
+    Confirmed,
+    /// It enters when nobody is heard to be inside. Two may be inside at once: for comparison only.
+    Heard,
 }
 
 /// What the vehicle can do, and the distances it keeps.
@@ -60,6 +73,54 @@ impl Default for Envelope {
     }
 }
 
+/// What turns a path into the velocity to fly now.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LocalPlanner {
+    /// Pulled along the path, pushed away by what is near: [`apf`](skein_planning::local::apf).
+    #[default]
+    Apf,
+    /// Through openings, gently: [`vfh`](skein_planning::local::vfh).
+    Vfh,
+}
+
+impl LocalPlanner {
+    /// Its name in configuration files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Apf => "apf",
+            Self::Vfh => "vfh",
+        }
+    }
+}
+
+/// A part of the pipeline that can be left out, to see what it is good for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layer {
+    /// The path around what is known: straight to the waypoint instead.
+    GlobalPath,
+    /// What keeps the velocity off obstacles: straight along the path instead.
+    LocalAvoidance,
+    /// Repulsion between vehicles.
+    Repulsion,
+    /// The safety filter.
+    SafetyFilter,
+    /// Planning anew where no way is made.
+    Escape,
+    /// Right of way in narrow passages.
+    RightOfWay,
+}
+
+/// Which planners the pipeline is made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Planners {
+    /// The local planner.
+    pub local: LocalPlanner,
+    /// What is left out. For experiments alone: every layer is there for a reason.
+    pub without: Option<Layer>,
+}
+
 /// The configuration of one vehicle's agent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AgentConfig {
@@ -91,10 +152,14 @@ pub struct AgentConfig {
     pub fence: Fence,
     /// What the vehicle can do.
     pub envelope: Envelope,
+    /// How it plans.
+    pub planners: Planners,
     /// What to do without the ground station.
     pub link_loss: LinkLossPolicy,
-    /// Which b-threads to run.
+    /// What decides.
     pub controller: Controller,
+    /// How it shares narrow passages.
+    pub passage_rule: PassageRule,
     /// The scripts that run from the start.
     pub scripts: Vec<Assignment>,
     /// Lease of the bids this node sends.

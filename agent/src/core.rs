@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use skein_bp::script::Assignment;
-use skein_bp::{Event, EventSet, Program, ProgramConfig};
+use skein_bp::{Event, EventSet, Origin, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_mav::{Companion, CompanionConfig, Landed, SetPoint};
 use skein_planning::map::MapError;
@@ -28,6 +28,7 @@ use crate::{
     },
     precedence,
     scripts::{Circumstances, RunningScript, ScriptFacts, Scripts},
+    sequential::Sequential,
     verify::check_script,
     watches::Watches,
 };
@@ -53,6 +54,8 @@ const SURELY_DOWN_S: f64 = 45.0;
 /// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for between
 /// two ticks. `skein-agent verify --script` looks at all.
 const STATES_TRIED: usize = 500;
+/// Who requested what the sequential navigator does, in the trace.
+const SEQUENTIAL: &str = "sequential";
 /// A navigation cycle and a state message to the others begin this often.
 const CYCLE_PERIOD: Duration = Duration::from_millis(100);
 
@@ -132,6 +135,8 @@ pub struct AgentCore {
     name: NodeName,
     companion: Companion,
     node: NodeLink,
+    /// What decides in place of the node's program.
+    sequential: Option<Sequential>,
     neighbours: Neighbours,
     perception: Perception,
     watches: Watches,
@@ -214,13 +219,16 @@ impl AgentCore {
                 Some(store) => NodeLink::durable(Node::new(node_config, program), fleet, store),
                 None => NodeLink::new(Node::new(node_config, program), fleet),
             },
+            sequential: (config.controller == Controller::Sequential).then(|| {
+                Sequential::new(me.clone(), &config.waypoints, [home.x, home.y, config.return_altitude_m])
+            }),
             name: own_name,
             neighbours,
             perception: Perception::new(&config.fence, home, heights(&config))?,
             watches: Watches::new(me.clone()),
             failsafes: Failsafes::default(),
             flight: Flight::new(me.clone(), config.takeoff_height_m),
-            guidance: Guidance::new(config.envelope, config.fence),
+            guidance: Guidance::new(config.envelope, config.fence, config.planners),
             scripts,
             script_facts: ScriptFacts::default(),
             next_cycle: Duration::ZERO,
@@ -263,6 +271,7 @@ impl AgentCore {
         }
         let others: Vec<_> = self.neighbours.at(now).map(|neighbour| neighbour.position()).collect();
         self.perception.take_in(scan, &pose, &others);
+        self.guidance.look(scan.stamp, &pose.position, self.perception.returns(), scan.ranges_m.len());
     }
 
     /// The vehicle's estimated pose at a time near the newest telemetry.
@@ -288,7 +297,7 @@ impl AgentCore {
         self.follow_autopilot(now);
         self.watch(now, &neighbours);
         let report = self.guidance.go_on_planning(self.perception.map_mut());
-        self.hear_of_path(report);
+        self.hear_of_path(now, report);
         if now >= self.next_cycle {
             self.next_cycle = now + CYCLE_PERIOD;
             self.begin_cycle(now, &neighbours, link);
@@ -320,7 +329,7 @@ impl AgentCore {
             && let Some(event) = self.flight.wake(pause)
         {
             self.guidance.rest();
-            self.node.node_mut().enqueue(event);
+            self.report(now, event);
             // Before anything that was said meanwhile is heard.
             self.decide(now, &[]);
         }
@@ -331,11 +340,21 @@ impl AgentCore {
         while let Some(event) = self.companion.poll_event() {
             let autopilot = self.companion.telemetry().autopilot;
             self.failsafes.hear(&event, autopilot);
-            let heard = self.flight.hear(now, &event, &mut self.companion);
-            heard.into_iter().for_each(|event| self.node.node_mut().enqueue(event));
+            if let Some(event) = self.flight.hear(now, &event, &mut self.companion) {
+                self.report(now, event);
+            }
         }
-        let heard = self.flight.follow(now, &mut self.companion);
-        heard.into_iter().for_each(|event| self.node.node_mut().enqueue(event));
+        if let Some(event) = self.flight.follow(now, &mut self.companion) {
+            self.report(now, event);
+        }
+    }
+
+    /// Tells whoever decides what the vehicle's body has found out.
+    fn report(&mut self, now: Duration, event: Event) {
+        match &mut self.sequential {
+            Some(sequential) => sequential.hear(now, &event),
+            None => self.node.node_mut().enqueue(event),
+        }
     }
 
     fn watch(&mut self, now: Duration, neighbours: &[Neighbour]) {
@@ -358,7 +377,7 @@ impl AgentCore {
             events.extend(self.watches.separation(position.value, neighbours));
         }
         for event in events {
-            self.node.node_mut().enqueue(event);
+            self.report(now, event);
         }
     }
 
@@ -377,10 +396,10 @@ impl AgentCore {
         })
     }
 
-    /// Tells the program what came of a plan, if something did.
-    fn hear_of_path(&mut self, report: Option<Report>) {
+    /// Tells whoever decides what came of a plan, if something did.
+    fn hear_of_path(&mut self, now: Duration, report: Option<Report>) {
         if let Some(report) = report {
-            self.node.node_mut().enqueue(report.into_event(&self.me));
+            self.report(now, report.into_event(&self.me));
             self.script_facts.forget_path();
         }
     }
@@ -390,7 +409,7 @@ impl AgentCore {
         if let (FlightPhase::Flying, Some(motion)) = (self.flight.phase(), self.motion()) {
             let map = self.perception.map();
             for report in self.guidance.look_ahead(now, &motion, map, neighbours) {
-                self.node.node_mut().enqueue(report.into_event(&self.me));
+                self.report(now, report.into_event(&self.me));
             }
             self.tell_scripts(&motion, neighbours);
         }
@@ -413,15 +432,11 @@ impl AgentCore {
         }
     }
 
-    /// Lets the program decide until nothing new comes of it, and carries out what it selected.
+    /// Lets whoever decides do so until nothing new comes of it, and carries out what was decided.
     fn decide(&mut self, now: Duration, neighbours: &[Neighbour]) {
-        // Planning answers a selected event with a new one, which deserves its turn in the same tick.
+        // Planning answers a decision with a new report, which deserves its turn in the same tick.
         for _ in 0..4 {
-            if let Err(error) = self.node.node_mut().step(now) {
-                // Without fresh leave the vehicle hovers; its b-threads may yet recover.
-                self.fault = Some(error.to_string());
-            }
-            let selections = self.node.node_mut().take_selections();
+            let selections = self.decisions(now);
             if selections.is_empty() {
                 break;
             }
@@ -433,6 +448,27 @@ impl AgentCore {
             }
             self.selections.extend(selections);
         }
+    }
+
+    /// One step of whoever decides.
+    fn decisions(&mut self, now: Duration) -> Vec<Happened> {
+        if let Err(error) = self.node.node_mut().step(now) {
+            // Without fresh leave the vehicle hovers; its b-threads may yet recover.
+            self.fault = Some(error.to_string());
+        }
+        let selections = self.node.node_mut().take_selections();
+        let Some(sequential) = &mut self.sequential else { return selections };
+        let decided = sequential.step(now).into_iter().map(|event| Happened {
+            event,
+            home: self.name.clone(),
+            seq: 0,
+            term: 0,
+            origin: Origin::Internal,
+            requested_by: vec![SEQUENTIAL.into()],
+            choice: None,
+            at: now,
+        });
+        decided.collect()
     }
 
     fn carry_out(&mut self, now: Duration, event: &Event, neighbours: &[Neighbour]) {
@@ -450,7 +486,7 @@ impl AgentCore {
             Some(PLAN) => {
                 if let Some(motion) = self.motion() {
                     let report = self.guidance.plan(why, &motion, self.perception.map_mut(), neighbours);
-                    self.hear_of_path(report);
+                    self.hear_of_path(now, report);
                 }
             }
             Some(ADVANCE | HOMEWARD) => self.guidance.grant_leave(now),

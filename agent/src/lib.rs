@@ -14,11 +14,12 @@ mod neighbours;
 pub mod pipeline;
 pub mod precedence;
 pub mod scripts;
+pub mod sequential;
 pub mod verify;
 mod watches;
 
 pub use self::{
-    config::{AgentConfig, Controller, Envelope, Fence},
+    config::{AgentConfig, Controller, Envelope, Fence, Layer, LocalPlanner, PassageRule, Planners},
     core::{AgentCore, AgentError, Outcome, SetPointRecord, Status},
     flight::FlightPhase,
     me::Me,

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use skein_agent::{
-    AgentConfig, Controller, Envelope, Fence, Me,
+    AgentConfig, Controller, Envelope, Fence, Me, PassageRule, Planners,
     bthreads::{self, LinkLossPolicy},
     scripts::{Runner, Scripts},
 };
@@ -40,8 +40,10 @@ fn config() -> AgentConfig {
         lidar: true,
         fence: Fence { min: [-60.0, -60.0, -1.0], max: [60.0, 60.0, 20.0] },
         envelope: Envelope::default(),
+        planners: Planners::default(),
         link_loss: LinkLossPolicy::Continue,
         controller: Controller::Bp,
+        passage_rule: PassageRule::Confirmed,
         scripts: Vec::new(),
         lease: Duration::from_secs(1),
         authority: skein_wire::standard_authority(),

@@ -7,7 +7,9 @@ use std::time::Duration;
 use serde::Serialize;
 use serde_json::{Value, json};
 use skein_agent::verify::{Scene, SceneReport, VehicleVerifier, check_script};
-use skein_agent::{AgentConfig, AgentError, Controller, Envelope, Fence, bthreads::LinkLossPolicy};
+use skein_agent::{
+    AgentConfig, AgentError, Controller, Envelope, Fence, PassageRule, Planners, bthreads::LinkLossPolicy,
+};
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_bp::verify::ViolationKind;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
@@ -32,8 +34,10 @@ fn config() -> AgentConfig {
         lidar: true,
         fence: Fence { min: [-60.0, -60.0, -1.0], max: [60.0, 60.0, 20.0] },
         envelope: Envelope::default(),
+        planners: Planners::default(),
         link_loss: LinkLossPolicy::Return,
         controller: Controller::Bp,
+        passage_rule: PassageRule::Confirmed,
         scripts: Vec::new(),
         lease: Duration::from_secs(1),
         authority: skein_wire::standard_authority(),

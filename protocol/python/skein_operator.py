@@ -351,6 +351,8 @@ def hold(options, output, interrupted):
         held = [node for node in outboxes if outboxes[node].is_kept()]
         faults.update(outboxes.keys() - held)
 
+        # Said before it is done: whoever has not heard this sees vehicles that are held.
+        output.tell(f"lifting the hold of {', '.join(ordered(held)) or 'nobody'}", lifting=ordered(held))
         wanted = list(outboxes)
         for outbox in outboxes.values():
             outbox.state()

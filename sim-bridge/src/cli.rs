@@ -191,7 +191,8 @@ pub struct Fly {
     /// How many times faster than the clock on the wall; `--clock real` only.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
     pub speed: f64,
-    /// What decides on board: behavioural programs, or nothing (the vehicles stay where they are).
+    /// What decides on board: behavioural programs, one sequential loop that hears no orders, or nothing (the vehicles stay
+    /// where they are).
     #[arg(long, value_enum, default_value_t = Controller::Bp)]
     pub controller: Controller,
     /// Folder for summary.json and mission.mcap; made if missing.
@@ -454,6 +455,8 @@ pub enum Clock {
 pub enum Controller {
     /// Behavioural programs.
     Bp,
+    /// One loop around the same planners: the navigator without behavioural programming.
+    Sequential,
     /// The same vehicles with no b-threads loaded: nothing flies.
     None,
 }

@@ -212,7 +212,8 @@ impl Plan {
             .set("envelope", "latency_s", &envelope.latency_s)
             .set("envelope", "hull_m", &envelope.hull_m)
             .set("envelope", "margin_m", &envelope.margin_m)
-            .set("envelope", "separation_m", &envelope.separation_m);
+            .set("envelope", "separation_m", &envelope.separation_m)
+            .set("planners", "local", &agent.planners.local.name());
         let before =
             [WORLD_PORT, GROUND_PORT].into_iter().chain((0..index).map(|index| FIRST_VEHICLE_PORT + index));
         self.join(template, FIRST_VEHICLE_PORT + index, before.collect()).0
@@ -261,6 +262,7 @@ mod tests {
             assert_eq!(agent["mission"]["waypoints"].as_array().unwrap().len(), agents[1].waypoints.len());
             assert_eq!(agent["autopilot"]["link"].as_str(), Some("udp:127.0.0.1:14641"));
             assert_eq!(agent["envelope"].as_table().unwrap().len(), 7);
+            assert_eq!(agent["planners"]["local"].as_str(), Some("apf"));
             let ground: toml::Table = plan.ground(&agents, true, false).parse().unwrap();
             assert_eq!(ground["vehicles"].as_array().unwrap().len(), agents.len());
             assert_eq!(

@@ -121,8 +121,10 @@ def check_hold(folder, connect, watcher):
         expect(len(held) >= 2, f"only {held} are under way when they are held")
         watcher.wait_until("coming to a stop", HOLD_S, lambda: watcher.swarm.now_s() > began_s + STOPPING_S)
         stood = 0
-        while not hold.has_ended() and not hold.json_lines()[-1].get("lifted"):
+        while not hold.has_ended():
             watcher.look()
+            if "lifting" in hold.json_lines()[-1] or "lifted" in hold.json_lines()[-1]:
+                break
             for node in held:
                 speed, waiting_for = watcher.speed(node), watcher.states[node].waiting_for
                 expect(speed < STANDING_M_S, f"{node} moves at {speed:.2f} m/s while it is held")

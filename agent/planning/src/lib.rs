@@ -5,8 +5,11 @@
 //! path ([`global`]) -> velocity along it ([`local`]) -> velocity that keeps its distance ([`separation`]).
 //! [`passage`] finds the places that only one vehicle should be in.
 //!
-//! Nothing here reads a clock or draws a random number: the same inputs give the same outputs, bit for bit.
-//! Budgets count expansions. The world frame is ENU; metres, seconds, radians.
+//! What is known beforehand, an [`airspace`] of terrain and threats, is planned through before take-off: [`route`] by
+//! [`particle_swarm`], with [`assignment`] of vehicles to targets. [`coverage`] and [`formation`] make missions.
+//!
+//! Nothing here reads a clock, and random numbers come from a seed that is given: the same inputs give the same outputs,
+//! bit for bit. Budgets count expansions or evaluations. The world frame is ENU; metres, seconds, radians.
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -25,12 +28,18 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod airspace;
+pub mod assignment;
+pub mod coverage;
+pub mod formation;
 pub mod global;
 pub mod grid;
 pub mod local;
 pub mod map;
+pub mod particle_swarm;
 pub mod passage;
 mod path;
+pub mod route;
 pub mod separation;
 pub mod traffic;
 

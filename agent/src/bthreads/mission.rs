@@ -51,24 +51,23 @@ impl Mission {
     /// A mission over `waypoints` in metres ENU, the last being where the vehicle lands.
     #[must_use]
     pub fn new(me: Me, waypoints: &[[f64; 3]]) -> Self {
-        let last = waypoints.len().saturating_sub(1);
-        let goto = |(leg, &[x, y, z]): (usize, &[f64; 3])| {
-            let number = i64::try_from(leg).unwrap_or(i64::MAX);
-            me.event(GOTO)
-                .with("leg", number)
-                .with("lands", leg == last)
-                .with("x", x)
-                .with("y", y)
-                .with("z", z)
-        };
-        let waypoints = waypoints.iter().enumerate().map(goto).collect();
-        Self { me, waypoints, phase: Phase::Grounded }
+        Self { waypoints: gotos(&me, waypoints), me, phase: Phase::Grounded }
     }
 
     /// The phase that flies to waypoint `leg`, or lands after the last.
     fn towards(&self, leg: usize) -> Phase {
         if leg < self.waypoints.len() { Phase::Heading { leg } } else { Phase::Descending { failure: None } }
     }
+}
+
+/// The `goto` of each waypoint, in order; the vehicle lands at the last.
+pub(crate) fn gotos(me: &Me, waypoints: &[[f64; 3]]) -> Vec<Event> {
+    let last = waypoints.len().saturating_sub(1);
+    let goto = |(leg, &[x, y, z]): (usize, &[f64; 3])| {
+        let number = i64::try_from(leg).unwrap_or(i64::MAX);
+        me.event(GOTO).with("leg", number).with("lands", leg == last).with("x", x).with("y", y).with("z", z)
+    };
+    waypoints.iter().enumerate().map(goto).collect()
 }
 
 /// Why the vehicle is on its way down, as the event that sent it says.

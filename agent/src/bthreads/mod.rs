@@ -3,20 +3,20 @@
 //! Adding a b-thread: write its file, name it in [`load`]. No other b-thread changes.
 
 mod battery;
-mod escape;
+pub(crate) mod escape;
 mod found_airborne;
 mod geofence;
 mod link_loss;
-mod mission;
-mod navigation;
+pub(crate) mod mission;
+pub(crate) mod navigation;
 mod obstacle_avoidance;
 mod one_name;
 mod operator;
-mod path_planning;
+pub(crate) mod path_planning;
 mod pilot;
 mod preflight;
 mod reposition;
-mod return_home;
+pub(crate) mod return_home;
 mod right_of_way;
 mod separation;
 mod together;
@@ -38,11 +38,12 @@ pub use pilot::Pilot;
 pub use preflight::Preflight;
 pub use reposition::{OPERATOR_LEG, Reposition};
 pub use return_home::{HOME_LEG, ReturnHome};
-pub use right_of_way::{NAME as RIGHT_OF_WAY, RightOfWay};
+pub use right_of_way::{NAME as RIGHT_OF_WAY, NaiveRightOfWay, RightOfWay};
 pub use separation::Separation;
 pub use together::Together;
 
-use crate::{config::AgentConfig, me::Me};
+use crate::config::{AgentConfig, PassageRule};
+use crate::me::Me;
 
 /// Loads a vehicle's b-threads into its program.
 pub fn load(program: &mut Program, config: &AgentConfig) {
@@ -51,9 +52,14 @@ pub fn load(program: &mut Program, config: &AgentConfig) {
     program.add("pilot", Pilot::new(me.clone()));
     program.add("separation", Separation::new(me.clone()));
     program.add("obstacle_avoidance", ObstacleAvoidance::new(me.clone()));
-    let with_say = |node: &&String| node.starts_with("uav/") || **node == config.ground;
-    let others = config.roster.iter().filter(with_say).filter(|node| **node != config.node);
-    program.add(RIGHT_OF_WAY, RightOfWay::new(me.clone(), others.map(String::as_str)));
+    match config.passage_rule {
+        PassageRule::Confirmed => {
+            let with_say = |node: &&String| node.starts_with("uav/") || **node == config.ground;
+            let others = config.roster.iter().filter(with_say).filter(|node| **node != config.node);
+            program.add(RIGHT_OF_WAY, RightOfWay::new(me.clone(), others.map(String::as_str)))
+        }
+        PassageRule::Heard => program.add(RIGHT_OF_WAY, NaiveRightOfWay::new(me.clone())),
+    };
     program.add("preflight", Preflight::new(me.clone()));
     program.add("found_airborne", FoundAirborne::new(me.clone()));
     program.add("one_name", OneName::new(me.clone()));

@@ -40,21 +40,25 @@ enum Phase {
 impl ReturnHome {
     /// `home` is the point above the take-off place, metres ENU; its height is the vehicle's own return altitude.
     #[must_use]
-    pub fn new(me: Me, [x, y, z]: [f64; 3]) -> Self {
-        let home =
-            me.event(GOTO).with("leg", HOME_LEG).with("lands", true).with("x", x).with("y", y).with("z", z);
-        Self { me, home, phase: Phase::Grounded }
+    pub fn new(me: Me, home: [f64; 3]) -> Self {
+        Self { home: goto(&me, home), me, phase: Phase::Grounded }
     }
+}
+
+/// The `goto` to the point above the take-off place.
+pub(crate) fn goto(me: &Me, [x, y, z]: [f64; 3]) -> Event {
+    me.event(GOTO).with("leg", HOME_LEG).with("lands", true).with("x", x).with("y", y).with("z", z)
 }
 
 impl BThread for ReturnHome {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::BATTERY_LOW);
+        // Whatever was ordered on the ground is over then.
+        let bid = Bid::new().priority(precedence::BATTERY_LOW).wait_for(me.any(TAKEOFF));
         let grounded = me.any_of(&[LANDED, COMMAND_FAILED]);
         let over = grounded.clone().or(me.any(LAND));
         Some(match &self.phase {
-            Phase::Grounded => bid.wait_for(me.any_of(&[TAKEOFF, AIRBORNE, FOUND_AIRBORNE, HAND_BACK])),
+            Phase::Grounded => bid.wait_for(me.any_of(&[AIRBORNE, FOUND_AIRBORNE, HAND_BACK])),
             Phase::Away => bid.wait_for(me.any(RETURN)).wait_for(over),
             Phase::Turning { .. } => bid.request(self.home.clone()).wait_for(over),
             Phase::Returning { .. } => bid.wait_for(me.any(ARRIVED)).wait_for(over),
@@ -65,6 +69,7 @@ impl BThread for ReturnHome {
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         self.phase = match (self.phase.clone(), self.me.verb(event)) {
+            (_, Some(TAKEOFF)) => Phase::Away,
             (_, Some(LAND)) => Phase::Down,
             (_, Some(LANDED | COMMAND_FAILED)) => Phase::Grounded,
             (Phase::Away, _) => Phase::Turning { why: event.text("why").unwrap_or("return").to_owned() },

@@ -10,6 +10,8 @@
 //! confirmation of those who have lost it. So on a cut network one side at most goes on, and whoever was inside is
 //! waited for. Whoever has just heard another again first lets claims cross, for as long as it takes to repeat them.
 
+mod naive;
+
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -18,6 +20,7 @@ use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, PEER_JOINED, PEER_LOST, STALLED};
 use skein_wire::vocabulary::{ADVANCE, ENTER, HOMEWARD, LANDED, LEAVE, PASSAGE, of, of_every_vehicle};
 
+pub use self::naive::NaiveRightOfWay;
 use crate::{me::Me, precedence};
 
 /// The name under which this b-thread runs, as confirmations name it.
@@ -87,11 +90,6 @@ impl RightOfWay {
         EventSet::any_of(needed.map(|(node, _)| of(node, ENTER))).and(around(passage))
     }
 
-    fn enter(&self, passage: &Event) -> Event {
-        let [x, y, z] = centre(passage);
-        self.me.event(ENTER).with("x", x).with("y", y).with("z", z)
-    }
-
     /// Whether the vehicle `other` goes first when both claim: the lower number does.
     fn goes_before_me(&self, other: &str) -> bool {
         // Facts name a remote b-thread `node#bthread`.
@@ -132,6 +130,12 @@ fn around(passage: &Event) -> EventSet {
     EventSet::region(min, max)
 }
 
+/// `enter` into a passage.
+fn entering(me: &Me, passage: &Event) -> Event {
+    let [x, y, z] = centre(passage);
+    me.event(ENTER).with("x", x).with("y", y).with("z", z)
+}
+
 fn centre(passage: &Event) -> [f64; 3] {
     ["x", "y", "z"].map(|axis| passage.real(axis).unwrap_or_default())
 }
@@ -149,7 +153,7 @@ impl BThread for RightOfWay {
                 .wait_for(me.any(CONFIRMED))
                 .wait_for(gone),
             Phase::Entering { passage } => bid
-                .request(self.enter(passage))
+                .request(entering(me, passage))
                 .block(self.claim(passage))
                 .block(me.any_of(&[ADVANCE, HOMEWARD]))
                 .wait_for(me.any_of(&[STALLED, BLOCK_LAPSED]))

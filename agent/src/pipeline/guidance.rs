@@ -7,13 +7,9 @@ use skein_bp::Event;
 use skein_mav::SetPoint;
 use skein_planning::{
     Path,
-    global::{
-        Potential, PotentialObstacle,
-        astar::{self, Astar, AstarConfig, Disc, PlanError, Request},
-    },
+    global::{Potential, PotentialObstacle, astar::Disc},
     local::{
-        apf::{self, ApfConfig},
-        braking::{self, BrakingConfig},
+        apf,
         escape::{EscapeConfig, EscapeDetector, Verdict},
     },
     map::ClearanceMap,
@@ -24,16 +20,17 @@ use skein_wire::vocabulary::{ARRIVED, LEAVE, PASSAGE, PATH_BLOCKED, PLANNED, STU
 
 use super::evasion::{Evasion, Room, Way};
 use crate::{
-    config::{Envelope, Fence},
+    config::{Envelope, Fence, Layer, Planners},
     me::Me,
     neighbours::Neighbour,
-    pipeline::route_search::{ALLOWANCE, Found, RouteSearch, Task},
+    pipeline::{
+        local::Local,
+        route_search::{ALLOWANCE, Found, RouteSearch, Task},
+    },
 };
 
 /// Leave to move lasts for so long after an `advance`: a little more than two navigation cycles.
 const LEAVE_LASTS: Duration = Duration::from_millis(250);
-/// The set-point loop's period.
-const TICK_S: f64 = 0.02;
 /// The last waypoint is reached within this distance, m.
 const ARRIVAL_M: f64 = 0.35;
 /// Other waypoints are reached within this distance, m.
@@ -54,8 +51,6 @@ const AROUND_NEIGHBOURS_M: f64 = 8.0;
 const PLANAR_BAND_M: f64 = 0.4;
 /// Clearance that the safety filter keeps between hull and obstacles, m: less than paths do, so that it does not fight them.
 const OBSTACLE_MARGIN_M: f64 = 0.1;
-/// How far ahead the way is looked at for the speed cap, m.
-const SENSED_AHEAD_M: f64 = 9.0;
 /// Standard deviation of the vehicle's own position, m.
 const POSITION_SIGMA_M: f64 = 0.05;
 /// How far outside the ghost of a silent neighbour a path leads, m.
@@ -150,6 +145,7 @@ struct Following {
 pub struct Guidance {
     envelope: Envelope,
     fence: Fence,
+    planners: Planners,
     leg: Option<Leg>,
     following: Option<Following>,
     leave_until: Duration,
@@ -157,8 +153,7 @@ pub struct Guidance {
     passage: Option<Passage>,
     /// Where to hover while there is no leave to move.
     hover_at: Option<Vector3<f64>>,
-    speed_m_s: f64,
-    braking: BrakingConfig,
+    local: Local,
     filter: FilterConfig,
     escape: EscapeDetector,
     evasion: Evasion,
@@ -168,28 +163,23 @@ pub struct Guidance {
 }
 
 impl Guidance {
-    /// Guidance for a vehicle of this envelope inside this fence.
+    /// Guidance for a vehicle of this envelope inside this fence, by these planners.
     #[must_use]
-    pub fn new(envelope: Envelope, fence: Fence) -> Self {
+    pub fn new(envelope: Envelope, fence: Fence, planners: Planners) -> Self {
+        let obstacle_clearance_m = envelope.hull_m + OBSTACLE_MARGIN_M;
         Self {
             envelope,
             fence,
+            planners,
             leg: None,
             following: None,
             leave_until: Duration::ZERO,
             passage: None,
             hover_at: None,
-            speed_m_s: 0.0,
-            braking: BrakingConfig {
-                cruise_m_s: envelope.cruise_m_s,
-                decel_m_s2: envelope.brake_m_s2,
-                accel_m_s2: envelope.brake_m_s2,
-                latency_s: envelope.latency_s,
-                ..BrakingConfig::default()
-            },
+            local: Local::new(&envelope, planners, obstacle_clearance_m),
             filter: FilterConfig {
                 separation_m: envelope.separation_m,
-                obstacle_clearance_m: envelope.hull_m + OBSTACLE_MARGIN_M,
+                obstacle_clearance_m,
                 max_speed_m_s: envelope.cruise_m_s,
                 decel_m_s2: envelope.brake_m_s2,
                 latency_s: envelope.latency_s,
@@ -225,7 +215,12 @@ impl Guidance {
     /// Somebody else moves the vehicle, or nobody: whatever place it hovered at is not its place any more.
     pub fn rest(&mut self) {
         self.hover_at = None;
-        self.speed_m_s = 0.0;
+        self.local.rest();
+    }
+
+    /// Takes in the obstacle points of a scan of `rays` rays that was taken at `stamp` and `origin`; metres ENU.
+    pub fn look(&mut self, stamp: Duration, origin: &Vector3<f64>, returns: &[Vector3<f64>], rays: usize) {
+        self.local.look(stamp, origin, returns, rays);
     }
 
     /// The flight is over.
@@ -280,6 +275,11 @@ impl Guidance {
         // Outside the map, as beyond the fence, the way begins where the map does.
         let is_inside = map.voxels().index_of(&motion.position).is_some();
         let start = if is_inside { motion.position } else { map.voxels().clamp(&motion.position) };
+        if self.planners.without == Some(Layer::GlobalPath)
+            && let Some(path) = Path::new(vec![start, target])
+        {
+            return Some(self.take_up(leg.number, Found { path, clearance_m: 0.0 }));
+        }
         let standing: Vec<Vector3<f64>> = neighbours
             .iter()
             .filter(|neighbour| neighbour.armed && neighbour.track.cooperative)
@@ -332,17 +332,19 @@ impl Guidance {
     fn search(&mut self, map: &mut ClearanceMap) -> Option<Report> {
         let (leg, found) = self.routes.advance(map, &mut self.allowance)?;
         Some(match found {
-            Ok(Found { path, clearance_m }) => {
-                let length_m = path.length_m();
-                self.following = Some(Following { path, clearance_m, station_m: 0.0, blocked: false });
-                self.escape.reset();
-                Report::Planned { leg, length_m }
-            }
+            Ok(found) => self.take_up(leg, found),
             Err(error) => {
                 self.following = None;
                 Report::Unplannable { leg, why: error.to_string() }
             }
         })
+    }
+
+    fn take_up(&mut self, leg: i64, Found { path, clearance_m }: Found) -> Report {
+        let length_m = path.length_m();
+        self.following = Some(Following { path, clearance_m, station_m: 0.0, blocked: false });
+        self.escape.reset();
+        Report::Planned { leg, length_m }
     }
 
     /// Looks along the path; once in each navigation cycle.
@@ -380,7 +382,8 @@ impl Guidance {
     }
 
     fn check_path(&mut self, motion: &Motion, map: &ClearanceMap) -> Option<Report> {
-        let following = self.following.as_mut().filter(|following| !following.blocked)?;
+        let plans = self.planners.without != Some(Layer::GlobalPath);
+        let following = self.following.as_mut().filter(|following| plans && !following.blocked)?;
         // Less than what was planned with, so that a voxel more or less does not make a new plan.
         let clearance_m = (following.clearance_m - REPLAN_SLACK_M).max(0.0);
         let here = following.path.point_at(following.station_m);
@@ -401,6 +404,9 @@ impl Guidance {
     }
 
     fn check_passage(&mut self, motion: &Motion, map: &ClearanceMap) -> Option<Report> {
+        if self.planners.without == Some(Layer::RightOfWay) {
+            return None;
+        }
         if let Some(passage) = self.passage {
             let offset = motion.position - passage.centre;
             let is_past = offset.dot(&passage.direction) > PASSAGE_BEHIND_M;
@@ -428,7 +434,7 @@ impl Guidance {
     }
 
     fn check_progress(&mut self, now: Duration, has_leave: bool) -> Option<Report> {
-        let waits = self.leg.is_none_or(|leg| leg.arrived);
+        let waits = self.leg.is_none_or(|leg| leg.arrived) || self.planners.without == Some(Layer::Escape);
         let Some(following) = self.following.as_ref().filter(|_| has_leave && !waits) else {
             self.escape.reset();
             return None;
@@ -440,37 +446,56 @@ impl Guidance {
     pub fn steer(&mut self, now: Duration, motion: &Motion, surroundings: &Surroundings<'_>) -> SetPoint {
         let wish =
             self.along_path(now, motion, surroundings.map).unwrap_or_else(|| self.keep_station(motion));
-        let push =
-            repulsion(&motion.position, &wish.velocity, surroundings.neighbours, &RepulsionConfig::default());
+        let unheard = self.local.moving(now, surroundings.map);
+        let others: Vec<_> = surroundings.neighbours.iter().copied().chain(unheard).collect();
+        let push = match self.planners.without {
+            Some(Layer::Repulsion) => Vector3::zeros(),
+            _ => repulsion(&motion.position, &wish.velocity, &others, &RepulsionConfig::default()),
+        };
         let is_level = (wish.height_m - motion.position.z).abs() < PLANAR_BAND_M;
         let mut desired = apf::limited(wish.velocity + push, self.envelope.cruise_m_s);
         desired.z =
             if is_level { 0.0 } else { desired.z.clamp(-self.envelope.climb_m_s, self.envelope.climb_m_s) };
+        let has_leave = now <= self.leave_until;
         let request = separation::Motion {
             position: motion.position,
             velocity: motion.velocity,
             sigma_m: POSITION_SIGMA_M,
-            desired,
+            desired: if has_leave { self.local.ease(desired) } else { desired },
             planar: is_level,
         };
-        let obstacles: Vec<_> =
-            surroundings.obstacles.iter().copied().chain(self.fence_ahead(motion.position)).collect();
-        let filtered = filter(&request, surroundings.neighbours, &obstacles, &self.filter);
-        let clearance_m = self.filter.obstacle_clearance_m;
-        let room = || room(motion.position, surroundings.map, clearance_m);
-        if let Some(way) = self.evasion.decide(now, &filtered.outcome, surroundings.rank, room) {
-            let mut desired = filtered.velocity;
-            desired.z = way.sign() * self.envelope.climb_m_s;
-            let request = separation::Motion { desired, planar: false, ..request };
-            let velocity = filter(&request, surroundings.neighbours, &obstacles, &self.filter).velocity;
-            return SetPoint::Velocity { velocity, yaw: None };
-        }
-        let safe = filtered.velocity;
-        if is_level {
-            SetPoint::Planar { vx: safe.x, vy: safe.y, z: wish.height_m, yaw: None }
+        let Kept { velocity, evades } = self.keep_apart(now, request, &others, surroundings);
+        self.local.flew(&velocity);
+        if is_level && !evades {
+            SetPoint::Planar { vx: velocity.x, vy: velocity.y, z: wish.height_m, yaw: None }
         } else {
-            SetPoint::Velocity { velocity: safe, yaw: None }
+            SetPoint::Velocity { velocity, yaw: None }
         }
+    }
+
+    /// The velocity nearest to the one desired that keeps all distances, or the way out of where none does.
+    fn keep_apart(
+        &mut self,
+        now: Duration,
+        request: separation::Motion,
+        others: &[separation::Neighbour],
+        surroundings: &Surroundings<'_>,
+    ) -> Kept {
+        if self.planners.without == Some(Layer::SafetyFilter) {
+            return Kept { velocity: request.desired, evades: false };
+        }
+        let obstacles: Vec<_> =
+            surroundings.obstacles.iter().copied().chain(self.fence_ahead(request.position)).collect();
+        let filtered = filter(&request, others, &obstacles, &self.filter);
+        let clearance_m = self.filter.obstacle_clearance_m;
+        let room = || room(request.position, surroundings.map, clearance_m);
+        let Some(way) = self.evasion.decide(now, &filtered.outcome, surroundings.rank, room) else {
+            return Kept { velocity: filtered.velocity, evades: false };
+        };
+        let mut desired = filtered.velocity;
+        desired.z = way.sign() * self.envelope.climb_m_s;
+        let request = separation::Motion { desired, planar: false, ..request };
+        Kept { velocity: filter(&request, others, &obstacles, &self.filter).velocity, evades: true }
     }
 
     /// Along the path; `None` without path or leave.
@@ -479,34 +504,19 @@ impl Guidance {
         let following =
             self.following.as_mut().filter(|following| now <= self.leave_until && !following.blocked)?;
         self.hover_at = None;
-        let ahead = following.path.direction_at(following.station_m);
-        let sensed_free_m = map.voxels().sensed_free_m(&motion.position, &ahead, SENSED_AHEAD_M);
-        let (cap, _) = braking::speed_cap(&following.path, following.station_m, sensed_free_m, &self.braking);
-        self.speed_m_s = braking::ramp(self.speed_m_s, cap, TICK_S, &self.braking);
         let attraction = self.escape.attraction();
-        let step = apf::follow(
-            map,
-            &following.path,
-            following.station_m,
-            &motion.position,
-            self.speed_m_s,
-            attraction,
-            &ApfConfig::default(),
-        );
+        let step = self.local.follow(&following.path, following.station_m, &motion.position, attraction, map);
         following.station_m = step.station_m;
         Some(Wish { velocity: step.velocity, height_m: step.carrot.z })
     }
 
     /// At the place where the vehicle came to a stop, or to where others have pushed it.
     fn keep_station(&mut self, motion: &Motion) -> Wish {
-        self.speed_m_s = 0.0;
+        self.local.pause();
         let place = self
             .hover_at
             .filter(|place| (place - motion.position).norm() < GIVES_WAY_M)
-            .unwrap_or_else(|| {
-                let speed = motion.velocity.norm();
-                motion.position + motion.velocity * (speed / (2.0 * self.braking.decel_m_s2)).min(1.0)
-            });
+            .unwrap_or_else(|| self.local.stop(&motion.position, &motion.velocity));
         self.hover_at = Some(place);
         let back = apf::limited(place - motion.position, STATION_KEEPING_M_S);
         Wish { velocity: back, height_m: place.z }
@@ -541,6 +551,13 @@ fn room(position: Vector3<f64>, map: &ClearanceMap, clearance_m: f64) -> Room {
 struct Wish {
     velocity: Vector3<f64>,
     height_m: f64,
+}
+
+/// The velocity that is flown (ENU, m/s), and whether it leads off the height out of where no distance can be kept.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    velocity: Vector3<f64>,
+    evades: bool,
 }
 
 /// What is around the vehicle now.

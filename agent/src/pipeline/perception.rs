@@ -65,6 +65,7 @@ pub struct Perception {
     last_scan: Option<Duration>,
     ends: Vec<RayEnd>,
     near: Vec<Vector3<f64>>,
+    returns: Vec<Vector3<f64>>,
     ground_m: f64,
     rolls: bool,
     /// Which of the far rays the newest scan followed.
@@ -100,6 +101,7 @@ impl Perception {
             last_scan: None,
             ends: Vec::new(),
             near: Vec::new(),
+            returns: Vec::new(),
             ground_m: config.ground_m,
             rolls,
             far_ray: 0,
@@ -123,6 +125,13 @@ impl Perception {
         &self.near
     }
 
+    /// All obstacle points within the range of the map, of the newest scan; metres ENU. Neither neighbours are among them nor the
+    /// ground, which a beam meets when the vehicle pitches.
+    #[must_use]
+    pub fn returns(&self) -> &[Vector3<f64>] {
+        &self.returns
+    }
+
     /// When the newest scan was taken.
     #[must_use]
     pub fn last_scan(&self) -> Option<Duration> {
@@ -133,6 +142,7 @@ impl Perception {
     pub fn take_in(&mut self, scan: &Scan, pose: &Pose, neighbours: &[Vector3<f64>]) {
         self.last_scan = Some(scan.stamp);
         self.ends.clear();
+        self.returns.clear();
         let mut near = Sectors::new(pose.position);
         let to_world = pose.attitude.to_rotation_matrix();
         self.far_ray = (self.far_ray + 1) % FAR_RAYS;
@@ -157,8 +167,11 @@ impl Perception {
                 self.ends.push(RayEnd { point, hit: false });
                 continue;
             }
-            if hit && range < NEAR_M && point.z > self.ground_m {
-                near.add(point);
+            if hit && range < MAP_RANGE_M && point.z > self.ground_m {
+                self.returns.push(point);
+                if range < NEAR_M {
+                    near.add(point);
+                }
             }
             self.ends.push(RayEnd { point, hit });
         }
@@ -177,5 +190,56 @@ impl Perception {
             self.map.recentre(&pose.position);
         }
         self.map.integrate(pose.position, &self.ends);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What 720 rays return over flat ground, and of a wall across the way ahead.
+    fn scan(pose: &Pose, wall_m: f64) -> Scan {
+        let angle_step = std::f64::consts::TAU / 720.0;
+        let range = |ray: u32| {
+            let (sin, cos) = (f64::from(ray) * angle_step).sin_cos();
+            let direction = pose.attitude * Vector3::new(cos, sin, 0.0);
+            let ground = if direction.z < 0.0 { pose.position.z / -direction.z } else { f64::INFINITY };
+            let wall =
+                if direction.x > 0.0 { (wall_m - pose.position.x) / direction.x } else { f64::INFINITY };
+            ground.min(wall) as f32
+        };
+        Scan {
+            stamp: Duration::ZERO,
+            angle_min: 0.0,
+            angle_step,
+            max_range_m: 40.0,
+            ranges_m: (0..720).map(range).collect(),
+            up_m: None,
+            down_m: None,
+        }
+    }
+
+    fn seen(height_m: f64, pitch_deg: f64, wall_m: f64) -> Vec<Vector3<f64>> {
+        let fence = Fence { min: [-30.0, -30.0, -1.0], max: [30.0, 30.0, 10.0] };
+        let mut perception = Perception::new(&fence, Vector3::zeros(), [0.6, 5.0]).unwrap();
+        let pose = Pose {
+            position: Vector3::new(0.0, 0.0, height_m),
+            attitude: UnitQuaternion::from_euler_angles(0.0, pitch_deg.to_radians(), 0.0),
+        };
+        perception.take_in(&scan(&pose, wall_m), &pose, &[]);
+        perception.returns().to_vec()
+    }
+
+    #[test]
+    fn the_ground_that_a_pitched_beam_meets_is_no_obstacle() {
+        // Nose down by 12 degrees at 0.9 m, beams meet the ground 4.3 m ahead.
+        assert!(seen(0.9, 12.0, 100.0).is_empty());
+        assert!(!seen(0.9, 12.0, 2.0).is_empty(), "but a wall is");
+    }
+
+    #[test]
+    fn what_is_far_away_is_not_among_the_returns() {
+        assert!(seen(3.0, 0.0, 12.0).is_empty());
+        assert!(seen(3.0, 0.0, 4.0).iter().all(|point| point.z > 2.0));
     }
 }

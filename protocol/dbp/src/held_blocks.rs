@@ -27,6 +27,8 @@ pub(crate) struct Block {
     pub(crate) on_loss: OnLoss,
     /// The homes that it concerns.
     pub(crate) homes: Vec<NodeName>,
+    /// Whether its holder waits to be told that it holds, be it that no other home is concerned.
+    pub(crate) is_awaited: bool,
 }
 
 /// What the holder may rely on.
@@ -70,6 +72,12 @@ impl HeldBlocks {
         self.0.get(bthread).map(|held| (held.sync, &*held.block.homes))
     }
 
+    /// Whether `bthread` was told that its block holds, and `set` is what it blocked then, or a part of it.
+    pub(crate) fn is_relied_on(&self, bthread: &str, set: &EventSet) -> bool {
+        let relied_on = self.0.get(bthread).filter(|held| held.standing != Standing::Unsure);
+        relied_on.is_some_and(|held| !set.is_none() && set.is_within(&held.block.set))
+    }
+
     /// Forgets all b-threads but these, at these synchronisation points.
     pub(crate) fn retain(&mut self, stated: &BTreeMap<String, u64>) {
         self.0.retain(|bthread, held| stated.get(bthread) == Some(&held.sync));
@@ -86,6 +94,7 @@ impl HeldBlocks {
             let at = |home: &NodeName| upheld(home, bthread, held.sync).filter(|upheld| now < upheld.until);
             let homes = &held.block.homes;
             let unsure = homes.iter().find(|home| at(home).is_none());
+            let concerns_anyone = held.block.is_awaited || !homes.is_empty();
             let acknowledged = || homes.iter().all(|home| at(home).is_some_and(|upheld| upheld.acknowledged));
             let (bthread, sync) = (bthread.clone(), held.sync);
             held.standing = match (held.standing, unsure) {
@@ -93,7 +102,7 @@ impl HeldBlocks {
                     news.push(BlockNews::Lapsed { bthread, home: home.clone() });
                     Standing::Unsure
                 }
-                (Standing::Unsure | Standing::Inherited, None) if acknowledged() => {
+                (Standing::Unsure | Standing::Inherited, None) if concerns_anyone && acknowledged() => {
                     news.push(BlockNews::Confirmed { bthread, sync });
                     Standing::Confirmed
                 }
@@ -135,7 +144,12 @@ mod tests {
     }
 
     fn block(set: &str) -> Block {
-        Block { set: EventSet::from(set), on_loss: OnLoss::Release, homes: homes().to_vec() }
+        Block {
+            set: EventSet::from(set),
+            on_loss: OnLoss::Release,
+            homes: homes().to_vec(),
+            is_awaited: false,
+        }
     }
 
     /// A block of both homes.

@@ -29,7 +29,7 @@ pub struct Kept {
 pub struct KeptBlock {
     /// The holder's node.
     pub node: NodeName,
-    /// The life of that node in which the block was stated.
+    /// The life of that node in which the block was stated last, or another of its lives that have ended.
     pub incarnation: u64,
     /// The holder.
     pub bthread: String,

@@ -142,11 +142,14 @@ impl BidTable {
     /// A table with the blocks that a former life of this home has kept, and the proxies that stand for them.
     pub(crate) fn new(incarnation: u64, rights: Rights, kept: Vec<KeptBlock>) -> (Self, Vec<ProxyChange>) {
         let mut bidders: BTreeMap<NodeName, Bidder> = BTreeMap::new();
+        for KeptBlock { node, incarnation, .. } in &kept {
+            let bidder = bidders.entry(node.clone()).or_default();
+            bidder.incarnation = bidder.incarnation.max(*incarnation);
+        }
         for KeptBlock { node, incarnation, bthread, sync, block } in kept {
             let bidder = bidders.entry(node).or_default();
-            bidder.incarnation = incarnation;
-            let asked_block = block.clone();
-            bidder.bids.insert(bthread, TakenBid { sync, block, asked_block, ..TakenBid::kept() });
+            let (asked_block, orphaned) = (block.clone(), incarnation < bidder.incarnation);
+            bidder.bids.insert(bthread, TakenBid { sync, block, asked_block, orphaned, ..TakenBid::kept() });
         }
         let nothing = BTreeMap::new();
         let proxies =
@@ -164,7 +167,8 @@ impl BidTable {
         let blocks = self.bidders.iter().flat_map(|(node, bidder)| {
             bidder.bids.iter().filter(|(_, bid)| bid.keep).map(|(bthread, bid)| KeptBlock {
                 node: node.clone(),
-                incarnation: bidder.incarnation,
+                // Of the lives that have ended, one is as good as another.
+                incarnation: bidder.incarnation.saturating_sub(u64::from(bid.orphaned)),
                 bthread: bthread.clone(),
                 sync: bid.sync,
                 block: bid.block.clone(),
@@ -554,8 +558,9 @@ fn joined(more: &EventSet, set: &EventSet) -> EventSet {
 }
 
 /// What of these bids must outlive this home's life.
-fn kept_blocks(bids: &BTreeMap<String, TakenBid>) -> impl Iterator<Item = (&String, u64, &EventSet)> {
-    bids.iter().filter(|(_, bid)| bid.keep).map(|(bthread, bid)| (bthread, bid.sync, &bid.block))
+fn kept_blocks(bids: &BTreeMap<String, TakenBid>) -> impl Iterator<Item = (&String, u64, bool, &EventSet)> {
+    let kept = bids.iter().filter(|(_, bid)| bid.keep);
+    kept.map(|(bthread, bid)| (bthread, bid.sync, bid.orphaned, &bid.block))
 }
 
 /// How the proxies of `node` change from one set of bids to the next.

@@ -42,8 +42,10 @@ fn nodes_pass_a_gate_by_turns() {
     holds(&network, Faults { delay: true, ..NONE });
     let lapsing = holds(&network, Faults { lapses: 1, ..NONE });
     let restarting = holds(&network, Faults { restarts: 1, ..NONE });
+    let repeating = holds(&network, Faults { repeats: 1, ..NONE });
+    let parting = holds(&network, Faults { partitions: 1, ..NONE });
     // Faults add behaviour.
-    assert!([lapsing, restarting].iter().all(|report| report.states > calm.states));
+    assert!([lapsing, restarting, repeating, parting].iter().all(|report| report.states > calm.states));
 }
 
 #[test]
@@ -136,6 +138,44 @@ fn two_are_inside_where_a_lapsed_block_is_not_heeded() {
     let report = network.verifier(Faults { lapses: 1, ..NONE }).run();
     assert!(report.verdict.is_some(), "{report}");
     assert!(trace(&report).iter().any(|step| step.contains("lets go of what")), "{report}");
+    // A partition lets leases lapse that would not by themselves.
+    let (report, moves) = network.verifier(Faults { partitions: 1, ..NONE }).run_and_count();
+    assert!(report.verdict.is_some(), "{report}");
+    assert!(trace(&report).iter().any(|step| step.contains("are cut off from one another")), "{report}");
+    assert!(moves["partition"] > 0 && moves["lapse"] > 0 && !moves.contains_key("restart"), "{moves:?}");
+}
+
+#[test]
+fn a_hold_that_is_counted_on_holds_through_a_partition_and_a_repetition() {
+    for network in [programs::hold().unwrap(), programs::kept_hold().unwrap()] {
+        holds(&network, Faults { partitions: 1, ..NONE });
+        holds(&network, Faults { repeats: 1, delay: true, ..NONE });
+    }
+}
+
+/// A block that is stated to outlive its holder is there in its home's next life; another is not.
+#[test]
+fn only_a_kept_hold_survives_the_restart_of_its_home() {
+    let survives = |mut network: Network| {
+        let lost = |view: &NetworkView<'_>| {
+            let [ground, uav] = ["ground/main", "uav/1"].map(|node| view.program(node).unwrap());
+            let was_confirmed = ground.bids().any(|(name, _, sync)| name == "trust" && sync > 1);
+            let is_held = uav.blockers(&"uav/1/advance".into()).next().is_some();
+            if was_confirmed && !is_held { Err("let go".to_owned()) } else { Ok(()) }
+        };
+        network.requirement = Some(("once confirmed, it stays", Arc::new(lost)));
+        network.verifier(Faults { restarts: 1, ..NONE }).run().verdict.is_none()
+    };
+    assert!(survives(programs::kept_hold().unwrap()));
+    assert!(!survives(programs::hold().unwrap()));
+}
+
+#[test]
+fn programs_have_names_of_their_own() {
+    let all = programs::all().unwrap();
+    let names: std::collections::BTreeSet<&str> = all.iter().map(|network| network.name).collect();
+    assert_eq!(names.len(), all.len());
+    assert!(all.iter().any(|network| !network.is_sound), "nothing shows that faults are found");
 }
 
 #[test]

@@ -292,6 +292,37 @@ fn a_home_that_comes_into_the_roster_makes_a_confirmed_block_unsure_until_it_has
 }
 
 #[test]
+fn a_block_whose_only_home_leaves_the_roster_and_comes_back_is_unsure_until_that_has_heard_of_it() {
+    let mut swarm = fleet_with_roster(Bid::new().block("uav/3/step"));
+    order(&mut swarm, 2, &["uav/1", "uav/2"]);
+    swarm.run(2 * LEASE);
+    let told = |swarm: &Swarm, fact: &str| swarm.saw(HOLDER, fact).count();
+    let before = told(&swarm, "ground/main/confirmed");
+    assert_eq!(told(&swarm, "ground/main/block_lapsed"), 0);
+    order(&mut swarm, 3, &HOMES);
+    swarm.run(LEASE);
+    assert_eq!(told(&swarm, "ground/main/block_lapsed"), 1);
+    assert_eq!(told(&swarm, "ground/main/confirmed"), before + 1);
+}
+
+#[test]
+fn who_moves_on_with_a_block_while_its_home_is_out_of_the_roster_is_told_when_that_comes_back_and_not_before()
+{
+    let mut swarm = fleet_with_roster(Bid::new().block("uav/3/step").wait_for("ground/main/tick"));
+    order(&mut swarm, 2, &["uav/1", "uav/2"]);
+    swarm.run(LEASE);
+    let told = |swarm: &Swarm, fact: &str| swarm.saw(HOLDER, fact).count();
+    let before = told(&swarm, "ground/main/confirmed");
+    swarm.node(HOLDER).enqueue("ground/main/tick");
+    swarm.run(LEASE);
+    assert_eq!(told(&swarm, "ground/main/confirmed"), before, "there is nobody to confirm it");
+    order(&mut swarm, 3, &HOMES);
+    swarm.run(LEASE);
+    assert_eq!(told(&swarm, "ground/main/block_lapsed"), 1);
+    assert_eq!(told(&swarm, "ground/main/confirmed"), before + 1);
+}
+
+#[test]
 fn an_acknowledgement_from_before_the_home_came_back_into_the_roster_confirms_nothing() {
     // What is requested there goes on, whoever is in the roster, and is acknowledged.
     let mut swarm = fleet_with_roster(Bid::new().request("uav/3/never").block("uav/3/step"));

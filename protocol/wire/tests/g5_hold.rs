@@ -177,6 +177,39 @@ fn a_holder_that_lives_withdraws_it_from_a_home_that_has_restarted() {
 }
 
 #[test]
+fn a_new_life_that_has_taken_it_over_withdraws_it_while_the_home_is_down() {
+    let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
+    start_home(&mut swarm, 1, 1);
+    start_holder(&mut swarm, 1, Bid::new().hold_when_lost(), NEVER);
+    swarm.run(2 * LEASE);
+    start_holder(&mut swarm, 2, Bid::new().hold_when_lost(), 5 * LEASE);
+    let lost = swarm.now;
+    swarm.run(2 * LEASE);
+    assert_eq!(steps_since(&swarm, lost), 0, "the new life holds it too");
+    swarm.crash("uav/1");
+    swarm.run(4 * LEASE);
+    start_home(&mut swarm, 2, 1);
+    swarm.run(2 * LEASE);
+    assert!(steps_since(&swarm, lost) > 0, "its holder withdrew it in vain");
+}
+
+#[test]
+fn what_a_former_life_has_left_stays_through_a_restart_of_the_home_beside_what_the_present_one_holds() {
+    let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
+    start_home(&mut swarm, 1, 1);
+    start_holder(&mut swarm, 1, Bid::new().hold_when_lost(), NEVER);
+    swarm.run(2 * LEASE);
+    let mut ground = program(1);
+    ground.add("other", Always(Bid::new().block("uav/1/turn").hold_when_lost()));
+    swarm.start("ground/main", 2, ground);
+    let lost = swarm.now;
+    swarm.run(2 * LEASE);
+    start_home(&mut swarm, 2, 1);
+    swarm.run(2 * LEASE);
+    assert_eq!(steps_since(&swarm, lost), 0, "a life that never stated it has withdrawn it");
+}
+
+#[test]
 fn what_an_authority_has_lifted_stays_lifted_while_its_holder_moves_on_with_it() {
     let mut swarm = Swarm::new(&ROSTER, NetworkConfig::default(), 1);
     start_home(&mut swarm, 1, 1);

@@ -130,7 +130,7 @@ impl<'a> Flight<'a> {
             scene,
             me: Me::new(&config.node),
             perception: Perception::new(&config.fence, home, [0.6, 2.0 * HEIGHT_M])?,
-            guidance: Guidance::new(config.envelope, config.fence),
+            guidance: Guidance::new(config.envelope, config.fence, config.planners),
             filter: FilterConfig { max_speed_m_s: config.envelope.cruise_m_s, ..FilterConfig::default() },
             motion: Motion { position, velocity: Vector3::zeros() },
             rng: ChaCha8Rng::seed_from_u64(seed),

@@ -2,11 +2,20 @@
 //!
 //! An experiment is a file here, named in [`EXPERIMENTS`].
 
+mod ablation;
+mod circle;
 mod dstar_grid;
+mod feasibility;
 mod figure;
 mod lsc;
+mod performance;
 mod report;
+mod right_of_way;
+mod runs;
 mod sphere;
+mod statistics;
+mod swarm_planning;
+mod vfh;
 
 use std::path::PathBuf;
 
@@ -28,6 +37,36 @@ pub struct Experiment {
 /// Every experiment.
 pub const EXPERIMENTS: &[Experiment] = &[
     Experiment {
+        name: "feasibility",
+        about: "whether it navigates: b-threads loaded or not, obstacles or none (Wang 2023, table 1)",
+        run: feasibility::run,
+    },
+    Experiment {
+        name: "performance",
+        about: "b-threads against one sequential loop in 500 random worlds (Wang 2023, table 2)",
+        run: performance::run,
+    },
+    Experiment {
+        name: "vfh",
+        about: "dense cylinders by vector field histogram, at a speed that follows the scene (Xu 2023)",
+        run: vfh::run,
+    },
+    Experiment {
+        name: "circle",
+        about: "a circle by cascade PID: variable integral against a plain one (Zhang 2019)",
+        run: circle::run,
+    },
+    Experiment {
+        name: "ablation",
+        about: "what each layer of the pipeline contributes: 50 forests without it",
+        run: ablation::run,
+    },
+    Experiment {
+        name: "right-of-way",
+        about: "one vehicle at a time through a window: blocks that are confirmed, and the naive rule beside them",
+        run: right_of_way::run,
+    },
+    Experiment {
         name: "sphere",
         about: "a hundred vehicles through the middle of a sphere, beside ORCA",
         run: sphere::run,
@@ -41,6 +80,11 @@ pub const EXPERIMENTS: &[Experiment] = &[
         name: "lsc",
         about: "LSC-DR's ten-agent missions in forests and dense mazes (Park 2022)",
         run: lsc::run,
+    },
+    Experiment {
+        name: "swarm-planning",
+        about: "twenty vehicles plan to ten targets among mountains and threats: particle swarms compared (P3)",
+        run: swarm_planning::run,
     },
 ];
 

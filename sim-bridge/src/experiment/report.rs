@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn numbers_are_readable() {
-        let texts = [0.000_123_456, 3.141_59, 15.8, 1234.5, 500.0].map(readable);
-        assert_eq!(texts, ["0.0001235", "3.142", "15.80", "1234", "500"]);
+        let texts = [0.000_123_456, 2.345_67, 15.8, 1234.5, 500.0].map(readable);
+        assert_eq!(texts, ["0.0001235", "2.346", "15.80", "1234", "500"]);
     }
 }

@@ -10,6 +10,7 @@ pub(crate) mod report;
 mod setup;
 mod swarm;
 mod trace_hash;
+mod trial;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -17,6 +18,7 @@ use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
+use skein_agent::AgentConfig;
 use skein_ground::{Order, Who};
 use skein_wire::{Fleet, Network, NetworkConfig};
 
@@ -25,6 +27,7 @@ pub use self::{
     recording::Recording,
     setup::{FLEET, GROUND, agent_configs, ground_config, simulation_config, vehicle_name},
     swarm::{Happenings, Links, Swarm},
+    trial::{Flown, Trial},
 };
 use crate::{
     cli::{self, Clock},
@@ -56,6 +59,10 @@ pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
     anyhow::ensure!(
         !(args.processes && args.clock == Clock::Lockstep),
         "--processes: each process follows the clock on the wall; leave out --clock lockstep"
+    );
+    anyhow::ensure!(
+        !args.processes || args.controller == cli::Controller::Bp,
+        "--processes: an agent of its own runs its b-threads; leave out --controller"
     );
     let summary = match args.clock {
         Clock::Lockstep => {
@@ -92,7 +99,8 @@ fn in_lockstep(
 ) -> anyhow::Result<Summary> {
     let network = memory_network(scenario);
     let links = memory_links(&network, scenario);
-    Flight::new(scenario, controller, links, recording, table)?.fly(&mut Lockstep(network))
+    let agents = agent_configs(scenario, controller);
+    Flight::new(scenario, controller, agents, links, recording, table)?.fly(&mut Lockstep(network))
 }
 
 /// `out/<scenario>-<seed>`, under the current folder.
@@ -181,13 +189,13 @@ impl<'a> Flight<'a> {
     fn new(
         scenario: &'a Scenario,
         controller: cli::Controller,
+        agents: Vec<AgentConfig>,
         links: Links,
         recording: Option<Recording>,
         table: Option<LiveTable<std::io::Stderr>>,
     ) -> anyhow::Result<Self> {
         LazyLock::force(&INTERRUPTIONS);
         let simulation = skein_world::Simulation::new(simulation_config(scenario));
-        let agents = agent_configs(scenario, controller);
         let ground = ground_config(scenario, Fleet::new(setup::FLEET)?, controller);
         let swarm = Swarm::new(simulation, agents, ground, links)?;
         Ok(Self {

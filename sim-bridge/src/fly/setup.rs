@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AgentConfig, Controller, Envelope, Fence};
+use skein_agent::{AgentConfig, Controller, Envelope, Fence, PassageRule, Planners};
 use skein_bp::script::Assignment;
 use skein_dbp::{Kept, NodeName};
 use skein_ground::{GroundConfig, Order, Who};
@@ -99,9 +99,12 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
                 separation_m: SEPARATION_HULLS * plan.model.hull_radius_m,
                 ..Envelope::default()
             },
+            planners: Planners { local: scenario.local, without: None },
             link_loss: LinkLossPolicy::default(),
+            passage_rule: PassageRule::Confirmed,
             controller: match controller {
                 cli::Controller::Bp => Controller::Bp,
+                cli::Controller::Sequential => Controller::Sequential,
                 cli::Controller::None => Controller::None,
             },
             scripts: scripts_of(scenario, index + 1),

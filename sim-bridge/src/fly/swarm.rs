@@ -11,6 +11,7 @@ use skein_wire::{Link, MemoryStore};
 use skein_world::{LidarScan, Simulation, Truth};
 
 use super::{plan_times::PlanTimes, report::Account, trace_hash::TraceHash};
+use crate::cpu_time;
 use crate::summary::{EventCounts, Traffic};
 
 /// Agents and ground tick once in so many steps of the world: every 20 ms.
@@ -26,6 +27,7 @@ pub struct Swarm {
     trace: TraceHash,
     events: EventCounts,
     plan_times: PlanTimes,
+    agents_cpu: Duration,
 }
 
 struct Vehicle {
@@ -69,6 +71,7 @@ impl Swarm {
             vehicles,
             ground: GroundCore::durable(ground, Box::new(MemoryStore::default())),
             plan_times: PlanTimes::default(),
+            agents_cpu: Duration::ZERO,
             ground_link: links.ground,
             steps: 0,
             trace: TraceHash::default(),
@@ -89,7 +92,10 @@ impl Swarm {
         }
         for (index, scan) in &happenings.scans {
             if let Some(vehicle) = self.vehicles.get_mut(*index) {
-                vehicle.agent.sense(now, &scan_for_agent(scan));
+                let scan = scan_for_agent(scan);
+                let began = cpu_time();
+                vehicle.agent.sense(now, &scan);
+                self.agents_cpu += cpu_time().saturating_sub(began);
             }
         }
         if self.steps.is_multiple_of(STEPS_PER_TICK) {
@@ -112,8 +118,9 @@ impl Swarm {
         keep_own(&mut heard, self.ground.name());
         selections.append(&mut heard);
         for (index, vehicle) in self.vehicles.iter_mut().enumerate() {
-            let began = Instant::now();
+            let (began, cpu_began) = (Instant::now(), cpu_time());
             vehicle.agent.tick(now, vehicle.link.as_mut());
+            self.agents_cpu += cpu_time().saturating_sub(cpu_began);
             let mut heard = vehicle.agent.take_selections();
             self.plan_times.take_in(index, began, &heard, vehicle.agent.is_planning());
             self.simulation.send(index, &vehicle.agent.take_mavlink());
@@ -138,6 +145,12 @@ impl Swarm {
     /// Says something to the autopilot of vehicle `index`, as another program would.
     pub fn send_mavlink(&mut self, index: usize, bytes: &[u8]) {
         self.simulation.send(index, bytes);
+    }
+
+    /// Takes what the autopilot of vehicle `index` has said since the last call, where no agent listens to it: of a
+    /// vehicle that the world has beside those of the agents.
+    pub fn receive_mavlink(&mut self, index: usize) -> Vec<u8> {
+        self.simulation.receive(index)
     }
 
     /// The ground station.
@@ -198,6 +211,12 @@ impl Swarm {
         }
     }
 
+    /// Processor time that the agents have used so far, together.
+    #[must_use]
+    pub fn agents_cpu(&self) -> Duration {
+        self.agents_cpu
+    }
+
     /// What the referee has seen so far.
     #[must_use]
     pub fn truth(&self) -> Truth {
@@ -223,6 +242,11 @@ pub struct Links {
     pub vehicles: Vec<Box<dyn Link>>,
     /// The ground station's.
     pub ground: Box<dyn Link>,
+}
+
+/// What this thread has used so far; a system that does not tell makes all cost nothing.
+fn cpu_time() -> Duration {
+    cpu_time::this_thread().unwrap_or_default()
 }
 
 /// Remote b-threads are named `node#bthread`.

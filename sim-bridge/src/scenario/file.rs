@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
+use skein_agent::LocalPlanner;
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_world::{Aabb, Obstacle, Scene, Shape, VehicleModel, WindConfig};
 
@@ -44,6 +45,8 @@ struct FileTable {
     model: Option<String>,
     #[serde(default, deserialize_with = "field::optional_positive")]
     cruise_speed_m_s: Option<f64>,
+    #[serde(default)]
+    local: LocalPlanner,
     #[serde(default, deserialize_with = "field::optional_positive")]
     takeoff_height_m: Option<f64>,
     #[serde(default, deserialize_with = "field::optional_positive")]
@@ -229,6 +232,7 @@ impl ScenarioFile {
             fixed_bounds,
             vehicles: plans,
             cruise_speed_m_s: table.cruise_speed_m_s.unwrap_or(DEFAULT_CRUISE_SPEED_M_S),
+            local: table.local,
             takeoff_height_m: table.takeoff_height_m.unwrap_or(DEFAULT_TAKEOFF_HEIGHT_M),
             time_limit_s: table.time_limit_s.unwrap_or(DEFAULT_TIME_LIMIT_S),
             wind: table.wind.map(WindConfig::from).unwrap_or_default(),

@@ -60,5 +60,5 @@ pub use sdf::{SdfError, Warning};
 pub use sensors::{Battery, Gps, Imu, MotorCommands, SensorReadings};
 pub use simulation::{Simulation, SimulationConfig, VehicleSetup, VehicleState};
 pub use truth::Truth;
-pub use vehicle::{VehicleError, VehicleModel};
+pub use vehicle::{ControlModel, PositionIntegral, VehicleError, VehicleModel};
 pub use wind::{Wind, WindConfig};

@@ -54,6 +54,9 @@ pub struct VehicleModel {
     pub max_climb_m_s: f64,
     /// Largest rate of descent the autopilot demands, m/s, positive.
     pub max_descent_m_s: f64,
+    /// How the built-in autopilot flies it.
+    #[serde(default)]
+    pub control: ControlModel,
     /// Energy store.
     pub battery: BatteryModel,
     /// Planar laser scanner with its range finders up and down.
@@ -72,6 +75,27 @@ pub struct VehicleModel {
 
 fn default_hull_radius_m() -> f64 {
     0.25
+}
+
+/// The built-in autopilot's outer loop.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ControlModel {
+    /// The position loop's integral.
+    pub position_integral: PositionIntegral,
+}
+
+/// What the position loop learns from an error that lasts.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PositionIntegral {
+    /// Nothing: wind is left to the velocity loop's integral, and what moves is followed with a lag.
+    #[default]
+    None,
+    /// The whole error, as a plain PID does.
+    Plain,
+    /// The whole error within 1 m, nothing beyond 2 m, and between them a falling share (Zhang 2019, variable integral).
+    Variable,
 }
 
 /// An energy store that empties with thrust: `P = hover_power (T / T_hover)^1.5`, the momentum

@@ -2,7 +2,7 @@
 
 #![allow(clippy::expect_used)]
 
-use skein_world::{VehicleError, VehicleModel};
+use skein_world::{PositionIntegral, VehicleError, VehicleModel};
 
 const X500: &str = include_str!("../vehicles/x500.toml");
 
@@ -36,6 +36,19 @@ fn the_hull_is_a_quarter_metre_unless_stated() {
     let text = X500.replacen("hull_radius_m = 0.25\n", "", 1);
     let model = VehicleModel::from_toml(&text, "mine.toml").expect("a sound vehicle");
     assert_eq!(model.hull_radius_m, 0.25);
+}
+
+#[test]
+fn the_position_loop_has_an_integral_where_the_file_says_so() {
+    assert_eq!(
+        VehicleModel::built_in("x500").expect("a sound vehicle").control.position_integral,
+        PositionIntegral::None
+    );
+    let text = format!("{X500}\n[control]\nposition_integral = \"variable\"\n");
+    let model = VehicleModel::from_toml(&text, "mine.toml").expect("a sound vehicle");
+    assert_eq!(model.control.position_integral, PositionIntegral::Variable);
+    let error = refuse("[battery]", "[control]\nposition_integral = \"some\"\n[battery]");
+    assert!(error.contains("`none`, `plain`, `variable`"), "{error}");
 }
 
 #[test]

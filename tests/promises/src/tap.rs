@@ -1,6 +1,8 @@
 //! A link that lets an observer see which bids come in.
 
-use skein_dbp::{BidRecord, Message};
+use std::collections::BTreeMap;
+
+use skein_dbp::{BidRecord, Message, NodeName};
 use skein_wire::{Key, Link, MemoryLink, Payload, Topic};
 
 /// A node's link, and the records of bids that have come over it.
@@ -8,11 +10,13 @@ use skein_wire::{Key, Link, MemoryLink, Payload, Topic};
 pub(crate) struct TappedLink {
     pub(crate) link: MemoryLink,
     received: Vec<BidRecord>,
+    /// The newest life that each other node has been heard of: what comes late from an earlier one does not count.
+    lives: BTreeMap<NodeName, u64>,
 }
 
 impl TappedLink {
     pub(crate) fn new(link: MemoryLink) -> Self {
-        Self { link, received: Vec::new() }
+        Self { link, received: Vec::new(), lives: BTreeMap::new() }
     }
 
     /// The records that have come in since the last call, in order.
@@ -28,11 +32,29 @@ impl Link for TappedLink {
 
     fn poll(&mut self) -> Option<(Key, Vec<u8>)> {
         let (key, payload) = self.link.poll()?;
-        if matches!(key.topic(), Topic::Bid { .. })
-            && let Ok(Payload::Message(Message::Bid(record))) = Payload::decode(&payload)
+        if !matches!(key.topic(), Topic::State { .. })
+            && let Ok(Payload::Message(message)) = Payload::decode(&payload)
         {
-            self.received.push(record);
+            self.sees(message);
         }
         Some((key, payload))
+    }
+}
+
+impl TappedLink {
+    fn sees(&mut self, message: Message) {
+        let incarnation = match &message {
+            Message::Bid(record) => record.incarnation,
+            Message::Ack(ack) => ack.home_incarnation,
+            Message::Occurrence(occurrence) => occurrence.incarnation,
+            Message::Presence(presence) => presence.incarnation,
+            Message::Repair(_) => return,
+        };
+        let newest = self.lives.entry(message.sender().clone()).or_insert(incarnation);
+        *newest = incarnation.max(*newest);
+        match message {
+            Message::Bid(record) if incarnation == *newest => self.received.push(record),
+            _ => {}
+        }
     }
 }

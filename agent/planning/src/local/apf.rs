@@ -112,7 +112,7 @@ pub fn limited(velocity: Vector3<f64>, speed_m_s: f64) -> Vector3<f64> {
 }
 
 /// The furthest of a few points ahead on the path to which the straight way is free.
-fn carrot(
+pub(super) fn carrot(
     map: &ClearanceMap,
     path: &Path,
     station_m: f64,

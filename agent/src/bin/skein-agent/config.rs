@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::{Context as _, ensure};
 use serde::Deserialize;
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AgentConfig, Controller, Envelope, Fence};
+use skein_agent::{AgentConfig, Controller, Envelope, Fence, LocalPlanner, PassageRule, Planners};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
@@ -56,6 +56,8 @@ struct File {
     fence: FenceTable,
     #[serde(default)]
     envelope: EnvelopeTable,
+    #[serde(default)]
+    planners: PlannersTable,
     network: NetworkSettings,
     authority: Option<Authority>,
 }
@@ -135,6 +137,12 @@ struct EnvelopeTable {
     separation_m: f64,
 }
 
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct PlannersTable {
+    local: LocalPlanner,
+}
+
 impl Default for EnvelopeTable {
     fn default() -> Self {
         let Envelope { cruise_m_s, climb_m_s, brake_m_s2, latency_s, hull_m, margin_m, separation_m } =
@@ -210,12 +218,14 @@ impl File {
             lidar: lidar.is_some(),
             fence,
             envelope: self.envelope.check()?,
+            planners: Planners { local: self.planners.local, without: None },
             link_loss: match self.mission.without_ground {
                 WithoutGround::Continue => LinkLossPolicy::Continue,
                 WithoutGround::Return => LinkLossPolicy::Return,
                 WithoutGround::Land => LinkLossPolicy::Land,
             },
             controller: Controller::Bp,
+            passage_rule: PassageRule::Confirmed,
             scripts: self.script.iter().map(|script| script.read(folder)).collect::<anyhow::Result<_>>()?,
             lease: Duration::from_millis(self.lease_ms),
             authority: self.authority.unwrap_or_else(standard_authority),

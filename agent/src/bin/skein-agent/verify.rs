@@ -19,7 +19,7 @@ use skein_dbp::verify::{Faults, MoveCounts};
 use crate::config::Config;
 
 /// States of a scene that are looked at unless told otherwise.
-const STATES_OF_SCENE: usize = 300_000;
+const STATES_OF_SCENE: usize = 1_000_000;
 /// States of a network that are looked at unless told otherwise.
 const STATES_OF_NETWORK: usize = 20_000;
 /// States that are drawn unless told otherwise.

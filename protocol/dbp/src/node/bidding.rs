@@ -24,6 +24,8 @@ struct BidAbroad {
     blocked_homes: Vec<NodeName>,
     priority: Option<i32>,
     on_loss: OnLoss,
+    /// Whether its holder is, or was, or wants to be told that the block holds.
+    is_watched: bool,
     awaits_confirmation: bool,
 }
 
@@ -41,7 +43,7 @@ impl Node {
         for bid in self.bids_abroad() {
             self.report_unroutable(&bid);
             outcome = outcome.and(self.check_one_home(&bid));
-            if !bid.blocked_homes.is_empty() || bid.awaits_confirmation {
+            if bid.is_watched {
                 stated.insert(bid.bthread.clone(), bid.sync);
                 self.held.state(&bid.bthread, bid.sync, bid.held_block());
             }
@@ -77,7 +79,10 @@ impl Node {
         // In a fleet of one no other home is concerned; who waits to hear so hears it all the same.
         let awaits_confirmation =
             !bid.blocks().is_none() && bid.waits().contains(&confirmation(&self.config.name, bthread, sync));
-        if requests.is_empty() && unroutable.is_none() && blocked_homes.is_empty() && !awaits_confirmation {
+        // The homes that it concerns may be out of the roster, and come back.
+        let is_relied_on = self.held.is_relied_on(bthread, bid.blocks());
+        let is_watched = !blocked_homes.is_empty() || awaits_confirmation || is_relied_on;
+        if requests.is_empty() && unroutable.is_none() && !is_watched {
             return None;
         }
         Some(BidAbroad {
@@ -90,6 +95,7 @@ impl Node {
             blocked_homes,
             priority: bid.given_priority(),
             on_loss: if bid.holds_when_lost() { OnLoss::Hold } else { OnLoss::Release },
+            is_watched,
             awaits_confirmation,
         })
     }
@@ -134,7 +140,12 @@ impl Node {
 
 impl BidAbroad {
     fn held_block(&self) -> Block {
-        Block { set: self.block.clone(), on_loss: self.on_loss, homes: self.blocked_homes.clone() }
+        Block {
+            set: self.block.clone(),
+            on_loss: self.on_loss,
+            homes: self.blocked_homes.clone(),
+            is_awaited: self.awaits_confirmation,
+        }
     }
 
     /// The bid as each home it concerns is to know it.

@@ -265,7 +265,8 @@ fn holding(name: &'static str, about: &'static str, outlives: bool) -> Result<Ne
         name,
         about,
         is_sound: true,
-        faults: ONE_OF_EACH,
+        // Another hold ends with its home's life, before its holder can hear of it.
+        faults: Faults { restarts: outlives.into(), ..ONE_OF_EACH },
         members: vec![scripts("ground/main", &here)?, vehicle],
         requirement: Some(("a hold that is counted on holds", Arc::new(holds))),
     })

@@ -1,6 +1,6 @@
 //! The outer loops: a wished position or velocity becomes an attitude and a thrust (P4, cascade PID).
 //!
-//! Position error -> velocity (proportional, braking in time) -> a reference that moves with limited
+//! Position error -> velocity (proportional, braking in time, with an integral where the vehicle's file says so) -> a reference that moves with limited
 //! acceleration and jerk -> acceleration (PI on velocity, reference acceleration ahead) -> thrust vector
 //! within the tilt limit.
 
@@ -10,12 +10,20 @@ use skein_mav::axes;
 use super::estimator::Estimate;
 use super::parameters::Settings;
 use crate::quadrotor::STEP;
-use crate::vehicle::{GRAVITY_M_S2, VehicleModel};
+use crate::vehicle::{GRAVITY_M_S2, PositionIntegral, VehicleModel};
 
 /// How quickly the velocity reference follows the wish, 1/s.
 const REFERENCE_RATE: f64 = 5.0;
 /// Integral of the velocity error, relative to its proportional gain, 1/s.
 const INTEGRAL_RATE: f64 = 0.6;
+/// Integral of the position error, relative to its proportional gain, 1/s.
+const POSITION_INTEGRAL_RATE: f64 = 0.5;
+/// Fastest that the position integral may ask for, m/s.
+const MAX_POSITION_INTEGRAL_M_S: f64 = 2.0;
+/// Within this error the variable integral takes in all of it, m.
+const WHOLE_INTEGRAL_M: f64 = 1.0;
+/// Beyond this error it takes in nothing, m.
+const NO_INTEGRAL_M: f64 = 2.0;
 /// Largest acceleration the integral may hold against wind, m/s^2.
 const MAX_INTEGRAL_M_S2: f64 = 3.0;
 /// Largest vertical acceleration demanded, m/s^2.
@@ -97,6 +105,8 @@ pub(super) struct PositionControl {
     velocity_reference: Vector3<f64>,
     acceleration_reference: Vector3<f64>,
     integral: Vector3<f64>,
+    position_integral: Vector2<f64>,
+    learns: PositionIntegral,
     yaw_reference: Option<f64>,
 }
 
@@ -113,6 +123,8 @@ impl PositionControl {
             velocity_reference: Vector3::zeros(),
             acceleration_reference: Vector3::zeros(),
             integral: Vector3::zeros(),
+            position_integral: Vector2::zeros(),
+            learns: model.control.position_integral,
             yaw_reference: None,
         }
     }
@@ -122,6 +134,7 @@ impl PositionControl {
         self.velocity_reference = Vector3::zeros();
         self.acceleration_reference = Vector3::zeros();
         self.integral = Vector3::zeros();
+        self.position_integral = Vector2::zeros();
         self.yaw_reference = None;
     }
 
@@ -132,6 +145,7 @@ impl PositionControl {
         demand: &Demand,
         settings: &Settings,
     ) -> AttitudeTarget {
+        self.learn_position(estimate, demand);
         let wish = self.wished_velocity(estimate, demand, settings);
         self.move_reference(&wish, settings);
         let force = self.specific_force(estimate, settings);
@@ -153,7 +167,8 @@ impl PositionControl {
                 let distance = way.norm();
                 let braking = BRAKING_SHARE * settings.max_accel_m_s2;
                 let speed = approach_speed(distance, self.position_gain, braking).min(max_speed);
-                if distance > 0.0 { way * (speed / distance) } else { way }
+                let approach = if distance > 0.0 { way * (speed / distance) } else { way };
+                approach + self.position_integral
             }
         };
         let vertical = match demand.vertical {
@@ -168,6 +183,19 @@ impl PositionControl {
         let horizontal = horizontal.cap_magnitude(settings.max_speed_m_s);
         let vertical = vertical.clamp(-settings.max_descent_m_s, settings.max_climb_m_s);
         Vector3::new(horizontal.x, horizontal.y, vertical)
+    }
+
+    /// Takes the position error into the integral, as far as it counts. What is flown by velocity has none.
+    fn learn_position(&mut self, estimate: &Estimate, demand: &Demand) {
+        let Horizontal::Position(position, _) = demand.horizontal else {
+            self.position_integral = Vector2::zeros();
+            return;
+        };
+        let error = position - estimate.position.xy();
+        let growth =
+            error * (integral_share(self.learns, error.norm()) * self.position_gain * POSITION_INTEGRAL_RATE);
+        let integral = self.position_integral + growth * STEP.as_secs_f64();
+        self.position_integral = integral.cap_magnitude(MAX_POSITION_INTEGRAL_M_S);
     }
 
     /// Moves the velocity reference towards the wish, with limited acceleration and jerk.
@@ -214,6 +242,17 @@ impl PositionControl {
     }
 }
 
+/// Share of an error, m, that the position integral takes in.
+fn integral_share(learns: PositionIntegral, error_m: f64) -> f64 {
+    match learns {
+        PositionIntegral::None => 0.0,
+        PositionIntegral::Plain => 1.0,
+        PositionIntegral::Variable => {
+            ((NO_INTEGRAL_M - error_m) / (NO_INTEGRAL_M - WHOLE_INTEGRAL_M)).clamp(0.0, 1.0)
+        }
+    }
+}
+
 /// Speed at which a point `distance` away is approached: proportional near it, farther off as fast as can be
 /// braked with `braking` m/s^2, and smooth where the two meet.
 fn approach_speed(distance: f64, gain: f64, braking: f64) -> f64 {
@@ -243,4 +282,21 @@ fn attitude_along(force: &Vector3<f64>, yaw: f64) -> UnitQuaternion<f64> {
     let x = y.cross(&z);
     let axes = Matrix3::from_columns(&[x, y, z]);
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_variable_integral_takes_in_what_was_published() {
+        // 0 for |e| > 200 cm, (200 - |e|) / 100 between, 1 for |e| < 100 cm.
+        let published =
+            [(0.0, 1.0), (0.99, 1.0), (1.0, 1.0), (1.25, 0.75), (1.5, 0.5), (2.0, 0.0), (7.0, 0.0)];
+        for (error_m, share) in published {
+            assert!((integral_share(PositionIntegral::Variable, error_m) - share).abs() < 1e-12, "{error_m}");
+            assert_eq!(integral_share(PositionIntegral::Plain, error_m), 1.0);
+            assert_eq!(integral_share(PositionIntegral::None, error_m), 0.0);
+        }
+    }
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use skein_bp::{Event, Program};
-use skein_dbp::{RefusalReason, Roster, facts};
+use skein_dbp::{ROSTER, RefusalReason, Roster, facts};
 
 use super::{Findings, Oracle};
 use crate::knowledge::{Knowledge, Member, Step};
@@ -15,7 +15,9 @@ use crate::story::Story;
 /// Looks at the run's end.
 pub(super) struct GoesOn {
     calm: Duration,
-    /// How many occurrences each home had one lease after the calm had come.
+    /// How many occurrences each home had one lease after the calm had come: by then everybody hears everybody.
+    begun: Option<Vec<u64>>,
+    /// The same one lease later.
     marks: Option<Vec<u64>>,
     /// How far each node has come in each home's present life: by observer and home.
     heard: BTreeMap<(usize, usize), u64>,
@@ -26,7 +28,7 @@ pub(super) struct GoesOn {
 impl GoesOn {
     pub(super) fn new(story: &Story) -> Self {
         let calm = story.calm + story.longest_lease();
-        Self { calm, marks: None, heard: BTreeMap::new(), refused: BTreeSet::new() }
+        Self { calm, begun: None, marks: None, heard: BTreeMap::new(), refused: BTreeSet::new() }
     }
 }
 
@@ -50,17 +52,23 @@ impl Oracle for GoesOn {
                 }
             }
         }
-        if step.at >= self.calm && self.marks.is_none() {
-            let latest = |member: &Member| member.present().map_or(0, |life| life.occurred.len() as u64);
-            self.marks = Some(knowledge.members.iter().map(latest).collect());
+        for (marks, since) in
+            [(&mut self.begun, self.calm), (&mut self.marks, self.calm + knowledge.longest_lease)]
+        {
+            if step.at >= since && marks.is_none() {
+                *marks = Some(knowledge.members.iter().map(occurred).collect());
+            }
         }
     }
 
     fn ends(&mut self, at: Duration, knowledge: &Knowledge, findings: &mut Findings) {
-        let Some(marks) = &self.marks else { return };
+        let (Some(begun), Some(marks)) = (&self.begun, &self.marks) else { return };
         for observer in 0..marks.len() {
             for (home, mark) in marks.iter().enumerate().filter(|(home, _)| *home != observer) {
-                let heard = self.heard.get(&(observer, home)).copied().unwrap_or(0);
+                let heard = self.heard.get(&(observer, home)).copied();
+                // Who comes late hears what occurs from then on.
+                let begins = if came_after(observer, home, knowledge) { begun[home] } else { 0 };
+                let heard = heard.unwrap_or(begins);
                 if heard < *mark {
                     let name = &knowledge.member(home).name;
                     let what = format!("{heard} of {mark} occurrences of {name} have come here");
@@ -75,6 +83,9 @@ impl Oracle for GoesOn {
                     let Some(home) = knowledge.home_of(event, node).filter(|home| *home != node) else {
                         continue;
                     };
+                    if keeps_to_a_former_term(node, home, knowledge) {
+                        continue;
+                    }
                     if knowledge.member(home).safety.contains(event) {
                         if !self.refused.contains(&(node, bthread.clone())) {
                             let what = format!("{bthread} was not told that {event} is refused");
@@ -91,6 +102,27 @@ impl Oracle for GoesOn {
             }
         }
     }
+}
+
+/// How much has occurred at a home in its present life.
+fn occurred(member: &Member) -> u64 {
+    member.present().map_or(0, |life| life.occurred.len() as u64)
+}
+
+/// Whether a home was there before `observer` was.
+fn came_after(observer: usize, home: usize, knowledge: &Knowledge) -> bool {
+    let present = |node| knowledge.member(node).present();
+    let ran = present(observer).and_then(|life| life.ran);
+    present(home).zip(ran).is_some_and(|(life, ran)| life.began < ran)
+}
+
+/// Whether a node takes no part since it is in a former term, of its own doing: its b-threads block the order that would
+/// tell it of the new one.
+fn keeps_to_a_former_term(node: usize, home: usize, knowledge: &Knowledge) -> bool {
+    let member = knowledge.member(node);
+    let term = |member: &Member| member.roster.as_ref().map_or(0, |roster| roster.term);
+    let order = Event::new(member.name.event_name(ROSTER));
+    term(member) < term(knowledge.member(home)) && !is_free(&order, node, knowledge)
 }
 
 /// Whether no b-thread of the story ever blocks `event`.

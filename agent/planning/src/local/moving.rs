@@ -1,0 +1,306 @@
+//! Obstacles that move: found in a lidar's returns, followed from scan to scan, and predicted with growing uncertainty.
+
+use std::time::Duration;
+
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+use crate::map::ClearanceMap;
+use crate::separation::Neighbour;
+
+/// How returns are grouped and followed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MovingConfig {
+    /// Neighbouring returns further apart than this are of two things, metres.
+    pub gap_m: f64,
+    /// What is wider than this does not move, metres.
+    pub widest_m: f64,
+    /// Of fewer returns than this no place is known.
+    pub fewest_returns: usize,
+    /// Returns that are further than this from a circle, root mean square, are of nothing round, metres.
+    pub roundness_m: f64,
+    /// A thing is found again within this distance of where it was expected, metres.
+    pub gate_m: f64,
+    /// Share of a place's surprise that corrects the track's place, and its velocity per second.
+    pub correction: [f64; 2],
+    /// Slower than this a thing stands still, m/s.
+    pub slowest_m_s: f64,
+    /// A thing moves once it is this far from where it was first seen, metres.
+    pub moved_m: f64,
+    /// Seen less often than this it may be anything.
+    pub fewest_sightings: u32,
+    /// Mean distance from where it was expected beyond which it is not one thing, metres.
+    pub most_surprise_m: f64,
+    /// Standard deviation of a place that has just been seen, metres, and its growth while unseen, m/s.
+    pub sigma_m: [f64; 2],
+    /// What has not been seen for this long is forgotten, seconds.
+    pub forget_s: f64,
+}
+
+impl Default for MovingConfig {
+    fn default() -> MovingConfig {
+        MovingConfig {
+            gap_m: 0.4,
+            widest_m: 1.5,
+            fewest_returns: 8,
+            roundness_m: 0.06,
+            gate_m: 0.8,
+            correction: [0.5, 1.5],
+            slowest_m_s: 0.4,
+            moved_m: 0.7,
+            fewest_sightings: 6,
+            most_surprise_m: 0.2,
+            sigma_m: [0.1, 0.5],
+            forget_s: 1.5,
+        }
+    }
+}
+
+/// A thing that is followed.
+#[derive(Clone, Copy, Debug)]
+struct Track {
+    id: u32,
+    first_seen: Vector3<f64>,
+    position: Vector3<f64>,
+    velocity: Vector3<f64>,
+    radius_m: f64,
+    seen: Duration,
+    sightings: u32,
+    /// How far from where it was expected it was seen lately, metres.
+    surprise_m: f64,
+}
+
+impl Track {
+    fn expected(&self, now: Duration) -> Vector3<f64> {
+        self.position + self.velocity * now.saturating_sub(self.seen).as_secs_f64()
+    }
+}
+
+/// Follows what moves.
+#[derive(Clone, Debug)]
+pub struct Tracker {
+    config: MovingConfig,
+    tracks: Vec<Track>,
+    /// Ids count down, for those of vehicles count up.
+    next_id: u32,
+}
+
+impl Tracker {
+    /// A tracker that has seen nothing.
+    #[must_use]
+    pub fn new(config: MovingConfig) -> Tracker {
+        Tracker { config, tracks: Vec::new(), next_id: u32::MAX }
+    }
+
+    /// Takes in the returns of a scan (ENU, metres), in the order of its rays.
+    ///
+    /// Costs the number of returns plus that of things seen times that of things followed.
+    pub fn look(&mut self, now: Duration, returns: &[Vector3<f64>]) {
+        let MovingConfig { gate_m, correction: [place_share, velocity_share], forget_s, .. } = self.config;
+        let mut lost: Vec<Track> = std::mem::take(&mut self.tracks);
+        lost.retain(|track| now.saturating_sub(track.seen).as_secs_f64() < forget_s);
+        for (centre, radius_m) in self.things(returns) {
+            let surprise = |track: &Track| (centre - track.expected(now)).norm();
+            let nearest = (0..lost.len()).min_by(|a, b| surprise(&lost[*a]).total_cmp(&surprise(&lost[*b])));
+            self.tracks.push(match nearest.filter(|index| surprise(&lost[*index]) < gate_m) {
+                Some(index) => {
+                    let track = lost.swap_remove(index);
+                    let expected = track.expected(now);
+                    Track {
+                        position: expected + (centre - expected) * place_share,
+                        velocity: track.velocity + (centre - expected) * velocity_share,
+                        radius_m: radius_m.max(0.8 * track.radius_m),
+                        seen: now,
+                        sightings: track.sightings + 1,
+                        surprise_m: 0.7 * track.surprise_m + 0.3 * (centre - expected).norm(),
+                        ..track
+                    }
+                }
+                None => {
+                    let id = self.next_id;
+                    self.next_id = self.next_id.wrapping_sub(1);
+                    let velocity = Vector3::zeros();
+                    Track {
+                        id,
+                        first_seen: centre,
+                        position: centre,
+                        velocity,
+                        radius_m,
+                        seen: now,
+                        sightings: 1,
+                        surprise_m: 0.0,
+                    }
+                }
+            });
+        }
+        self.tracks.append(&mut lost);
+    }
+
+    /// What moves, where it is expected `now`. Its uncertainty has grown since it was last seen, and it keeps no distance.
+    ///
+    /// Whatever moves has left the place where it was first seen: in the `map` that place is free.
+    pub fn moving<'a>(
+        &'a self,
+        now: Duration,
+        map: &'a ClearanceMap,
+    ) -> impl Iterator<Item = Neighbour> + 'a {
+        let MovingConfig { sigma_m: [sigma_m, growth_m_s], .. } = self.config;
+        let moves = move |track: &&Track| {
+            track.sightings >= self.config.fewest_sightings
+                && track.surprise_m < self.config.most_surprise_m
+                && track.velocity.norm() > self.config.slowest_m_s
+                && (track.position - track.first_seen).norm() > self.config.moved_m
+                && map.clearance(&track.first_seen) > track.radius_m
+        };
+        self.tracks.iter().filter(moves).map(move |track| Neighbour {
+            id: track.id,
+            position: track.expected(now),
+            velocity: track.velocity,
+            sigma_m: sigma_m + growth_m_s * now.saturating_sub(track.seen).as_secs_f64(),
+            age_s: 0.0,
+            radius_m: track.radius_m,
+            cooperative: false,
+        })
+    }
+
+    /// Centre and radius of every narrow thing in the returns.
+    fn things(&self, returns: &[Vector3<f64>]) -> Vec<(Vector3<f64>, f64)> {
+        let MovingConfig { gap_m, widest_m, fewest_returns, roundness_m, .. } = self.config;
+        let mut groups: Vec<Vec<Vector3<f64>>> = Vec::new();
+        for point in returns {
+            match groups.last_mut() {
+                Some(group) if group.last().is_some_and(|last| (point - last).norm() < gap_m) => {
+                    group.push(*point);
+                }
+                _ => groups.push(vec![*point]),
+            }
+        }
+        // The last ray is beside the first.
+        if groups.len() > 1
+            && let (Some(last), Some(first)) = (groups.last().and_then(|g| g.last()), returns.first())
+            && (first - last).norm() < gap_m
+            && let Some(mut last) = groups.pop()
+            && let Some(first) = groups.first_mut()
+        {
+            last.append(first);
+            *first = last;
+        }
+        let narrow = |group: &&Vec<Vector3<f64>>| {
+            let ends = group.first().zip(group.last());
+            group.len() >= fewest_returns && ends.is_some_and(|(a, b)| (a - b).norm() < widest_m)
+        };
+        let round = |group: &Vec<Vector3<f64>>| {
+            let (centre, radius_m) = circle(group)?;
+            let off = |point: &Vector3<f64>| (point - centre).xy().norm() - radius_m;
+            let squares: f64 = group.iter().map(|point| off(point) * off(point)).sum();
+            let is_round = (squares / group.len() as f64).sqrt() < roundness_m;
+            (is_round && radius_m < widest_m / 2.0).then_some((centre, radius_m))
+        };
+        groups.iter().filter(narrow).filter_map(round).collect()
+    }
+}
+
+/// The circle through points in a plane, by least squares (Kasa 1976).
+///
+/// The centre of a round thing is the same from wherever it is seen; that of the part that is seen is not.
+fn circle(points: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
+    let middle = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for point in points {
+        let offset: Vector2<f64> = (point - middle).xy();
+        let row = Vector3::new(offset.x, offset.y, 1.0);
+        normal += row * row.transpose();
+        right += row * offset.norm_squared();
+    }
+    let solution = normal.lu().solve(&right)?;
+    let centre = Vector3::new(solution.x / 2.0, solution.y / 2.0, 0.0);
+    let radius_m = (solution.z + centre.norm_squared()).max(0.0).sqrt();
+    radius_m.is_finite().then_some((middle + centre, radius_m))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::local::vfh::direction;
+    use crate::map::VoxelMapConfig;
+
+    /// What 720 rays from `eye` return of a pillar.
+    fn seen(eye: &Vector3<f64>, pillar: &Vector3<f64>, radius_m: f64) -> Vec<Vector3<f64>> {
+        let offset = pillar - eye;
+        let cast = |ray: u32| {
+            let u = direction(f64::from(ray) * std::f64::consts::TAU / 720.0);
+            let (along, aside) = (u.dot(&offset), u.x * offset.y - u.y * offset.x);
+            let inside = radius_m * radius_m - aside * aside;
+            (inside > 0.0 && along > 0.0).then(|| eye + u * (along - inside.sqrt()))
+        };
+        (0..720).filter_map(cast).collect()
+    }
+
+    fn free() -> ClearanceMap {
+        ClearanceMap::new(VoxelMapConfig::default(), Vector3::new(0.0, 0.0, 5.0), 2.5).unwrap()
+    }
+
+    fn at(tick: u64) -> Duration {
+        Duration::from_millis(100 * tick)
+    }
+
+    #[test]
+    fn a_circle_is_found_from_the_part_that_is_seen() {
+        let pillar = Vector3::new(3.0, 1.0, 2.0);
+        let (centre, radius_m) = circle(&seen(&Vector3::new(0.0, 0.0, 2.0), &pillar, 0.3)).unwrap();
+        assert!((centre - pillar).norm() < 1e-6 && (radius_m - 0.3).abs() < 1e-6, "{centre:?} {radius_m}");
+    }
+
+    #[test]
+    fn what_moves_is_found_with_its_velocity_and_predicted() {
+        let mut tracker = Tracker::new(MovingConfig::default());
+        let place = |tick: u64| Vector3::new(4.0, -3.0 + 0.12 * tick as f64, 3.0);
+        for tick in 0..20 {
+            tracker.look(at(tick), &seen(&Vector3::new(0.0, 0.0, 3.0), &place(tick), 0.25));
+        }
+        let map = free();
+        let found: Vec<_> = tracker.moving(at(19), &map).collect();
+        let [thing] = found.as_slice() else { panic!("{found:?}") };
+        assert!((thing.velocity - Vector3::new(0.0, 1.2, 0.0)).norm() < 0.1, "{thing:?}");
+        // Behind a tree for half a second.
+        let later = tracker.moving(at(24), &map).next().unwrap();
+        assert!((later.position - place(24)).norm() < 0.15, "{later:?}");
+        assert!(later.sigma_m > thing.sigma_m + 0.2);
+        assert!(!later.cooperative);
+        tracker.look(at(40), &[]);
+        assert_eq!(tracker.moving(at(40), &map).count(), 0, "it is gone");
+    }
+
+    #[test]
+    fn what_still_stands_where_it_was_first_seen_has_not_moved() {
+        let mut tracker = Tracker::new(MovingConfig::default());
+        let place = |tick: u64| Vector3::new(4.1, -1.9 + 0.12 * tick as f64, 3.1);
+        for tick in 0..20 {
+            tracker.look(at(tick), &seen(&Vector3::new(0.0, 0.0, 3.1), &place(tick), 0.25));
+        }
+        let mut map = free();
+        map.insert(&place(0));
+        assert_eq!(tracker.moving(at(19), &map).count(), 0);
+    }
+
+    #[test]
+    fn what_stands_does_not_move_because_the_vehicle_does() {
+        let mut tracker = Tracker::new(MovingConfig::default());
+        for tick in 0..60 {
+            let eye = Vector3::new(-4.0 + 0.2 * tick as f64, 1.5, 3.0);
+            tracker.look(at(tick), &seen(&eye, &Vector3::new(0.0, 0.0, 3.0), 0.5));
+            assert_eq!(tracker.moving(at(tick), &free()).count(), 0, "at {eye:?}");
+        }
+    }
+
+    #[test]
+    fn a_wall_does_not_move() {
+        let mut tracker = Tracker::new(MovingConfig::default());
+        for tick in 0..30 {
+            let wall: Vec<_> = (0..40)
+                .map(|k| Vector3::new(3.0, -2.0 + 0.1 * f64::from(k), 3.0 + 0.05 * tick as f64))
+                .collect();
+            tracker.look(at(tick), &wall);
+            assert_eq!(tracker.moving(at(tick), &free()).count(), 0);
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! Follows a path by the vector field histogram.
+
+use nalgebra::Vector3;
+
+use super::{Vfh, VfhConfig, bearing, direction};
+use crate::local::apf::{ApfConfig, carrot};
+use crate::local::speed::{self, SpeedConfig, run_up, speed_to_stop, trapezoid, unhindered_speed};
+use crate::map::{ClearanceMap, Sectors};
+use crate::path::Path;
+
+/// Slower than this the vehicle has no heading of its own, m/s.
+const AT_REST_M_S: f64 = 0.3;
+
+/// The path ahead is looked at so far, metres: as far as it takes to slow down from any speed that is flown among obstacles.
+const PREVIEW_M: f64 = 8.0;
+/// Between two places on the path that are looked at, metres.
+const PREVIEW_STEP_M: f64 = 0.5;
+
+/// What to fly now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Velocity wanted (ENU, m/s).
+    pub velocity: Vector3<f64>,
+    /// The point of the path that it leads to (ENU, metres).
+    pub carrot: Vector3<f64>,
+    /// How far along the path the vehicle is, metres.
+    pub station_m: f64,
+}
+
+/// The histogram, the speed planner, and the set-point that they last made.
+#[derive(Clone, Debug)]
+pub struct Follower {
+    vfh: Vfh,
+    speed: SpeedConfig,
+    aim: ApfConfig,
+    /// The nearest returns of the newest scan, in each direction (ENU, metres).
+    obstacles: Vec<Vector3<f64>>,
+    /// The last set-point, which the next one is near to (ENU, m/s).
+    set_point: Vector3<f64>,
+}
+
+impl Follower {
+    /// A follower at rest that has seen nothing.
+    #[must_use]
+    pub fn new(vfh: VfhConfig, speed: SpeedConfig) -> Follower {
+        let aim = ApfConfig { look_ahead_m: 3.0, ..ApfConfig::default() };
+        Follower { vfh: Vfh::new(vfh), speed, aim, obstacles: Vec::new(), set_point: Vector3::zeros() }
+    }
+
+    /// Takes in the returns of a scan; see [`Histogram::of`](super::Histogram::of).
+    pub fn look(&mut self, origin: &Vector3<f64>, points: &[Vector3<f64>], rays: usize) {
+        self.vfh.look(origin, points, rays);
+        let mut nearest = Sectors::new(*origin);
+        points.iter().for_each(|point| nearest.add(*point));
+        self.obstacles = nearest.points().collect();
+    }
+
+    /// The velocity that follows `path` from about `station_m` (where the last call was), no faster than `cap_m_s`.
+    ///
+    /// It leads through the opening that is best for reaching the path ahead, at the speed that the phase of the leg, the
+    /// scene and the cap allow. Without an opening it is zero.
+    pub fn follow(
+        &mut self,
+        path: &Path,
+        station_m: f64,
+        position: &Vector3<f64>,
+        cap_m_s: f64,
+        map: &ClearanceMap,
+    ) -> Step {
+        let reach_m = 2.0 * self.aim.look_ahead_m;
+        let station_m = path.project_within(position, station_m - reach_m, station_m + reach_m).station_m;
+        let carrot = carrot(map, path, station_m, position, &self.aim);
+        let offset = carrot - position;
+        let phase_m_s = trapezoid(station_m, path.length_m() - station_m, &self.speed);
+        let speed_m_s = cap_m_s.min(phase_m_s.max(self.speed.start_share * cap_m_s));
+        let speed_m_s = speed_m_s.min(self.speed_ahead(path, station_m));
+        let share = offset.try_normalize(1e-6).unwrap_or_default();
+        let level = self.level(&offset, speed_m_s * share.xy().norm(), position);
+        Step { velocity: Vector3::new(level.x, level.y, speed_m_s * share.z), carrot, station_m }
+    }
+
+    /// The speed from which every place of the path ahead is reached, gently, as slowly as it has to be flown through.
+    fn speed_ahead(&self, path: &Path, station_m: f64) -> f64 {
+        let places = (PREVIEW_M.min(path.length_m() - station_m) / PREVIEW_STEP_M).floor().max(0.0) as u32;
+        let allowed = |step: u32| {
+            let way_m = f64::from(step) * PREVIEW_STEP_M;
+            let (place, ahead) = (path.point_at(station_m + way_m), path.direction_at(station_m + way_m));
+            run_up(unhindered_speed(&place, &ahead, &self.obstacles, &self.speed), way_m, &self.speed)
+        };
+        (0..=places).map(allowed).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The horizontal part, of at most `speed_m_s`.
+    fn level(&mut self, offset: &Vector3<f64>, speed_m_s: f64, position: &Vector3<f64>) -> Vector3<f64> {
+        let heading = (self.set_point.xy().norm() > AT_REST_M_S).then(|| bearing(&self.set_point));
+        let Some(chosen) = self.vfh.steer(bearing(offset), heading) else { return Vector3::zeros() };
+        let free = |bearing| {
+            let ahead = direction(bearing);
+            let to_stop = speed_to_stop(position, &ahead, &self.obstacles, &self.speed);
+            to_stop.min(unhindered_speed(position, &ahead, &self.obstacles, &self.speed))
+        };
+        let free_m_s = free(chosen).min(heading.map_or(f64::INFINITY, free));
+        direction(chosen) * speed_m_s.min(free_m_s)
+    }
+
+    /// The set-point after `step_s`, on its way to `wanted`: never a step, but for what keeps a distance, for which see
+    /// [`Follower::flew`].
+    #[must_use]
+    pub fn ease(&self, wanted: &Vector3<f64>, step_s: f64) -> Vector3<f64> {
+        speed::step(&self.set_point, wanted, step_s, self.speed.gentle_m_s2)
+    }
+
+    /// The set-point that was sent in the end.
+    pub fn flew(&mut self, set_point: &Vector3<f64>) {
+        self.set_point = *set_point;
+    }
+
+    /// Somebody else moves the vehicle, or nobody.
+    pub fn rest(&mut self) {
+        self.vfh.rest();
+        self.set_point = Vector3::zeros();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::VoxelMapConfig;
+
+    /// A point mass that flies ten metres eastward past `trunks`, with what it sees of them.
+    fn fly(trunks: &[(f64, f64)], radius_m: f64) -> Vec<(Vector3<f64>, Vector3<f64>)> {
+        let map = ClearanceMap::new(VoxelMapConfig::default(), Vector3::new(5.0, 0.0, 5.0), 2.5).unwrap();
+        let path = Path::new(vec![Vector3::new(0.0, 0.1, 3.1), Vector3::new(10.0, 0.1, 3.1)]).unwrap();
+        let mut follower = Follower::new(VfhConfig::default(), SpeedConfig::default());
+        let (mut position, mut station_m) = (path.start(), 0.0);
+        let mut flown = Vec::new();
+        for tick in 0..2000 {
+            let bark = |&(x, y): &(f64, f64)| {
+                (0..72).map(move |k| Vector3::new(x, y, 3.1) + direction(f64::from(k) * 0.087_266) * radius_m)
+            };
+            let points: Vec<_> = trunks.iter().flat_map(bark).collect();
+            if tick % 5 == 0 {
+                follower.look(&position, &points, 72);
+            }
+            let step = follower.follow(&path, station_m, &position, 2.0, &map);
+            station_m = step.station_m;
+            let set_point = follower.ease(&step.velocity, 0.02);
+            follower.flew(&set_point);
+            position += set_point * 0.02;
+            flown.push((position, set_point));
+        }
+        flown
+    }
+
+    #[test]
+    fn a_free_path_is_followed_to_its_end() {
+        let flown = fly(&[], 0.3);
+        assert!(flown.iter().all(|(position, _)| (position.y - 0.1).abs() < 0.05));
+        assert!(flown.last().unwrap().0.x > 9.0);
+    }
+
+    #[test]
+    fn an_obstacle_on_the_path_is_passed_without_a_step_of_the_set_point() {
+        let flown = fly(&[(5.0, 0.2)], 0.3);
+        let nearest = |(position, _): &(Vector3<f64>, Vector3<f64>)| {
+            (position.xy() - nalgebra::Vector2::new(5.0, 0.2)).norm() - 0.3
+        };
+        let closest_m = flown.iter().map(nearest).fold(f64::INFINITY, f64::min);
+        assert!(closest_m > SpeedConfig::default().clearance_m, "{closest_m}");
+        assert!(flown.last().unwrap().0.x > 9.0, "{:?}", flown.last());
+        for pair in flown.windows(2) {
+            let change = (pair[1].1 - pair[0].1).norm();
+            assert!(change <= SpeedConfig::default().gentle_m_s2 * 0.02 + 1e-9, "{change}");
+        }
+    }
+
+    #[test]
+    fn walled_in_it_stays() {
+        let wall: Vec<_> =
+            (0..40).map(|k| direction(f64::from(k) * 0.157) * 1.5).map(|p| (p.x, p.y)).collect();
+        assert!(fly(&wall, 0.15).iter().all(|(position, _)| position.xy().norm() < 0.8));
+    }
+}

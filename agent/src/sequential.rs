@@ -1,0 +1,319 @@
+//! The navigator without behavioural programming: one loop and one state machine around the same pipeline.
+//!
+//! It is what the b-threads are compared with (Wang 2023, the second experiment). It hears the same reports as they do
+//! and orders the same acts, at the same rates: takes off when the checks pass, flies the waypoints in turn, plans anew
+//! around what is in the way, goes home on a low battery and from beyond the fence, and lands. But it knows only its own
+//! vehicle: nobody can hold it from afar or order it about, and it yields to nobody in a narrow passage.
+
+use std::time::Duration;
+
+use skein_bp::Event;
+use skein_wire::vocabulary::{
+    ADVANCE, AIRBORNE, ARRIVED, BATTERY_CRITICAL, BATTERY_LOW, CLEAR, COMMAND_FAILED, COMPLETE, FAILED,
+    FENCE_BREACHED, FOUND_AIRBORNE, HOLD, HOMEWARD, LAND, LANDED, PATH_BLOCKED, PILOT, PLAN, PLANNED, READY,
+    SLEPT, STUCK, TAKEOFF, TOO_CLOSE, UNPLANNABLE, UNREADY,
+};
+
+use crate::bthreads::{escape, mission, navigation, path_planning, return_home};
+use crate::me::Me;
+
+/// The state machine.
+#[derive(Clone, Debug)]
+pub struct Sequential {
+    me: Me,
+    /// The `goto` of each waypoint, in order.
+    waypoints: Vec<Event>,
+    /// The `goto` home.
+    home: Event,
+    stage: Stage,
+    way: Way,
+    /// Whether the checks before take-off pass.
+    ready: bool,
+    /// Whether a neighbour is inside the emergency distance.
+    too_close: bool,
+    /// Escapes from local minima on the way to this waypoint.
+    escapes: u8,
+    acts: Vec<Event>,
+}
+
+/// Where the flight stands.
+#[derive(Clone, Debug, PartialEq)]
+enum Stage {
+    Grounded,
+    Climbing,
+    Flying {
+        leg: usize,
+    },
+    Returning {
+        why: String,
+    },
+    Landing {
+        failure: Option<String>,
+    },
+    /// Somebody else has the vehicle.
+    Taken,
+    Over,
+}
+
+/// Where the path to the waypoint stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    None,
+    Wanted { why: &'static str, attempt: u8, due: Duration },
+    Asked { attempt: u8 },
+    Known { leave_due: Duration },
+}
+
+impl Sequential {
+    /// The navigator of vehicle `me`, which stands on the ground: over `waypoints`, the last being where it lands, and
+    /// over `home`, from where it lands after a return; metres ENU.
+    #[must_use]
+    pub fn new(me: Me, waypoints: &[[f64; 3]], home: [f64; 3]) -> Self {
+        Self {
+            waypoints: mission::gotos(&me, waypoints),
+            home: return_home::goto(&me, home),
+            me,
+            stage: Stage::Grounded,
+            way: Way::None,
+            ready: false,
+            too_close: false,
+            escapes: 0,
+            acts: Vec::new(),
+        }
+    }
+
+    /// Takes in a report of the vehicle's body.
+    pub fn hear(&mut self, now: Duration, report: &Event) {
+        let why = || report.text("why").unwrap_or("no reason given").to_owned();
+        let is_under_way = matches!(self.stage, Stage::Flying { .. } | Stage::Returning { .. });
+        match (self.me.verb(report).unwrap_or_default(), &self.stage) {
+            (verb @ (READY | UNREADY), _) => self.ready = verb == READY,
+            (verb @ (TOO_CLOSE | CLEAR), _) => self.too_close = verb == TOO_CLOSE,
+            (AIRBORNE, Stage::Climbing) => self.fly(now, 0),
+            (ARRIVED, Stage::Flying { leg }) if report.int("leg") == i64::try_from(*leg).ok() => {
+                self.fly(now, leg + 1);
+            }
+            (ARRIVED, Stage::Returning { why }) if report.int("leg") == Some(return_home::HOME_LEG) => {
+                self.land(Some(why.clone()));
+            }
+            (PLANNED, _) if is_under_way => self.way = Way::Known { leave_due: now },
+            (UNPLANNABLE, _) if is_under_way => self.plan_again(now, why()),
+            (PATH_BLOCKED, _) if is_under_way => self.plan("obstacle", now),
+            (STUCK, _) if is_under_way && self.escapes < escape::ATTEMPTS => {
+                self.escapes += 1;
+                self.plan("stuck", now);
+            }
+            (STUCK, _) if is_under_way => {
+                self.land(Some("stuck: no way past what stands around".to_owned()));
+            }
+            (BATTERY_LOW, Stage::Climbing | Stage::Flying { .. }) => self.go_home(now, "battery low"),
+            (FENCE_BREACHED, Stage::Flying { .. }) => self.go_home(now, "outside the geofence"),
+            (BATTERY_CRITICAL, Stage::Climbing | Stage::Flying { .. } | Stage::Returning { .. }) => {
+                self.land(Some("battery nearly empty".to_owned()));
+            }
+            (verb @ (PILOT | SLEPT | FOUND_AIRBORNE), _) => {
+                if verb == FOUND_AIRBORNE {
+                    self.acts.push(self.me.because(HOLD, "the agent started in the air"));
+                }
+                (self.stage, self.way) = (Stage::Taken, Way::None);
+            }
+            (COMMAND_FAILED, Stage::Climbing) => self.end(Some(why())),
+            (LANDED, Stage::Landing { failure }) => self.end(failure.clone()),
+            (LANDED, Stage::Taken) => self.end(Some("somebody else flew it".to_owned())),
+            (LANDED, Stage::Climbing | Stage::Flying { .. } | Stage::Returning { .. }) => {
+                self.end(Some("the autopilot landed by itself".to_owned()));
+            }
+            _ => {}
+        }
+    }
+
+    /// What is to be done now, in this order; nothing until something is heard or due.
+    pub fn step(&mut self, now: Duration) -> Vec<Event> {
+        if self.stage == Stage::Grounded && self.ready {
+            self.stage = Stage::Climbing;
+            self.acts.push(self.me.event(TAKEOFF));
+        }
+        match self.way {
+            Way::Wanted { why, attempt, due } if now >= due => {
+                self.way = Way::Asked { attempt };
+                self.acts.push(self.me.because(PLAN, why));
+            }
+            Way::Known { leave_due } if now >= leave_due && !self.too_close => {
+                self.way = Way::Known { leave_due: now + navigation::CYCLE };
+                let homeward = matches!(self.stage, Stage::Returning { .. });
+                self.acts.push(self.me.event(if homeward { HOMEWARD } else { ADVANCE }));
+            }
+            _ => {}
+        }
+        std::mem::take(&mut self.acts)
+    }
+
+    /// Flies to waypoint `leg`, or lands after the last.
+    fn fly(&mut self, now: Duration, leg: usize) {
+        match self.waypoints.get(leg).cloned() {
+            Some(goto) => self.head_for(now, goto, Stage::Flying { leg }),
+            None => self.land(None),
+        }
+    }
+
+    fn go_home(&mut self, now: Duration, why: &str) {
+        self.head_for(now, self.home.clone(), Stage::Returning { why: why.to_owned() });
+    }
+
+    fn head_for(&mut self, now: Duration, goto: Event, stage: Stage) {
+        self.stage = stage;
+        self.escapes = 0;
+        self.acts.push(goto);
+        self.plan("waypoint", now);
+    }
+
+    fn plan(&mut self, why: &'static str, now: Duration) {
+        self.way = Way::Wanted { why, attempt: 1, due: now };
+    }
+
+    fn plan_again(&mut self, now: Duration, why: String) {
+        match self.way {
+            Way::Asked { attempt } if attempt < path_planning::ATTEMPTS => {
+                let due = now + path_planning::PAUSE;
+                self.way = Way::Wanted { why: "waypoint", attempt: attempt + 1, due };
+            }
+            _ => self.land(Some(why)),
+        }
+    }
+
+    fn land(&mut self, failure: Option<String>) {
+        self.way = Way::None;
+        self.acts.push(self.me.because(LAND, failure.as_deref().unwrap_or("mission complete")));
+        self.stage = Stage::Landing { failure };
+    }
+
+    fn end(&mut self, failure: Option<String>) {
+        (self.stage, self.way) = (Stage::Over, Way::None);
+        self.acts.push(match failure {
+            None => self.me.event(COMPLETE),
+            Some(why) => self.me.because(FAILED, &why),
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The navigator and a clock; every report is answered with the verbs of what is then done.
+    struct Loop {
+        navigator: Sequential,
+        me: Me,
+        now: Duration,
+    }
+
+    impl Loop {
+        fn new() -> Self {
+            let me = Me::new("uav/1");
+            let waypoints = [[10.0, 0.0, 2.0], [10.0, 10.0, 2.0]];
+            let navigator = Sequential::new(me.clone(), &waypoints, [0.0, 0.0, 4.0]);
+            Self { navigator, me, now: Duration::ZERO }
+        }
+
+        /// On its way to the first waypoint, with a path.
+        fn under_way() -> Self {
+            let mut vehicle = Self::new();
+            for verb in [READY, AIRBORNE, PLANNED] {
+                vehicle.after(vehicle.me.event(verb));
+            }
+            vehicle
+        }
+
+        fn after(&mut self, report: Event) -> Vec<String> {
+            self.navigator.hear(self.now, &report);
+            self.wait(0)
+        }
+
+        fn wait(&mut self, ms: u64) -> Vec<String> {
+            self.now += Duration::from_millis(ms);
+            let acts = self.navigator.step(self.now);
+            acts.iter().map(|act| self.me.verb(act).unwrap_or_default().to_owned()).collect()
+        }
+
+        fn hears(&mut self, verb: &str) -> Vec<String> {
+            self.after(self.me.event(verb))
+        }
+
+        fn arrives(&mut self, leg: i64) -> Vec<String> {
+            self.after(self.me.event(ARRIVED).with("leg", leg))
+        }
+    }
+
+    #[test]
+    fn it_flies_its_waypoints_in_turn_and_lands() {
+        let mut vehicle = Loop::new();
+        assert!(vehicle.wait(1000).is_empty(), "the checks have not passed");
+        assert_eq!(vehicle.hears(READY), [TAKEOFF]);
+        assert_eq!(vehicle.hears(AIRBORNE), ["goto", PLAN]);
+        assert_eq!(vehicle.hears(PLANNED), [ADVANCE]);
+        assert!(vehicle.wait(80).is_empty());
+        assert_eq!(vehicle.wait(20), [ADVANCE]);
+        assert!(vehicle.arrives(1).is_empty(), "that is not where it is going");
+        assert_eq!(vehicle.arrives(0), ["goto", PLAN]);
+        assert_eq!(vehicle.hears(PLANNED), [ADVANCE]);
+        assert_eq!(vehicle.arrives(1), [LAND]);
+        assert_eq!(vehicle.hears(LANDED), [COMPLETE]);
+        assert!(vehicle.hears(READY).is_empty(), "there is nothing left to fly for");
+    }
+
+    #[test]
+    fn it_does_not_move_along_a_blocked_path() {
+        let mut vehicle = Loop::under_way();
+        assert_eq!(vehicle.hears(PATH_BLOCKED), [PLAN]);
+        assert!(vehicle.wait(500).is_empty());
+        assert_eq!(vehicle.hears(PLANNED), [ADVANCE]);
+    }
+
+    #[test]
+    fn a_waypoint_without_a_path_is_tried_three_times() {
+        let mut vehicle = Loop::under_way();
+        vehicle.hears(PATH_BLOCKED);
+        for _ in 0..2 {
+            assert!(vehicle.hears(UNPLANNABLE).is_empty());
+            assert_eq!(vehicle.wait(1000), [PLAN]);
+        }
+        assert_eq!(vehicle.hears(UNPLANNABLE), [LAND]);
+        assert_eq!(vehicle.hears(LANDED), [FAILED]);
+    }
+
+    #[test]
+    fn it_gives_up_a_waypoint_that_it_is_stuck_before() {
+        let mut vehicle = Loop::under_way();
+        for _ in 0..escape::ATTEMPTS {
+            assert_eq!(vehicle.hears(STUCK), [PLAN]);
+            vehicle.hears(PLANNED);
+        }
+        assert_eq!(vehicle.hears(STUCK), [LAND]);
+    }
+
+    #[test]
+    fn a_low_battery_brings_it_home() {
+        let mut vehicle = Loop::under_way();
+        assert_eq!(vehicle.hears(BATTERY_LOW), ["goto", PLAN]);
+        assert_eq!(vehicle.hears(PLANNED), [HOMEWARD]);
+        assert_eq!(vehicle.arrives(return_home::HOME_LEG), [LAND]);
+        assert_eq!(vehicle.hears(LANDED), [FAILED]);
+    }
+
+    #[test]
+    fn it_waits_while_a_neighbour_is_too_close() {
+        let mut vehicle = Loop::under_way();
+        assert!(vehicle.hears(TOO_CLOSE).is_empty());
+        assert!(vehicle.wait(500).is_empty());
+        assert_eq!(vehicle.hears(CLEAR), [ADVANCE]);
+    }
+
+    #[test]
+    fn what_a_pilot_has_taken_it_leaves_alone() {
+        let mut vehicle = Loop::under_way();
+        assert!(vehicle.hears(PILOT).is_empty());
+        assert!(vehicle.wait(10_000).is_empty());
+        assert!(vehicle.hears(PATH_BLOCKED).is_empty());
+        assert_eq!(vehicle.hears(LANDED), [FAILED]);
+    }
+}
