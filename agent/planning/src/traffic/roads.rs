@@ -191,10 +191,10 @@ impl Distances {
     /// Steps from a state to the goal; `None` if it cannot be reached.
     #[must_use]
     pub fn steps_from(&self, roads: &Roads, state: &State) -> Option<u16> {
-        roads.index(state).and_then(|index| self.from_index(index))
+        roads.index(state).and_then(|index| self.at_index(index))
     }
 
-    pub(super) fn from_index(&self, index: usize) -> Option<u16> {
+    pub(super) fn at_index(&self, index: usize) -> Option<u16> {
         self.steps.get(index).copied().filter(|steps| *steps != UNREACHABLE)
     }
 }

@@ -8,12 +8,16 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use nalgebra::Vector3;
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use skein_world::{Aabb, Scene};
 
 use self::flight::{Flown, Space, fly};
-use super::{Bound, Figure, Line, Options, Report, Style};
-use crate::mission::LscMission;
+use super::statistics::mean;
+use super::{Bound, Figure, Line, Options, Report, Style, runs};
+use crate::mission::{LscAgent, LscMission};
 use crate::scenario::read_world;
 
 /// Families of missions: their name, where missions and worlds are, and how many there are.
@@ -34,29 +38,35 @@ struct Family {
 }
 
 /// One mission with its world.
+#[derive(Clone)]
 struct Setting {
     name: String,
     mission: LscMission,
     scene: Scene,
 }
 
-/// Flies the missions, at the height of their starts and at any.
+/// Flies the missions, at the height of their starts and at any; and others that nobody has published, in the same worlds.
 ///
 /// # Errors
 /// No folder of missions, or something wrong in one.
-pub fn run(options: &Options) -> anyhow::Result<Report> {
+pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
     let dir = options.dir.as_deref().context("say where LSC-DR's missions and worlds are with --dir")?;
     let settings = settings(dir, options.runs.unwrap_or(MISSIONS_PER_FAMILY))?;
-    let planar = fly_all(&settings, Space::Planar)?;
-    let spatial = fly_all(&settings, Space::Spatial)?;
+    let planar = fly_all("planar missions", &settings, Space::Planar)?;
+    let spatial = fly_all("spatial missions", &settings, Space::Spatial)?;
+    let shuffled_settings = shuffled(&settings);
+    let shuffled = fly_all("planar missions, goals shuffled", &shuffled_settings, Space::Planar)?;
     let mut report = Report::default();
     report.number("missions", planar.len());
     report.number("succeeded", succeeded(&planar));
     report.number("planar", rows(&settings, &planar));
     report.number("spatial_succeeded", succeeded(&spatial));
     report.number("spatial", rows(&settings, &spatial));
+    report.number("shuffled_succeeded", succeeded(&shuffled));
+    report.number("shuffled", rows(&shuffled_settings, &shuffled));
     table(&mut report, "At the height of the starts", &settings, &planar);
     table(&mut report, "At any height", &settings, &spatial);
+    table(&mut report, "At the height of the starts, goals shuffled", &shuffled_settings, &shuffled);
     goals(&mut report, &settings, &planar);
     for (setting, flown) in settings.iter().zip(&planar) {
         if published(&setting.name).is_some() {
@@ -84,15 +94,27 @@ fn settings(dir: &Path, runs: usize) -> anyhow::Result<Vec<Setting>> {
         .collect()
 }
 
-fn fly_all(settings: &[Setting], space: Space) -> anyhow::Result<Vec<Flown>> {
-    let flown = settings.iter().zip(1..).map(|(setting, seed)| {
-        let flown =
-            fly(&setting.mission, &setting.scene, space, seed).with_context(|| setting.name.clone())?;
-        let verdict = flown.reason.as_deref().unwrap_or("arrived");
-        eprintln!("{} {space:?}: {verdict}, {:.1} s", setting.name, flown.flight_time_s);
-        Ok(flown)
-    });
-    flown.collect()
+/// The same with goals dealt out among the agents anew, by a seed for each.
+fn shuffled(settings: &[Setting]) -> Vec<Setting> {
+    let mut shuffled = settings.to_vec();
+    for (setting, seed) in shuffled.iter_mut().zip(1..) {
+        let agents = &mut setting.mission.agents;
+        let mut goals: Vec<_> = agents.iter().map(|agent| agent.goal).collect();
+        goals.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+        for (agent, goal) in agents.iter_mut().zip(goals) {
+            agent.goal = goal;
+        }
+        setting.name += ", shuffled";
+    }
+    shuffled
+}
+
+/// Each mission has a seed of its own, which is its place in the list.
+fn fly_all(what: &str, settings: &[Setting], space: Space) -> anyhow::Result<Vec<Flown>> {
+    let cases: Vec<(&Setting, u64)> = settings.iter().zip(1..).collect();
+    runs::in_turn(what, &cases, |(setting, seed)| {
+        fly(&setting.mission, &setting.scene, space, *seed).with_context(|| setting.name.clone())
+    })
 }
 
 fn succeeded(flown: &[Flown]) -> usize {
@@ -158,11 +180,7 @@ fn goals(report: &mut Report, settings: &[Setting], flown: &[Flown]) {
         least(|flown| flown.min_separation_m),
         Bound::AtLeast(LEAST_SEPARATION_M),
     );
-    report.goal(
-        "least clearance, m",
-        least(|flown| flown.min_clearance_m),
-        Bound::AtLeast(0.0),
-    );
+    report.goal("least clearance, m", least(|flown| flown.min_clearance_m), Bound::AtLeast(0.0));
     report.goal(
         "least distance from the bounds, m",
         least(|flown| flown.min_to_bounds_m),
@@ -194,7 +212,7 @@ fn goals(report: &mut Report, settings: &[Setting], flown: &[Flown]) {
 /// Of divisions and differences.
 const ROUNDING: f64 = 1e-9;
 
-fn least_limit(mission: &LscMission, of: fn(&crate::mission::LscAgent) -> Vector3<f64>) -> f64 {
+fn least_limit(mission: &LscMission, of: fn(&LscAgent) -> Vector3<f64>) -> f64 {
     mission.agents.iter().map(|agent| of(agent).min()).fold(f64::INFINITY, f64::min)
 }
 
@@ -225,10 +243,57 @@ fn map(setting: &Setting, flown: &Flown) -> Figure {
     }
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
-}
-
 fn greatest(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use skein_world::Obstacle;
+
+    use super::*;
+
+    const SWAP: &str = r#"{
+        "quadrotors": { "small": {
+            "max_vel": [1.0, 1.0, 1.0], "max_acc": [2.0, 2.0, 2.0], "radius": 0.15, "downwash": 2.0 } },
+        "world": [{ "dimension": [-2.0, -1.3, 0.0, 2.0, 1.3, 2.5] }],
+        "agents": [ # Two on each side of a wall with a gap for one.
+            { "type": "small", "start": [-1.5, 0.5, 1], "goal": [1.5, -0.5, 1] },
+            { "type": "small", "start": [-1.5, -0.5, 1], "goal": [1.5, 0.5, 1] },
+            { "type": "small", "start": [1.5, 0.5, 1], "goal": [-1.5, -0.5, 1] },
+            { "type": "small", "start": [1.5, -0.5, 1], "goal": [-1.5, 0.5, 1] }
+        ]
+    }"#;
+
+    fn wall_with_a_gap() -> Setting {
+        let half = |name, y| Obstacle::block(name, Vector3::new(0.0, y, 1.25), Vector3::new(0.5, 1.0, 2.5));
+        Setting {
+            name: "swap".to_owned(),
+            mission: LscMission::read(SWAP, "swap.json").expect("a mission"),
+            scene: Scene::new("wall", vec![half("south", -0.8), half("north", 0.8)]),
+        }
+    }
+
+    #[test]
+    fn four_swap_sides_through_a_gap_for_one() {
+        let setting = wall_with_a_gap();
+        let flown = fly(&setting.mission, &setting.scene, Space::Planar, 1).expect("it can be flown");
+        let mut report = Report::default();
+        goals(&mut report, &[setting], &[flown]);
+        assert!(report.is_reached(), "{report}");
+    }
+
+    #[test]
+    fn a_start_between_two_cells_is_refused_by_name() {
+        let mut setting = wall_with_a_gap();
+        setting.mission.agents[1].start.x += 0.2;
+        let refused = fly(&setting.mission, &setting.scene, Space::Planar, 1).err().map(|e| e.to_string());
+        assert!(refused.is_some_and(|error| error.starts_with("agent 2: its start is 0.20 m off")));
+    }
+
+    #[test]
+    fn without_a_folder_it_says_what_it_needs() {
+        let refused = run(&Options::default()).err().map(|error| error.to_string());
+        assert!(refused.is_some_and(|error| error.contains("--dir")));
+    }
 }
