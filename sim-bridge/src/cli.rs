@@ -174,6 +174,9 @@ pub struct SeparationCampaign {
     /// Share of messages that are lost.
     #[arg(long, value_name = "SHARE", default_value_t = 0.3)]
     pub loss: f64,
+    /// How long bids hold elsewhere without being renewed: several times as long as a message takes there and back.
+    #[arg(long, value_name = "MS", default_value_t = 4000.0)]
+    pub lease_ms: f64,
     /// How many at once; as many as this computer has processors if not given.
     #[arg(long, value_name = "N")]
     pub jobs: Option<usize>,

@@ -219,7 +219,11 @@ fn no_vehicles_are_refused() {
 fn an_unknown_scenario_lists_the_known_ones() {
     let error =
         Scenario::open("forrest", &Overrides::default(), 1).expect_err("no such scenario").to_string();
-    assert!(error.contains("`forrest`") && error.contains("forest, antipodal, window, open"), "{error}");
+    assert!(
+        error.contains("`forrest`")
+            && error.contains("forest, antipodal, window, open, survey, geese, valley"),
+        "{error}"
+    );
     let error =
         Scenario::open("no/such.toml", &Overrides::default(), 1).expect_err("no such file").to_string();
     assert!(error.starts_with("cannot read `no/such.toml`"), "{error}");
@@ -294,5 +298,33 @@ fn the_example_scenario_is_sound_and_explains_every_key() -> Result<(), Scenario
     for key in keys {
         assert!(text.contains(key), "`{key}` is not in the example");
     }
+    Ok(())
+}
+
+#[test]
+fn a_task_that_cannot_be_done_is_refused_with_why() {
+    let refusal = |text: &str| read(text).expect_err("the task is wrong").to_string();
+    let coverage = "[coverage]\narea_m = [[0, 0], [9, 9], [18, 18]]\nswath_m = 4\nheight_m = 3\n";
+    let error = refusal(coverage);
+    assert!(error.contains("coverage") && error.contains("encloses nothing"), "{error}");
+    let formation = "[formation]\nshape = \"wedge\"\nspacing_m = 4\nleader_m = [[0, 0, 3], [9, 0, 3]]\n";
+    let error = refusal(&format!("{formation}{coverage}"));
+    assert!(error.contains("formation") && error.contains("`coverage`"), "{error}");
+    let targets = "[targets]\nfrom_m = [[0, 0], [0, 20]]\nplaces_m = [[40, 10, 5]]\nspacing_m = 4\n";
+    assert!(refusal(targets).contains("[bounds]"));
+    let bounds = "[bounds]\nmin_m = [-5, -5, -1]\nmax_m = [45, 25, 15]\n";
+    let mountain = "[[targets.mountain]]\ncentre_m = [40, 10]\nheight_m = 10\nslope_m = 5\n";
+    let error = refusal(&format!("{bounds}{targets}{mountain}"));
+    assert!(error.contains("no route was found for vehicle"), "the target is in the mountain: {error}");
+}
+
+#[test]
+fn targets_are_shared_and_reached_at_one_time() -> Result<(), ScenarioError> {
+    let valley = Scenario::built_in("valley", None, 7)?;
+    assert!(valley.muster);
+    assert!(valley.vehicles.iter().any(|vehicle| vehicle.pace == 1.0), "the last flies at cruise");
+    assert!(valley.vehicles.iter().all(|vehicle| (0.5..=1.0).contains(&vehicle.pace)));
+    let again = Scenario::built_in("valley", None, 7)?;
+    assert_eq!(valley.vehicles, again.vehicles);
     Ok(())
 }

@@ -244,6 +244,19 @@ mod tests {
     }
 
     #[test]
+    fn every_line_is_flown_whole_and_by_one_after_another() {
+        let field = [(0.0, 0.0), (50.0, 0.0), (50.0, 30.0), (0.0, 30.0)].map(|(x, y)| Vector2::new(x, y));
+        let routes = cover(&field, 6.0, 3).unwrap();
+        for line in 0..5 {
+            let y = 3.0 + 6.0 * f64::from(line);
+            let legs = routes.iter().flat_map(|route| route.windows(2));
+            let on_line = legs.filter(|leg| leg.iter().all(|end| (end.y - y).abs() < 1e-9));
+            let flown_m: f64 = on_line.map(|leg| (leg[1] - leg[0]).norm()).sum();
+            assert!((flown_m - 50.0).abs() < 1e-9, "line {line}: {flown_m} m");
+        }
+    }
+
+    #[test]
     fn lines_run_along_the_longer_side_however_it_lies() {
         for angle in [0.0, 0.7, 2.0] {
             let turn = Rotation2::new(angle);

@@ -1,4 +1,4 @@
-//! Flying in formation: places around a leader, and the velocity that keeps one.
+//! Flying in formation: places around a leader, and routes that keep them.
 
 use nalgebra::{Rotation2, Vector2, Vector3};
 
@@ -47,21 +47,18 @@ impl Formation {
         };
         (0..vehicles).map(place).collect()
     }
-}
 
-/// The velocity that brings a vehicle to its place and keeps it there: `place_velocity + gain (place - position)`, at most
-/// `max_m_s` fast. The distance falls by `1 / e` in each `1 / gain` seconds, while the bound is not met.
-///
-/// Positions ENU, metres; velocities m/s; `gain` 1/s.
-#[must_use]
-pub fn keep(
-    position: &Vector3<f64>,
-    place: &Vector3<f64>,
-    place_velocity: &Vector3<f64>,
-    gain: f64,
-    max_m_s: f64,
-) -> Vector3<f64> {
-    (place_velocity + (place - position) * gain).cap_magnitude(max_m_s)
+    /// The routes of so many vehicles whose leader flies along `leader` (ENU, metres), the leader's first. The formation heads
+    /// along the leader's first leg that leads anywhere over ground, and is shifted without being turned: all routes are the
+    /// leader's, moved aside. So all are equally long, and vehicles that set out together and are equally fast keep their
+    /// places, around corners too.
+    #[must_use]
+    pub fn routes(&self, leader: &[Vector3<f64>], vehicles: usize) -> Vec<Vec<Vector3<f64>>> {
+        let mut legs = leader.windows(2).map(|leg| (leg[1] - leg[0]).xy());
+        let ahead = legs.find(|leg| *leg != Vector2::zeros()).unwrap_or_else(Vector2::x);
+        let places = self.places(&Vector3::zeros(), ahead.y.atan2(ahead.x), vehicles);
+        places.iter().map(|place| leader.iter().map(|point| point + place).collect()).collect()
+    }
 }
 
 #[cfg(test)]
@@ -83,18 +80,16 @@ mod tests {
         );
     }
 
-    #[test]
-    fn the_distance_to_the_place_falls_as_stated() {
-        let (gain, step_s) = (0.8, 0.001);
-        let velocity = Vector3::new(3.0, 1.0, 0.0);
-        let (mut place, mut position) = (Vector3::zeros(), Vector3::new(0.0, 2.0, 1.0));
-        let before_m = (place - position).norm();
-        for _ in 0..2500 {
-            position += keep(&position, &place, &velocity, gain, 10.0) * step_s;
-            place += velocity * step_s;
+    /// Where one who flies along a route at 1 m/s is after so many seconds.
+    fn after(route: &[Vector3<f64>], mut seconds: f64) -> Vector3<f64> {
+        for leg in route.windows(2) {
+            let length_m = (leg[1] - leg[0]).norm();
+            if seconds <= length_m {
+                return leg[0] + (leg[1] - leg[0]) * (seconds / length_m);
+            }
+            seconds -= length_m;
         }
-        let share = (place - position).norm() / before_m;
-        assert!((share - (-0.8 * 2.5_f64).exp()).abs() < 1e-3, "{share}");
+        route[route.len() - 1]
     }
 
     proptest! {
@@ -114,9 +109,23 @@ mod tests {
         }
 
         #[test]
-        fn nobody_is_asked_to_fly_faster_than_allowed(x in -50.0..50.0_f64, v in -20.0..20.0_f64) {
-            let velocity = keep(&Vector3::new(x, 0.0, 0.0), &Vector3::zeros(), &Vector3::new(v, 0.0, 0.0), 1.0, 5.0);
-            prop_assert!(velocity.norm() <= 5.0 + 1e-9);
+        fn who_flies_the_routes_keeps_its_place_at_all_times(
+            shape in prop::sample::select(SHAPES.to_vec()),
+            legs in prop::collection::vec((-20.0..20.0_f64, -20.0..20.0_f64, -2.0..2.0_f64), 1..6),
+            seconds in 0.0..120.0_f64,
+        ) {
+            let mut leader = vec![Vector3::new(3.0, 4.0, 30.0)];
+            for (x, y, z) in legs {
+                leader.push(leader[leader.len() - 1] + Vector3::new(x, y, z));
+            }
+            let formation = Formation { shape, spacing_m: 3.0 };
+            let ahead = leader[1] - leader[0];
+            let routes = formation.routes(&leader, 7);
+            prop_assert_eq!(&routes[0], &leader);
+            let places = formation.places(&after(&leader, seconds), ahead.y.atan2(ahead.x), 7);
+            for (route, place) in routes.iter().zip(places) {
+                prop_assert!((after(route, seconds) - place).norm() < 1e-6);
+            }
         }
     }
 }

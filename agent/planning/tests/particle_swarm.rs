@@ -110,13 +110,13 @@ fn the_equation_of_motion_is_the_papers() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut velocity = [1.0, -2.0];
     let here = [5.0, 5.0];
-    Mover { index: 0, position: &here, velocity: &mut velocity, own_best: &here, leader: &here }
+    Mover { position: &here, velocity: &mut velocity, own_best: &here, leader: &here }
         .attract(0.9, 2.0, 2.0, &mut rng);
     assert_eq!(velocity, [0.9, -1.8], "nothing attracts at the best place");
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for _ in 0..2000 {
         let mut velocity = [0.0];
-        Mover { index: 0, position: &[0.0], velocity: &mut velocity, own_best: &[1.0], leader: &[10.0] }
+        Mover { position: &[0.0], velocity: &mut velocity, own_best: &[1.0], leader: &[10.0] }
             .attract(0.9, 2.0, 3.0, &mut rng);
         (low, high) = (low.min(velocity[0]), high.max(velocity[0]));
     }

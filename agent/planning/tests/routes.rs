@@ -5,9 +5,10 @@
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
 use skein_planning::airspace::{Airspace, Mountain, NoFlyZone, ThreatZone};
+use skein_planning::assignment::assign;
 use skein_planning::route::{
     AnyAngleConfig, Effort, Plan, Planner, RouteCost, RouteError, RouteProblem, Traffic, any_angle,
-    plan_in_turn,
+    arrival_slots, arrive_together, plan_in_turn,
 };
 
 const UPPER: Vector3<f64> = Vector3::new(2000.0, 2000.0, 1000.0);
@@ -184,6 +185,58 @@ fn the_improved_swarms_beat_the_others_and_come_near_the_reference() {
         assert!(found < 0.45 * standard, "{planner:?}: {found}, standard {standard}");
         assert!(found < constriction, "{planner:?}: {found}, constriction {constriction}");
         assert!(found < 1.05 * reference, "{planner:?}: {found}, reference {reference}");
+    }
+}
+
+/// Where a vehicle is, so many seconds after it set out along a route whose legs it flies so many times slower than at cruise.
+fn flown(route: &[Vector3<f64>], slowed: f64, mut seconds: f64, cost: &RouteCost) -> Vector3<f64> {
+    for leg in route.windows(2) {
+        let way = leg[1] - leg[0];
+        let leg_s = (way.norm() / cost.cruise_m_s).max(way.z.abs() / cost.climb_m_s) * slowed;
+        if seconds < leg_s {
+            return leg[0] + way * (seconds / leg_s);
+        }
+        seconds -= leg_s;
+    }
+    route[route.len() - 1]
+}
+
+#[test]
+fn vehicles_assigned_to_targets_get_there_together_and_apart() {
+    let (airspace, cost) = (mountains(), RouteCost::default());
+    let starts: Vec<_> = (0..6).map(|k| Vector3::new(0.0, 100.0 + 330.0 * f64::from(k), 120.0)).collect();
+    let targets =
+        [[2000.0, 300.0, 300.0], [2000.0, 1000.0, 500.0], [2000.0, 2000.0, 400.0]].map(Vector3::from);
+    let west = |target: &Vector3<f64>| Vector3::new(0.0, target.y, target.z);
+    let slots: Vec<_> =
+        targets.iter().flat_map(|target| arrival_slots(target, &west(target), 2, 60.0, &airspace)).collect();
+    let distance_m = |start: &Vector3<f64>| slots.iter().map(|slot| (slot - start).norm()).collect();
+    let taken = assign(&starts.iter().map(distance_m).collect::<Vec<_>>()).unwrap();
+    let ends: Vec<_> = starts.iter().zip(&taken).map(|(start, slot)| (*start, slots[*slot])).collect();
+    let plans = plan_in_turn(&airspace, cost, &ends, WAYPOINTS, |vehicle, problem| {
+        Ok::<_, RouteError>(Planner::Ground.plan(problem, Effort::default(), vehicle as u64))
+    })
+    .unwrap();
+
+    let times_s: Vec<_> = plans.iter().map(|plan| plan.assessment.time_s).collect();
+    let arrival = arrive_together(&times_s, 2.0);
+    let at = |seconds: f64| -> Vec<_> {
+        let paced = plans.iter().zip(&arrival.slowed);
+        paced.map(|(plan, slowed)| flown(&plan.route, *slowed, seconds, &cost)).collect()
+    };
+    for (place, (_, goal)) in at(arrival.time_s + 1e-6).iter().zip(&ends) {
+        assert!((place - goal).norm() < 1e-3, "{place} is not {goal}");
+    }
+    for (place, (_, goal)) in at(arrival.time_s - 1.0).iter().zip(&ends) {
+        assert!((place - goal).norm() > 1.0, "too early at {goal}");
+    }
+    for tenth in 0..=(10.0 * arrival.time_s) as usize {
+        let places = at(tenth as f64 / 10.0);
+        for (k, one) in places.iter().enumerate() {
+            for other in &places[..k] {
+                assert!((one - other).norm() >= cost.least_separation_m, "{one} and {other}");
+            }
+        }
     }
 }
 

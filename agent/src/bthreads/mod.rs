@@ -56,7 +56,7 @@ pub fn load(program: &mut Program, config: &AgentConfig) {
         PassageRule::Confirmed => {
             let with_say = |node: &&String| node.starts_with("uav/") || **node == config.ground;
             let others = config.roster.iter().filter(with_say).filter(|node| **node != config.node);
-            program.add(RIGHT_OF_WAY, RightOfWay::new(me.clone(), others.map(String::as_str)))
+            program.add(RIGHT_OF_WAY, RightOfWay::new(me.clone(), others.map(String::as_str), config.lease))
         }
         PassageRule::Heard => program.add(RIGHT_OF_WAY, NaiveRightOfWay::new(me.clone())),
     };

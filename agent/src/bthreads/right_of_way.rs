@@ -29,9 +29,9 @@ pub const NAME: &str = "right_of_way";
 const SAME_PASSAGE_M: f64 = 3.0;
 /// A vehicle that gave way claims again when it hears that another has left a passage, or after this long.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Claims that were made apart are known to both sides this long after they have met again: records are repeated every
-/// tenth of a lease of at most a second.
-const MEETING: Duration = Duration::from_millis(1500);
+/// Claims that were made apart are known to both sides so many leases after they have met again: records are repeated every
+/// tenth of one.
+const MEETING_LEASES: f64 = 1.5;
 
 /// Claims a passage, enters it when the claim is confirmed, and lets go behind it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -39,6 +39,8 @@ pub struct RightOfWay {
     me: Me,
     /// The other vehicles and the ground station.
     others: BTreeMap<String, Other>,
+    /// How long claims take to cross.
+    meeting: Duration,
     /// No claim counts before this.
     met: Duration,
     phase: Phase,
@@ -67,11 +69,12 @@ enum Phase {
 }
 
 impl RightOfWay {
-    /// The b-thread of vehicle `me`; `others` are the other vehicles and the ground station.
+    /// The b-thread of vehicle `me`; `others` are the other vehicles and the ground station, `lease` is that of their bids.
     #[must_use]
-    pub fn new<'a>(me: Me, others: impl IntoIterator<Item = &'a str>) -> Self {
+    pub fn new<'a>(me: Me, others: impl IntoIterator<Item = &'a str>, lease: Duration) -> Self {
         let others = others.into_iter().map(|node| (node.to_owned(), Other::Unheard)).collect();
-        Self { me, others, met: Duration::ZERO, phase: Phase::Clear }
+        let meeting = lease.mul_f64(MEETING_LEASES);
+        Self { me, others, meeting, met: Duration::ZERO, phase: Phase::Clear }
     }
 
     /// `enter` into the same passage, of everyone else.
@@ -109,7 +112,7 @@ impl RightOfWay {
             (false, false) => Other::Lost,
         };
         if joined {
-            self.met = now + MEETING;
+            self.met = now + self.meeting;
         }
     }
 

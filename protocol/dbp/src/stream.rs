@@ -106,6 +106,11 @@ impl Stream {
     pub(crate) fn occurrence(&mut self, occurrence: Occurrence, heard: &mut VecDeque<Heard>) {
         let seq = occurrence.seq;
         self.latest = self.latest.max(seq);
+        if self.pending.is_empty() && self.applied.is_some_and(|applied| seq == applied + 1) {
+            self.applied = Some(seq);
+            heard.push_back(Heard::Occurrence(occurrence));
+            return;
+        }
         let wanted = self.applied.is_none_or(|applied| seq > applied);
         if wanted
             && (self.pending.len() < MOST_PENDING || Some(seq) == self.applied.map(|applied| applied + 1))
@@ -176,6 +181,10 @@ impl Stream {
             }
         }
         self.applied = Some(applied);
+        if self.pending.is_empty() {
+            // An emptied map keeps a node of its tree, for every home.
+            self.pending = BTreeMap::new();
+        }
     }
 }
 

@@ -52,6 +52,7 @@ pub(super) fn run(args: &SeparationCampaign, as_json: bool) -> anyhow::Result<bo
             "vehicles": args.vehicles,
             "latency_ms": args.latency_ms,
             "loss": args.loss,
+            "lease_ms": args.lease_ms,
             "collisions": collided.iter().map(|run| run.collisions).sum::<u64>(),
             "arrived": runs.iter().filter(|run| run.arrived).count(),
             "min_separation_m": separation_m,
@@ -107,7 +108,7 @@ fn fly_all(args: &SeparationCampaign) -> anyhow::Result<Vec<Run>> {
 
 fn fly_one(args: &SeparationCampaign, scenario: &str, seed: u64) -> anyhow::Result<Run> {
     let mut scenario = Scenario::built_in(scenario, Some(args.vehicles), seed)?;
-    scenario.network = Network { latency_ms: args.latency_ms, loss: args.loss };
+    scenario.network = Network { latency_ms: args.latency_ms, loss: args.loss, lease_ms: args.lease_ms };
     scenario.validate()?;
     fly::in_memory(&scenario).map(Run::of)
 }

@@ -32,9 +32,9 @@ const TICKS_BEFORE_OFFBOARD: u32 = 25;
 const PATIENCE_S: f64 = 20.0;
 
 const INTEGRALS: [(&str, PositionIntegral); 3] = [
-    ("variable", PositionIntegral::Variable),
-    ("plain", PositionIntegral::Plain),
-    ("none", PositionIntegral::None),
+    ("variable integral", PositionIntegral::Variable),
+    ("plain integral", PositionIntegral::Plain),
+    ("no integral", PositionIntegral::None),
 ];
 
 /// A flight: when, where it should have been and where it was, at every tick since it joined the circle.
@@ -61,13 +61,13 @@ pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
         let rms_m = mean(&errors.iter().map(|errors| root_mean_square(errors)).collect::<Vec<_>>());
         let greatest = |errors: &Vec<f64>| errors.iter().copied().fold(0.0, f64::max);
         let max_m = mean(&errors.iter().map(greatest).collect::<Vec<_>>());
-        report.number(name, json!({ "rms_m": rms_m, "max_m": max_m }));
+        report.number(&name.replace(' ', "_"), json!({ "rms_m": rms_m, "max_m": max_m }));
         rows.push(vec![(*name).to_owned(), format!("{rms_m:.3}"), format!("{max_m:.3}")]);
         found.push((rms_m, max_m));
     }
     report.table(
         "Tracking a circle: means over the runs of each run's error",
-        &["position integral", "RMS, m", "greatest, m"],
+        &["position loop", "RMS, m", "greatest, m"],
         rows,
     );
     if let [variable, plain, ..] = found.as_slice() {
@@ -181,12 +181,13 @@ fn fly(integral: PositionIntegral, seed: u64) -> anyhow::Result<Flight> {
     }
 }
 
+/// The variable integral is drawn last: on the circle it flies as the plain one does, and hides it.
 fn map(flights: &[Flight]) -> Figure {
     let circle =
         (0..=72).map(|k| f64::from(k) * TAU / 72.0).map(|a| (RADIUS_M * a.cos(), RADIUS_M * a.sin()));
     let reference = Line { name: "wanted".to_owned(), style: Style::Reference, points: circle.collect() };
     let line = |((name, _), flight): (&(&str, PositionIntegral), &Flight)| Line {
-        name: format!("{name} integral"),
+        name: (*name).to_owned(),
         style: Style::Solid,
         points: flight.0.iter().map(|(_, _, was)| (was.x, was.y)).collect(),
     };
@@ -194,13 +195,13 @@ fn map(flights: &[Flight]) -> Figure {
         x: "east, m".to_owned(),
         y: "north, m".to_owned(),
         is_map: true,
-        lines: std::iter::once(reference).chain(INTEGRALS.iter().zip(flights).map(line)).collect(),
+        lines: std::iter::once(reference).chain(INTEGRALS.iter().zip(flights).rev().map(line)).collect(),
     }
 }
 
 fn errors_over_time(flights: &[Flight]) -> Figure {
     let line = |((name, _), flight): (&(&str, PositionIntegral), &Flight)| Line {
-        name: format!("{name} integral"),
+        name: (*name).to_owned(),
         style: Style::Solid,
         points: flight.0.iter().map(|(t, wanted, was)| (*t, (was - wanted).norm())).collect(),
     };
@@ -208,7 +209,7 @@ fn errors_over_time(flights: &[Flight]) -> Figure {
         x: "time, s".to_owned(),
         y: "distance from where it should be, m".to_owned(),
         is_map: false,
-        lines: INTEGRALS.iter().zip(flights).map(line).collect(),
+        lines: INTEGRALS.iter().zip(flights).rev().map(line).collect(),
     }
 }
 

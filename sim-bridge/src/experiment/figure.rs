@@ -77,7 +77,7 @@ impl Figure {
         let mut chart = ChartBuilder::on(root)
             .margin(12)
             .x_label_area_size(44)
-            .y_label_area_size(60)
+            .y_label_area_size(72)
             .build_cartesian_2d(across, up)?;
         chart
             .configure_mesh()
@@ -127,7 +127,7 @@ impl Figure {
         if !self.is_map {
             return (across, up);
         }
-        let shape = f64::from(SIZE.0 - 84) / f64::from(SIZE.1 - 68);
+        let shape = f64::from(SIZE.0 - 96) / f64::from(SIZE.1 - 68);
         let (wide, high) = (across.end - across.start, up.end - up.start);
         (widen(across, high * shape), widen(up, wide / shape))
     }

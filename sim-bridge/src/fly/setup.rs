@@ -16,8 +16,6 @@ use crate::scenario::{self, OrderKind, Scenario, VehiclePlan};
 
 /// The fleet's name on one host.
 pub const FLEET: &str = "sim";
-/// Lease of every node's bids.
-const LEASE: Duration = Duration::from_secs(1);
 /// Distance that vehicles keep from centre to centre, in hull radii: 1.4 m for a vehicle of 0.25 m.
 const SEPARATION_HULLS: f64 = 5.6;
 /// Lowest height at which vehicles return, m above the world's origin.
@@ -92,7 +90,7 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
             lidar: true,
             fence,
             envelope: Envelope {
-                cruise_m_s: scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
+                cruise_m_s: plan.pace * scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
                 climb_m_s: plan.model.max_climb_m_s.min(1.5),
                 brake_m_s2: plan.model.max_accel_m_s2 * 0.7,
                 hull_m: plan.model.hull_radius_m,
@@ -108,7 +106,7 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
                 cli::Controller::None => Controller::None,
             },
             scripts: scripts_of(scenario, index + 1),
-            lease: LEASE,
+            lease: lease(scenario),
             authority: standard_authority(),
             kept: Kept::default(),
             seed: scenario.seed.wrapping_mul(1000).wrapping_add(index as u64),
@@ -129,6 +127,11 @@ fn swaps_places(scenario: &Scenario) -> bool {
         let near = |other: &VehiclePlan| (one.goal() - other.start).xy().norm() < ROOM_TO_LAND_M;
         vehicles.iter().enumerate().any(|(other_index, other)| other_index != index && near(other))
     })
+}
+
+/// Lease of every node's bids.
+fn lease(scenario: &Scenario) -> Duration {
+    Duration::from_secs_f64(scenario.network.lease_ms / 1000.0)
 }
 
 /// The ground station of a scenario, with its operator's orders.
@@ -154,9 +157,9 @@ pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Control
         orders: orders.collect(),
         loaded: controller == cli::Controller::Bp,
         launch_on_order: scenario.orders.iter().any(|said| said.order == OrderKind::LaunchTogether),
-        muster: swaps_places(scenario),
+        muster: scenario.muster || swaps_places(scenario),
         operators: NodeName::new(SCRIPT).into_iter().collect(),
-        lease: LEASE,
+        lease: lease(scenario),
         seed: scenario.seed,
         ..GroundConfig::new(fleet, GROUND.clone(), vehicles)
     }

@@ -19,6 +19,11 @@ pub fn share<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error
     number(deserializer, "a number from 0 to below 1", |v| (0.0..1.0).contains(&v))
 }
 
+/// A lease, in milliseconds.
+pub fn lease_ms<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    number(deserializer, "a number from 100 to 10000", |v| (100.0..=10_000.0).contains(&v))
+}
+
 /// A finite number above zero, where the field is given.
 pub fn optional_positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
     positive(deserializer).map(Some)
@@ -34,6 +39,12 @@ pub fn point<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vector3<f64>,
 pub fn ground_point<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vector3<f64>, D::Error> {
     let [x, y] = <[f64; 2]>::deserialize(deserializer)?;
     finite::<D::Error>([x, y, 0.0]).map(Vector3::from)
+}
+
+/// A list of places on the ground.
+pub fn ground_points<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Vector3<f64>>, D::Error> {
+    let values = Vec::<[f64; 2]>::deserialize(deserializer)?;
+    values.into_iter().map(|[x, y]| finite::<D::Error>([x, y, 0.0]).map(Vector3::from)).collect()
 }
 
 /// A list of points, each of three finite coordinates.

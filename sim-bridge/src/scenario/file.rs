@@ -12,10 +12,13 @@ use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_world::{Aabb, Obstacle, Scene, Shape, VehicleModel, WindConfig};
 
 use super::antipodal::Antipodal;
+use super::coverage::Coverage;
 use super::field;
 use super::forest::Forest;
+use super::formation::Formation;
 use super::layout::Layout;
 use super::open::Open;
+use super::targets::{PacedRoute, Targets};
 use super::window::Window;
 use super::{
     DEFAULT_TIME_LIMIT_S, Network, Order, OrderKind, Scenario, ScenarioError, VehiclePlan, VehicleScript,
@@ -58,6 +61,9 @@ struct FileTable {
     antipodal: Option<Antipodal>,
     window: Option<Window>,
     open: Option<Open>,
+    coverage: Option<Coverage>,
+    formation: Option<Formation>,
+    targets: Option<Targets>,
     bounds: Option<BoundsTable>,
     wind: Option<WindTable>,
     #[serde(default)]
@@ -216,13 +222,14 @@ impl ScenarioFile {
         let count = self.count(vehicles, set.missions.len());
         check_count(&name, count)?;
         let layout = self.generate(count, seed);
-        let mut plans = self.plans(count, layout.as_ref(), set.missions.is_empty())?;
+        let mut plans = self.plans(count, layout.as_ref(), set.missions.is_empty(), seed)?;
         self.tune_gps(&mut plans);
         let replaced = world.is_some() && layout.is_some();
         let (scene, notes) = self.scene(&name, layout, world)?;
         let orders = self.orders(count)?;
         let scripts = self.scripts(count)?;
         let fixed_bounds = self.fixed_bounds();
+        let (cruise_speed_m_s, takeoff_height_m) = (self.cruise_speed_m_s(), self.takeoff_height_m());
         let table = self.table;
         let mut scenario = Scenario {
             name,
@@ -231,9 +238,10 @@ impl ScenarioFile {
             scene,
             fixed_bounds,
             vehicles: plans,
-            cruise_speed_m_s: table.cruise_speed_m_s.unwrap_or(DEFAULT_CRUISE_SPEED_M_S),
+            muster: table.formation.is_some() || table.targets.is_some(),
+            cruise_speed_m_s,
             local: table.local,
-            takeoff_height_m: table.takeoff_height_m.unwrap_or(DEFAULT_TAKEOFF_HEIGHT_M),
+            takeoff_height_m,
             time_limit_s: table.time_limit_s.unwrap_or(DEFAULT_TIME_LIMIT_S),
             wind: table.wind.map(WindConfig::from).unwrap_or_default(),
             orders,
@@ -270,12 +278,40 @@ impl ScenarioFile {
         {
             return Err(self.contradiction(format!("forest.{field}"), message));
         }
+        let ways = [
+            ("vehicle", !table.vehicle.is_empty()),
+            ("coverage", table.coverage.is_some()),
+            ("formation", table.formation.is_some()),
+            ("targets", table.targets.is_some()),
+            ("mission", !table.mission.is_empty() && self.has_task()),
+        ];
+        let mut stated = ways.iter().filter(|(_, given)| *given);
+        if let (Some((one, _)), Some((other, _))) = (stated.next(), stated.next()) {
+            return Err(self.contradiction(*other, format!("the vehicles' ways come from `{one}` already")));
+        }
+        if table.targets.is_some() && table.bounds.is_none() {
+            return Err(self.contradiction("targets", "expected [bounds] beside it, to plan routes in"));
+        }
         if let Some(bounds) = &table.bounds
             && (0..3).any(|axis| bounds.min_m[axis] >= bounds.max_m[axis])
         {
             return Err(self.contradiction("bounds", "expected min_m below max_m in every axis".to_owned()));
         }
         Ok(())
+    }
+
+    /// Whether routes are planned from a task for the whole swarm.
+    fn has_task(&self) -> bool {
+        let table = &self.table;
+        table.coverage.is_some() || table.formation.is_some() || table.targets.is_some()
+    }
+
+    fn cruise_speed_m_s(&self) -> f64 {
+        self.table.cruise_speed_m_s.unwrap_or(DEFAULT_CRUISE_SPEED_M_S)
+    }
+
+    fn takeoff_height_m(&self) -> f64 {
+        self.table.takeoff_height_m.unwrap_or(DEFAULT_TAKEOFF_HEIGHT_M)
     }
 
     fn contradiction(&self, field: impl Into<String>, message: impl Into<String>) -> ScenarioError {
@@ -299,7 +335,8 @@ impl ScenarioFile {
             described => Some(described),
         };
         let one_each = (missions > 1).then_some(missions);
-        let default = || if self.table.generator.is_some() || missions > 0 { DEFAULT_VEHICLES } else { 0 };
+        let has_work = self.table.generator.is_some() || self.has_task() || missions > 0;
+        let default = || if has_work { DEFAULT_VEHICLES } else { 0 };
         wanted.or(self.table.vehicles).or(described).or(one_each).unwrap_or_else(default)
     }
 
@@ -315,33 +352,58 @@ impl ScenarioFile {
         Some(layout)
     }
 
-    /// `[[vehicle]]` tables where there are any, else the generator's routes, else blanks for a mission to fill.
+    /// `[[vehicle]]` tables where there are any, else the task's routes, else the generator's, else blanks for a mission to
+    /// fill.
     fn plans(
         &self,
         count: usize,
         layout: Option<&Layout>,
         no_mission: bool,
+        seed: u64,
     ) -> Result<Vec<VehiclePlan>, ScenarioError> {
         let model = self.model(self.table.model.as_deref().unwrap_or(DEFAULT_MODEL))?;
         if !self.table.vehicle.is_empty() {
             return self.described(count, &model);
+        }
+        if let Some(routes) = self.task(count, seed)? {
+            return Ok(routes.into_iter().map(|paced| from_under(paced, &model)).collect());
         }
         if let Some(layout) = layout {
             let plan = |route: &super::layout::Route| VehiclePlan {
                 start: route.start,
                 yaw: route.yaw(),
                 waypoints: vec![route.goal],
+                pace: 1.0,
                 model: model.clone(),
             };
             return Ok(layout.routes.iter().map(plan).collect());
         }
         if no_mission {
-            let message =
-                "expected a generator, a mission or [[vehicle]] tables: the vehicles have nowhere to go";
+            let message = "expected a generator, a task, a mission or [[vehicle]] tables: the vehicles have nowhere to go";
             return Err(self.contradiction("vehicles", message));
         }
-        let blank = VehiclePlan { start: Vector3::zeros(), yaw: 0.0, waypoints: Vec::new(), model };
+        let blank =
+            VehiclePlan { start: Vector3::zeros(), yaw: 0.0, waypoints: Vec::new(), pace: 1.0, model };
         Ok(vec![blank; count])
+    }
+
+    /// The routes that the task for the whole swarm gives, if there is one.
+    fn task(&self, vehicles: usize, seed: u64) -> Result<Option<Vec<PacedRoute>>, ScenarioError> {
+        let at_cruise = |route| PacedRoute { route, pace: 1.0 };
+        let table = &self.table;
+        if let Some(coverage) = &table.coverage {
+            let routes = coverage.routes(vehicles);
+            let routes = routes.map_err(|error| self.contradiction("coverage", error.to_string()))?;
+            return Ok(Some(routes.into_iter().map(at_cruise).collect()));
+        }
+        if let Some(formation) = &table.formation {
+            return Ok(Some(formation.routes(vehicles).into_iter().map(at_cruise).collect()));
+        }
+        let (Some(targets), Some(bounds)) = (&table.targets, &table.bounds) else { return Ok(None) };
+        let bounds = Aabb { min: bounds.min_m, max: bounds.max_m };
+        let (height_m, cruise_m_s) = (self.takeoff_height_m(), self.cruise_speed_m_s());
+        let routes = targets.routes(vehicles, &bounds, height_m, cruise_m_s, seed);
+        routes.map(Some).map_err(|error| self.contradiction("targets", error.to_string()))
     }
 
     fn described(&self, count: usize, model: &VehicleModel) -> Result<Vec<VehiclePlan>, ScenarioError> {
@@ -357,6 +419,7 @@ impl ScenarioFile {
                 start,
                 yaw: table.yaw_rad.unwrap_or_else(|| ahead.y.atan2(ahead.x)),
                 waypoints: table.waypoints_m.clone(),
+                pace: 1.0,
                 model: table.model.as_deref().map_or_else(|| Ok(model.clone()), |name| self.model(name))?,
             })
         };
@@ -413,7 +476,8 @@ impl ScenarioFile {
     }
 
     fn obstacles(&self) -> Result<Vec<Obstacle>, ScenarioError> {
-        self.table.obstacle.iter().enumerate().map(|(i, table)| self.obstacle(i, table)).collect()
+        let own = self.table.obstacle.iter().enumerate().map(|(i, table)| self.obstacle(i, table));
+        own.chain(self.table.targets.iter().flat_map(Targets::obstacles).map(Ok)).collect()
     }
 
     fn obstacle(&self, index: usize, table: &ObstacleTable) -> Result<Obstacle, ScenarioError> {
@@ -477,6 +541,19 @@ impl ScenarioFile {
             }
         }
         Ok(scripts)
+    }
+}
+
+/// The plan of a vehicle that takes off under its route's first point.
+fn from_under(PacedRoute { route, pace }: PacedRoute, model: &VehicleModel) -> VehiclePlan {
+    let first = route.first().copied().unwrap_or_default();
+    let ahead = route.get(1).map_or(Vector3::x(), |second| second - first);
+    VehiclePlan {
+        start: Vector3::new(first.x, first.y, 0.0),
+        yaw: ahead.y.atan2(ahead.x),
+        waypoints: route,
+        pace,
+        model: model.clone(),
     }
 }
 

@@ -1,16 +1,20 @@
 //! Scenarios: a world, a swarm in it, and what is asked of the swarm.
 //!
 //! A scenario is a TOML file. The built-in ones are the files of `scenarios/`, read as a user's own would be;
-//! those whose `generator` makes world and routes make them from the seed, so that one seed is one world.
+//! those whose `generator` makes world and routes make them from the seed, so that one seed is one world. Others name a
+//! task for the whole swarm, from which the vehicles' routes are planned: an area, a formation, targets.
 
 mod antipodal;
+mod coverage;
 mod error;
 mod field;
 mod file;
 mod forest;
+mod formation;
 mod layout;
 mod open;
 pub(crate) mod placement;
+mod targets;
 mod window;
 mod world_file;
 
@@ -41,11 +45,14 @@ const ROUTE_MARGIN: Vector3<f64> = Vector3::new(5.0, 5.0, 5.0);
 /// Room between two hulls on the ground, in metres, below which a scenario is refused.
 const HULL_ROOM_M: f64 = 0.2;
 
-const BUILT_IN: [(&str, &str); 4] = [
+const BUILT_IN: [(&str, &str); 7] = [
     ("forest", include_str!("../../scenarios/forest.toml")),
     ("antipodal", include_str!("../../scenarios/antipodal.toml")),
     ("window", include_str!("../../scenarios/window.toml")),
     ("open", include_str!("../../scenarios/open.toml")),
+    ("survey", include_str!("../../scenarios/survey.toml")),
+    ("geese", include_str!("../../scenarios/geese.toml")),
+    ("valley", include_str!("../../scenarios/valley.toml")),
 ];
 
 /// A world, a swarm in it, and what is asked of the swarm. World frame ENU, metres, seconds.
@@ -63,6 +70,8 @@ pub struct Scenario {
     pub fixed_bounds: bool,
     /// The vehicles; vehicle `i` is `uav/{i + 1}`.
     pub vehicles: Vec<VehiclePlan>,
+    /// Whether nobody sets out before everybody is in the air.
+    pub muster: bool,
     /// Speed the vehicles aim for between waypoints.
     pub cruise_speed_m_s: f64,
     /// What turns a path into a velocity on board.
@@ -92,6 +101,8 @@ pub struct VehiclePlan {
     pub yaw: f64,
     /// Where to fly: ENU, metres. It lands under the last.
     pub waypoints: Vec<Vector3<f64>>,
+    /// How fast it flies, as a share of the scenario's cruise speed: above 0, at most 1.
+    pub pace: f64,
     /// What it is made of.
     pub model: VehicleModel,
 }
@@ -103,7 +114,7 @@ impl VehiclePlan {
     }
 }
 
-/// What the in-memory network does to messages.
+/// What the in-memory network does to messages, and how the nodes are set up for it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Network {
@@ -113,11 +124,15 @@ pub struct Network {
     /// Share of messages that are lost, 0 to below 1.
     #[serde(deserialize_with = "field::share")]
     pub loss: f64,
+    /// How long a node's bids hold elsewhere without being renewed, in milliseconds, 100 to 10000: several times as long as
+    /// a message takes there and back.
+    #[serde(deserialize_with = "field::lease_ms")]
+    pub lease_ms: f64,
 }
 
 impl Default for Network {
     fn default() -> Self {
-        Self { latency_ms: 5.0, loss: 0.0 }
+        Self { latency_ms: 5.0, loss: 0.0, lease_ms: 1000.0 }
     }
 }
 

@@ -22,6 +22,8 @@ pub struct MovingConfig {
     pub gate_m: f64,
     /// Share of a place's surprise that corrects the track's place, and its velocity per second.
     pub correction: [f64; 2],
+    /// What stands where it was first seen has something within this distance of what was seen of it first, metres.
+    pub stays_m: f64,
     /// Slower than this a thing stands still, m/s.
     pub slowest_m_s: f64,
     /// A thing moves once it is this far from where it was first seen, metres.
@@ -45,6 +47,7 @@ impl Default for MovingConfig {
             roundness_m: 0.06,
             gate_m: 0.8,
             correction: [0.5, 1.5],
+            stays_m: 0.3,
             slowest_m_s: 0.4,
             moved_m: 0.7,
             fewest_sightings: 6,
@@ -60,6 +63,8 @@ impl Default for MovingConfig {
 struct Track {
     id: u32,
     first_seen: Vector3<f64>,
+    /// What was seen of it first: a place on its surface.
+    first_surface: Vector3<f64>,
     position: Vector3<f64>,
     velocity: Vector3<f64>,
     radius_m: f64,
@@ -73,6 +78,15 @@ impl Track {
     fn expected(&self, now: Duration) -> Vector3<f64> {
         self.position + self.velocity * now.saturating_sub(self.seen).as_secs_f64()
     }
+}
+
+/// A round thing in the returns of one scan.
+#[derive(Clone, Copy, Debug)]
+struct Thing {
+    centre: Vector3<f64>,
+    radius_m: f64,
+    /// A place on the side that is seen.
+    surface: Vector3<f64>,
 }
 
 /// Follows what moves.
@@ -98,7 +112,7 @@ impl Tracker {
         let MovingConfig { gate_m, correction: [place_share, velocity_share], forget_s, .. } = self.config;
         let mut lost: Vec<Track> = std::mem::take(&mut self.tracks);
         lost.retain(|track| now.saturating_sub(track.seen).as_secs_f64() < forget_s);
-        for (centre, radius_m) in self.things(returns) {
+        for Thing { centre, radius_m, surface } in self.things(returns) {
             let surprise = |track: &Track| (centre - track.expected(now)).norm();
             let nearest = (0..lost.len()).min_by(|a, b| surprise(&lost[*a]).total_cmp(&surprise(&lost[*b])));
             self.tracks.push(match nearest.filter(|index| surprise(&lost[*index]) < gate_m) {
@@ -122,6 +136,7 @@ impl Tracker {
                     Track {
                         id,
                         first_seen: centre,
+                        first_surface: surface,
                         position: centre,
                         velocity,
                         radius_m,
@@ -137,7 +152,8 @@ impl Tracker {
 
     /// What moves, where it is expected `now`. Its uncertainty has grown since it was last seen, and it keeps no distance.
     ///
-    /// Whatever moves has left the place where it was first seen: in the `map` that place is free.
+    /// Whatever moves has left the place where it was first seen: in the `map` what was seen of it there is free. The centre of
+    /// what stands may seem to move as more of it comes into view; its surface does not.
     pub fn moving<'a>(
         &'a self,
         now: Duration,
@@ -149,7 +165,7 @@ impl Tracker {
                 && track.surprise_m < self.config.most_surprise_m
                 && track.velocity.norm() > self.config.slowest_m_s
                 && (track.position - track.first_seen).norm() > self.config.moved_m
-                && map.clearance(&track.first_seen) > track.radius_m
+                && map.clearance(&track.first_surface) > self.config.stays_m
         };
         self.tracks.iter().filter(moves).map(move |track| Neighbour {
             id: track.id,
@@ -162,8 +178,8 @@ impl Tracker {
         })
     }
 
-    /// Centre and radius of every narrow thing in the returns.
-    fn things(&self, returns: &[Vector3<f64>]) -> Vec<(Vector3<f64>, f64)> {
+    /// Every narrow thing in the returns.
+    fn things(&self, returns: &[Vector3<f64>]) -> Vec<Thing> {
         let MovingConfig { gap_m, widest_m, fewest_returns, roundness_m, .. } = self.config;
         let mut groups: Vec<Vec<Vector3<f64>>> = Vec::new();
         for point in returns {
@@ -190,10 +206,11 @@ impl Tracker {
         };
         let round = |group: &Vec<Vector3<f64>>| {
             let (centre, radius_m) = circle(group)?;
+            let surface = *group.get(group.len() / 2)?;
             let off = |point: &Vector3<f64>| (point - centre).xy().norm() - radius_m;
             let squares: f64 = group.iter().map(|point| off(point) * off(point)).sum();
             let is_round = (squares / group.len() as f64).sqrt() < roundness_m;
-            (is_round && radius_m < widest_m / 2.0).then_some((centre, radius_m))
+            (is_round && radius_m < widest_m / 2.0).then_some(Thing { centre, radius_m, surface })
         };
         groups.iter().filter(narrow).filter_map(round).collect()
     }
@@ -278,7 +295,7 @@ mod tests {
             tracker.look(at(tick), &seen(&Vector3::new(0.0, 0.0, 3.1), &place(tick), 0.25));
         }
         let mut map = free();
-        map.insert(&place(0));
+        seen(&Vector3::new(0.0, 0.0, 3.1), &place(0), 0.25).iter().for_each(|point| map.insert(point));
         assert_eq!(tracker.moving(at(19), &map).count(), 0);
     }
 

@@ -11,6 +11,8 @@ pub use follower::{Follower, Step};
 
 /// A detour for comfort turns from the target by no more than this, radians.
 const DETOUR: f64 = FRAC_PI_4;
+/// A bearing this near to the one chosen last is the same choice, and may turn from the target by so much more, radians.
+const SAME_CHOICE: f64 = 0.2;
 
 /// How the histogram is made and read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -236,7 +238,7 @@ impl Vfh {
     /// radians counter-clockwise from east. `None` where no opening is left.
     ///
     /// The edges of each opening are candidates, and the target if it lies in one; openings that leave the comfort radius come
-    /// first, as long as they lead within an eighth of a turn of the target. The least
+    /// first, as long as they lead within about an eighth of a turn of the target. The least
     /// `mu1 |c - target| + mu2 |c - heading| + mu3 |c - previous|` wins (Ulrich and Borenstein 1998).
     pub fn steer(&mut self, target: f64, heading: Option<f64>) -> Option<f64> {
         let VfhConfig { target_weight, heading_weight, previous_weight, .. } = self.config;
@@ -249,7 +251,13 @@ impl Vfh {
         };
         let best = |openings: &[Opening], within: f64| {
             let all = openings.iter().flat_map(|opening| opening.candidates(target)).map(wrapped);
-            let near = all.filter(|candidate| wrapped(candidate - target).abs() <= within);
+            let slack = |candidate: f64| {
+                let is_kept =
+                    previous.is_some_and(|previous| wrapped(candidate - previous).abs() < SAME_CHOICE);
+                if is_kept { SAME_CHOICE } else { 0.0 }
+            };
+            let near =
+                all.filter(|candidate| wrapped(candidate - target).abs() <= within + slack(*candidate));
             near.min_by(|a, b| cost(*a).total_cmp(&cost(*b)))
         };
         let [comfortable, safe] = &self.openings;

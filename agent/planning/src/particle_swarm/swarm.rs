@@ -39,8 +39,6 @@ pub struct Best {
 
 /// A particle about to move.
 pub struct Mover<'a> {
-    /// Which one it is.
-    pub index: usize,
     /// Where it is.
     pub position: &'a [f64],
     /// Its velocity so far, to be replaced by the next one.
@@ -81,12 +79,6 @@ impl Mover<'_> {
 }
 
 impl Flock {
-    /// The box.
-    #[must_use]
-    pub fn space(&self) -> &SearchSpace {
-        &self.space
-    }
-
     /// Positions of all particles, one after another.
     #[must_use]
     pub fn positions(&self) -> &[f64] {
@@ -101,12 +93,6 @@ impl Flock {
         let sum: f64 =
             moved.map(|(k, (now, then))| (now - then).abs() / self.space.width(k % dimensions)).sum();
         sum / self.positions.len() as f64
-    }
-
-    /// `gbest`.
-    #[must_use]
-    pub fn leader(&self) -> &Best {
-        &self.leader
     }
 }
 
@@ -185,13 +171,8 @@ impl<M: Motion> Swarm<M> {
         let dimensions = space.dimensions();
         let here = self.turn * dimensions..(self.turn + 1) * dimensions;
         let (position, velocity) = (&mut positions[here.clone()], &mut velocities[here.clone()]);
-        let mover = Mover {
-            index: self.turn,
-            position,
-            velocity: &mut *velocity,
-            own_best: &bests[here],
-            leader: &leader.position,
-        };
+        let mover =
+            Mover { position, velocity: &mut *velocity, own_best: &bests[here], leader: &leader.position };
         self.motion.accelerate(mover, space, &mut self.rng);
         for (dimension, (at, speed)) in position.iter_mut().zip(velocity).enumerate() {
             let most = self.motion.max_step() * space.width(dimension);

@@ -39,18 +39,6 @@ impl Traffic {
         self.tracks.push(Track::along(route, cost));
     }
 
-    /// How many vehicles there are.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.tracks.len()
-    }
-
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.tracks.is_empty()
-    }
-
     /// Least distance from any of the vehicles while flying along these points with them, metres; infinite without any.
     #[must_use]
     pub fn separation_m(&self, route: &[Vector3<f64>], cost: &RouteCost) -> f64 {

@@ -15,6 +15,9 @@ use crate::node::{
 use crate::stalls::StallNews;
 use crate::{Message, NodeName, Occurrence, Recipient, Roster};
 
+/// Room for deliveries that is kept between steps.
+const DELIVERIES_KEPT: usize = 16;
+
 impl Node {
     pub(super) fn let_go_of_the_lapsed(&mut self) {
         let lapsed = self.table.expire(self.now);
@@ -67,6 +70,8 @@ impl Node {
                 break;
             }
         }
+        // When a fleet meets, hundreds come at once, and never again.
+        self.deliveries.shrink_to(DELIVERIES_KEPT);
         outcome
     }
 

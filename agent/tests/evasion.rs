@@ -1,0 +1,68 @@
+//! A vehicle that others have come too near to on all sides leaves its height.
+
+use std::time::Duration;
+
+use nalgebra::Vector3;
+use skein_agent::pipeline::guidance::{Guidance, Motion, Surroundings};
+use skein_agent::pipeline::perception::Perception;
+use skein_agent::{Envelope, Fence, Planners};
+use skein_mav::SetPoint;
+use skein_planning::separation::Neighbour;
+
+const FENCE: Fence = Fence { min: [-20.0, -20.0, 0.0], max: [20.0, 20.0, 12.0] };
+
+fn around(place: Vector3<f64>, count: u32, distance_m: f64) -> Vec<Neighbour> {
+    let neighbour = |id: u32| {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(id) / f64::from(count)).sin_cos();
+        Neighbour {
+            id,
+            position: place + Vector3::new(cos, sin, 0.0) * distance_m,
+            velocity: Vector3::zeros(),
+            sigma_m: 0.05,
+            age_s: 0.0,
+            radius_m: 0.25,
+            cooperative: true,
+        }
+    };
+    (0..count).map(neighbour).collect()
+}
+
+/// The set-points of the first second at `place`, among neighbours that stand around it.
+fn second_among(place: Vector3<f64>, neighbours: &[Neighbour], rank: u32) -> Vec<SetPoint> {
+    let perception = Perception::new(&FENCE, Vector3::zeros(), [0.6, 8.0]).unwrap();
+    let mut guidance = Guidance::new(Envelope::default(), FENCE, Planners::default());
+    let motion = Motion { position: place, velocity: Vector3::zeros() };
+    let surroundings = Surroundings { map: perception.map(), obstacles: &[], neighbours, rank };
+    (0..50).map(|tick| guidance.steer(Duration::from_millis(20 * tick), &motion, &surroundings)).collect()
+}
+
+fn climb(set_point: &SetPoint) -> f64 {
+    match set_point {
+        SetPoint::Velocity { velocity, .. } => velocity.z,
+        _ => 0.0,
+    }
+}
+
+#[test]
+fn hemmed_in_it_brakes_and_then_climbs_or_sinks_by_rank() {
+    let place = Vector3::new(0.0, 0.0, 4.0);
+    let close = around(place, 3, 0.8);
+    let climbs = second_among(place, &close, 0);
+    assert!(climbs[..24].iter().all(|set_point| climb(set_point) == 0.0), "it brakes first");
+    assert!(climb(&climbs[49]) > 0.5, "{:?}", climbs[49]);
+    assert!(climb(&second_among(place, &close, 3)[49]) < -0.5);
+}
+
+#[test]
+fn near_the_ground_it_does_not_sink_and_under_the_ceiling_it_does_not_climb() {
+    let low = Vector3::new(0.0, 0.0, 1.2);
+    assert!(climb(&second_among(low, &around(low, 3, 0.8), 3)[49]) > 0.5);
+    let high = Vector3::new(0.0, 0.0, 7.8);
+    assert!(climb(&second_among(high, &around(high, 3, 0.8), 0)[49]) < -0.5);
+}
+
+#[test]
+fn with_room_between_the_others_it_keeps_its_height() {
+    let place = Vector3::new(0.0, 0.0, 4.0);
+    assert!(second_among(place, &around(place, 3, 2.5), 0).iter().all(|set_point| climb(set_point) == 0.0));
+}

@@ -1,0 +1,223 @@
+//! `[targets]`: the vehicles fly through terrain, threats and no-fly zones that are known beforehand, and arrive at their
+//! targets together (P3). Their routes are planned before take-off, as the ground plans: each among those before it.
+
+use nalgebra::{Isometry3, Vector2, Vector3};
+use serde::Deserialize;
+use skein_planning::airspace::{Airspace, Mountain, NoFlyZone, ThreatZone};
+use skein_planning::assignment::assign;
+use skein_planning::route::{
+    Effort, Planner, RouteCost, RouteError, arrival_slots, arrive_together, plan_in_turn,
+};
+use skein_world::{Aabb, Obstacle, Shape};
+
+use super::field::{ground_point, ground_points, non_negative, points, positive};
+
+/// Inner waypoints of a route.
+const WAYPOINTS: usize = 6;
+/// How far routes stay out of threat and no-fly zones: what a vehicle strays from its route, and its hull, in metres.
+const MARGIN_M: f64 = 1.5;
+/// Height of the steps that a mountain is built of, in metres.
+const STEP_M: f64 = 1.0;
+/// How many times slower than at cruise a vehicle may fly so that all arrive together.
+const SLOWEST: f64 = 2.0;
+
+/// The `[targets]` table.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Targets {
+    /// Where to fly (ENU, metres). Vehicles that share a target arrive in a line across their way.
+    #[serde(deserialize_with = "points")]
+    places_m: Vec<Vector3<f64>>,
+    /// The two ends of the line on which the vehicles stand, evenly, before they take off.
+    #[serde(deserialize_with = "ground_points")]
+    from_m: Vec<Vector3<f64>>,
+    /// Distance between vehicles at one target, in metres.
+    #[serde(deserialize_with = "positive")]
+    spacing_m: f64,
+    #[serde(default)]
+    mountain: Vec<MountainTable>,
+    #[serde(default)]
+    threat: Vec<ThreatTable>,
+    #[serde(default)]
+    no_fly: Vec<NoFlyTable>,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MountainTable {
+    #[serde(deserialize_with = "ground_point")]
+    centre_m: Vector3<f64>,
+    #[serde(deserialize_with = "positive")]
+    height_m: f64,
+    #[serde(deserialize_with = "positive")]
+    slope_m: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ThreatTable {
+    #[serde(deserialize_with = "ground_point")]
+    centre_m: Vector3<f64>,
+    #[serde(deserialize_with = "positive")]
+    radius_m: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct NoFlyTable {
+    #[serde(deserialize_with = "ground_point")]
+    centre_m: Vector3<f64>,
+    #[serde(deserialize_with = "positive")]
+    radius_m: f64,
+    #[serde(default, deserialize_with = "non_negative")]
+    floor_m: f64,
+    #[serde(deserialize_with = "positive")]
+    ceiling_m: f64,
+}
+
+/// Why there are no routes.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TargetsError {
+    /// The line to start from has not two ends.
+    #[error("{0} places, expected two: the ends of the line that the vehicles stand on")]
+    Line(usize),
+    /// There is nowhere to fly.
+    #[error("expected at least one target")]
+    NoTarget,
+    /// A start or a target is no place to plan from or to.
+    #[error(transparent)]
+    Route(#[from] RouteError),
+    /// The best route that was found is not feasible.
+    #[error(
+        "no route was found for vehicle {vehicle} that keeps clear of terrain, zones and the others; leave more room between them"
+    )]
+    NoRoute {
+        /// Its number, from 1.
+        vehicle: usize,
+    },
+}
+
+/// A route and how fast it is flown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PacedRoute {
+    /// From above the start to the target (ENU, metres).
+    pub route: Vec<Vector3<f64>>,
+    /// Share of the cruise speed, 0 to 1.
+    pub pace: f64,
+}
+
+impl Targets {
+    /// Routes of so many vehicles that fly at `cruise_m_s` from `height_m` above where they stand.
+    pub fn routes(
+        &self,
+        vehicles: usize,
+        bounds: &Aabb,
+        height_m: f64,
+        cruise_m_s: f64,
+        seed: u64,
+    ) -> Result<Vec<PacedRoute>, TargetsError> {
+        let airspace = self.airspace(bounds);
+        let ends = self.ends(vehicles, height_m, &airspace)?;
+        let cost = cost(cruise_m_s);
+        let plans = plan_in_turn(&airspace, cost, &ends, WAYPOINTS, |vehicle, problem| {
+            let plan = Planner::Ground.plan(problem, Effort::default(), seed.wrapping_add(vehicle as u64));
+            if plan.assessment.is_feasible() {
+                Ok(plan)
+            } else {
+                Err(TargetsError::NoRoute { vehicle: vehicle + 1 })
+            }
+        })?;
+        let times_s: Vec<f64> = plans.iter().map(|plan| plan.assessment.time_s).collect();
+        let slowed = arrive_together(&times_s, SLOWEST).slowed;
+        let paced = plans.into_iter().zip(slowed);
+        Ok(paced.map(|(plan, slowed)| PacedRoute { route: plan.route, pace: 1.0 / slowed }).collect())
+    }
+
+    /// What routes keep clear of, grown by the margin.
+    fn airspace(&self, bounds: &Aabb) -> Airspace {
+        let mountain = |table: &MountainTable| Mountain {
+            centre: table.centre_m.xy(),
+            height_m: table.height_m,
+            slope_m: Vector2::repeat(table.slope_m),
+        };
+        let threat = |table: &ThreatTable| ThreatZone {
+            centre: table.centre_m.xy(),
+            radius_m: table.radius_m + MARGIN_M,
+        };
+        let no_fly = |table: &NoFlyTable| NoFlyZone {
+            centre: table.centre_m.xy(),
+            radius_m: table.radius_m + MARGIN_M,
+            floor_m: table.floor_m - MARGIN_M,
+            ceiling_m: table.ceiling_m + MARGIN_M,
+        };
+        let inset = Vector3::repeat(MARGIN_M);
+        Airspace {
+            lower: bounds.min + inset,
+            upper: bounds.max - inset,
+            mountains: self.mountain.iter().map(mountain).collect(),
+            threats: self.threat.iter().map(threat).collect(),
+            no_fly: self.no_fly.iter().map(no_fly).collect(),
+        }
+    }
+
+    /// From where to where each vehicle flies, so assigned that the straight ways are shortest together.
+    fn ends(
+        &self,
+        vehicles: usize,
+        height_m: f64,
+        airspace: &Airspace,
+    ) -> Result<Vec<(Vector3<f64>, Vector3<f64>)>, TargetsError> {
+        let [one, other] = self.from_m[..] else { return Err(TargetsError::Line(self.from_m.len())) };
+        let start = |k: usize| one.lerp(&other, (k as f64 + 0.5) / vehicles as f64) + Vector3::z() * height_m;
+        let middle = one.lerp(&other, 0.5);
+        let at_each = vehicles.div_ceil(self.places_m.len().max(1));
+        let slots: Vec<_> = self
+            .places_m
+            .iter()
+            .flat_map(|target| arrival_slots(target, &middle, at_each, self.spacing_m, airspace))
+            .collect();
+        let starts: Vec<_> = (0..vehicles).map(start).collect();
+        let distances: Vec<Vec<f64>> =
+            starts.iter().map(|start| slots.iter().map(|slot| (slot - start).norm()).collect()).collect();
+        let taken = assign(&distances).ok_or(TargetsError::NoTarget)?;
+        Ok(starts.into_iter().zip(taken.into_iter().filter_map(|slot| slots.get(slot).copied())).collect())
+    }
+
+    /// The mountains as one can hit them: round steps inside of them.
+    pub fn obstacles(&self) -> Vec<Obstacle> {
+        let steps = |(number, table): (usize, &MountainTable)| {
+            let count = (table.height_m / STEP_M).ceil().max(1.0);
+            let rise_m = table.height_m / count;
+            let step = move |k: usize, centre: Vector3<f64>, slope_m: f64| {
+                // z = h exp(-(r / s)^2), at the step's upper edge.
+                let radius = slope_m * (count / (k as f64 + 1.0)).ln().sqrt();
+                let middle = centre + Vector3::z() * ((k as f64 + 0.5) * rise_m);
+                Obstacle {
+                    name: format!("mountain {} step {}", number + 1, k + 1),
+                    shape: Shape::Cylinder { radius, half_height: 0.5 * rise_m },
+                    pose: Isometry3::translation(middle.x, middle.y, middle.z),
+                }
+            };
+            let (centre, slope_m) = (table.centre_m, table.slope_m);
+            // The last would be the peak, a point.
+            (0..(count as usize).saturating_sub(1)).map(move |k| step(k, centre, slope_m))
+        };
+        self.mountain.iter().enumerate().flat_map(steps).collect()
+    }
+}
+
+/// P3's cost at the scale of small vehicles: its distances shrink from a kilometre to a hundred metres and less.
+fn cost(cruise_m_s: f64) -> RouteCost {
+    RouteCost {
+        time_weight_m_s: 0.25 * cruise_m_s,
+        cruise_m_s,
+        climb_m_s: 1.0,
+        comfortable_clearance_m: 5.0,
+        least_clearance_m: 2.0,
+        repulsion_m2: 60.0,
+        influence_m: 5.0,
+        least_separation_m: 2.5,
+        sample_m: 0.5,
+        ..RouteCost::default()
+    }
+}
