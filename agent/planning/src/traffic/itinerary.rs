@@ -31,6 +31,14 @@ impl Itinerary {
         Self { first_step, states }
     }
 
+    /// The same, after `state` a step before its first: what is flown already and cannot be changed.
+    #[must_use]
+    pub fn after(mut self, state: State) -> Self {
+        self.first_step = self.first_step.saturating_sub(1);
+        self.states.insert(0, state);
+        self
+    }
+
     /// The state at a step; before the first the first, after the last the last. `None` of an empty itinerary.
     #[must_use]
     pub fn at(&self, step: u32) -> Option<State> {
@@ -76,6 +84,15 @@ impl Itinerary {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_new_plan_leaves_the_step_that_is_being_flown_as_it_is() {
+        let start = State::at_rest([0, 0, 0]);
+        let east = start.then([1, 0, 0]);
+        let plan = Itinerary::new(6, vec![east, east.braked()]).after(start);
+        assert_eq!(plan.movement(5), Some(Move { from: start, to: east }));
+        assert_eq!(plan.end(), 7);
+    }
 
     #[test]
     fn a_commitment_ends_in_a_rest_where_the_plan_would_go_on() {

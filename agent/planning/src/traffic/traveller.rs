@@ -29,7 +29,7 @@ pub struct Word {
     pub said_for: u32,
     /// Grows with every word.
     pub sequence: u32,
-    /// Its plan, to its goal.
+    /// Its plan, to its goal, from the step before on, which is being flown.
     pub itinerary: Itinerary,
     /// It keeps to its plan until this step, and brakes then unless it says otherwise.
     pub committed: u32,
@@ -51,7 +51,7 @@ impl Word {
 
     /// Whether it rests at its goal and plans to stay.
     fn is_settled(&self) -> bool {
-        self.itinerary.states() == [self.goal]
+        self.itinerary.states().iter().all(|state| *state == self.goal)
     }
 }
 
@@ -205,13 +205,14 @@ impl Traveller {
         }
         self.heard.retain(|_, word| word.said_for + FORGOTTEN_AFTER >= step);
         let start = self.movement(step)?.from;
+        let flown_from = self.movement(step.saturating_sub(1))?.from;
         self.stand(start);
         let found = self.search(step, start);
         self.is_hindered = found.is_hindered;
         if !found.is_clear && found.itinerary.at(step + 1) == Some(start) {
             self.word.cornered_until = step + CORNERED_FOR;
         }
-        self.word.itinerary = found.itinerary;
+        self.word.itinerary = found.itinerary.after(flown_from);
         self.word.committed = step + 1;
         self.word.said_for = step;
         self.word.sequence += 1;
@@ -318,6 +319,17 @@ mod tests {
             alone.is_home(*step)
         });
         assert_eq!(arrival, Some(7), "a step for each of five cells, and one to start, from step 1 on");
+    }
+
+    #[test]
+    fn planning_the_next_step_does_not_change_the_one_being_flown() {
+        let roads = Arc::new(room(&["......"]));
+        let mut traveller = traveller(1, &roads, 0.0, 5.0);
+        for step in 1..10 {
+            let being_flown = traveller.movement(step - 1);
+            traveller.take_turn(step);
+            assert_eq!(traveller.movement(step - 1), being_flown, "step {step}");
+        }
     }
 
     #[test]

@@ -22,9 +22,9 @@ use crate::mission::{LscAgent, LscMission};
 
 /// Cells of the lattice, as of the missions' starts and goals, m.
 const CELL_M: f64 = 0.5;
-/// A step of the lattice lasts as many ticks. With 26 a vehicle moves at 0.96 m/s and 1.85 m/s^2 at most: what is left of
+/// A step of the lattice lasts as many ticks. With 28 a vehicle moves at 0.89 m/s and 1.59 m/s^2 at most: what is left of
 /// the limits corrects.
-const TICKS_PER_STEP: u64 = 26;
+const TICKS_PER_STEP: u64 = 28;
 /// The agents' tick in steps of the world: 20 ms.
 const STEPS_PER_TICK: u64 = 5;
 /// How often each speaks before a step; it plans every time but the first.
@@ -33,8 +33,8 @@ const ROUNDS: usize = 3;
 const RADIO_RANGE_M: f64 = 3.0;
 /// Distance of hulls from obstacles in plans, m: for what the vehicle deviates from them.
 const OBSTACLE_MARGIN_M: f64 = 0.07;
-/// Distance of hulls from one another in plans, m.
-const VEHICLE_MARGIN_M: f64 = 0.05;
+/// Distance of hulls from one another in plans, m: just under what is left of a cell, so that neighbours in a row may rest.
+const VEHICLE_MARGIN_M: f64 = 0.19;
 /// A vehicle is never planned lower than this, m.
 const LEAST_HEIGHT_M: f64 = 0.4;
 /// Most states that a plan expands.
@@ -347,6 +347,7 @@ fn on_lattice(roads: &Roads, number: u32, agent: &LscAgent) -> anyhow::Result<()
 fn model(agent: &LscAgent) -> anyhow::Result<VehicleModel> {
     let mut model = VehicleModel::built_in("crazyflie")?;
     model.hull_radius_m = agent.radius_m;
+    (model.max_climb_m_s, model.max_descent_m_s) = (agent.max_speed_m_s.z, agent.max_speed_m_s.z);
     model.gps = GpsModel {
         sigma_horizontal_m: 0.005,
         sigma_vertical_m: 0.005,

@@ -90,8 +90,9 @@ impl Pilot {
     }
 
     fn steer(&mut self, now: Duration, reference: &Reference) {
-        let Some(position) = self.companion.telemetry().position else { return };
-        let velocity = self.tracker.follow(reference, &position.value);
+        let telemetry = self.companion.telemetry();
+        let Some((position, velocity)) = telemetry.position.zip(telemetry.velocity) else { return };
+        let velocity = self.tracker.follow(reference, &position.value, &velocity.value);
         let set_point = if self.level {
             SetPoint::Planar { vx: velocity.x, vy: velocity.y, z: self.agent.start.z, yaw: None }
         } else {
