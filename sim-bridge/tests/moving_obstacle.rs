@@ -18,11 +18,11 @@ vehicles = 1
 cruise_speed_m_s = 2.0
 
 [bounds]
-min_m = [-20.0, -30.0, -1.0]
+min_m = [-40.0, -30.0, -1.0]
 max_m = [50.0, 30.0, 12.0]
 
 [[vehicle]]
-start_m = [0.0, 0.0]
+start_m = [-30.0, 0.0]
 waypoints_m = [[30.0, 0.0, 3.0]]
 "#;
 /// Where the ways cross, and from where the intruder comes.
@@ -50,7 +50,7 @@ impl Intruder {
         let telemetry = self.companion.telemetry();
         let (mode, armed, ready) = (telemetry.mode, telemetry.armed, telemetry.ready_to_arm);
         let height_m = telemetry.position.map_or(0.0, |position| position.value.z);
-        let every_second = now.as_millis() % 1000 == 0;
+        let every_second = now.as_millis().is_multiple_of(1000);
         match mode {
             _ if !every_second => {}
             _ if ready && !armed => self.companion.command(now, Command::Arm),

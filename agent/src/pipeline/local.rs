@@ -39,13 +39,8 @@ pub struct Local {
     field: ApfConfig,
     /// Set-point of the field's speed, m/s.
     speed_m_s: f64,
-    /// In place of the field.
-    openings: Option<Openings>,
-}
-
-#[derive(Debug)]
-struct Openings {
-    follower: Follower,
+    /// In place of the field: through openings in a histogram.
+    openings: Option<Follower>,
     /// What moves and tells nobody where it is.
     moving: Tracker,
 }
@@ -55,10 +50,8 @@ impl Local {
     #[must_use]
     pub fn new(envelope: &Envelope, planners: Planners, filter_m: f64) -> Self {
         let avoids = planners.without != Some(Layer::LocalAvoidance);
-        let openings = (avoids && planners.local == LocalPlanner::Vfh).then(|| Openings {
-            follower: gentle_follower(envelope, filter_m),
-            moving: Tracker::new(MovingConfig::default()),
-        });
+        let openings =
+            (avoids && planners.local == LocalPlanner::Vfh).then(|| gentle_follower(envelope, filter_m));
         let brake_m_s2 = if openings.is_some() { GENTLE_M_S2 } else { envelope.brake_m_s2 };
         let field = ApfConfig::default();
         let repulsive_gain = if avoids { field.repulsive_gain } else { 0.0 };
@@ -73,24 +66,25 @@ impl Local {
             field: ApfConfig { repulsive_gain, ..field },
             speed_m_s: 0.0,
             openings,
+            moving: Tracker::new(MovingConfig::default()),
         }
     }
 
     /// Takes in the obstacle points of a scan of `rays` rays that was taken at `stamp` and `origin`; metres ENU.
     pub fn look(&mut self, stamp: Duration, origin: &Vector3<f64>, returns: &[Vector3<f64>], rays: usize) {
-        if let Some(Openings { follower, moving }) = &mut self.openings {
+        self.moving.look(stamp, returns);
+        if let Some(follower) = &mut self.openings {
             follower.look(origin, returns, rays);
-            moving.look(stamp, returns);
         }
     }
 
-    /// What moves and tells nobody where it is, as far as this planner looks out for it.
+    /// What moves and tells nobody where it is.
     pub fn moving<'a>(
         &'a self,
         now: Duration,
         map: &'a ClearanceMap,
     ) -> impl Iterator<Item = Neighbour> + 'a {
-        self.openings.iter().flat_map(move |openings| openings.moving.moving(now, map))
+        self.moving.moving(now, map)
     }
 
     /// The velocity that follows `path` from about `station_m`, where the last call was. `attraction` is 1, and less while a
@@ -106,7 +100,7 @@ impl Local {
         let ahead = path.direction_at(station_m);
         let sensed_free_m = map.voxels().sensed_free_m(position, &ahead, SENSED_AHEAD_M);
         let (cap_m_s, _) = braking::speed_cap(path, station_m, sensed_free_m, &self.braking);
-        if let Some(Openings { follower, .. }) = &mut self.openings {
+        if let Some(follower) = &mut self.openings {
             return follower.follow(path, station_m, position, cap_m_s, map);
         }
         self.speed_m_s = braking::ramp(self.speed_m_s, cap_m_s, TICK_S, &self.braking);
@@ -117,12 +111,12 @@ impl Local {
     /// The set-point on its way to `wanted`: gently, if this planner flies so.
     #[must_use]
     pub fn ease(&self, wanted: Vector3<f64>) -> Vector3<f64> {
-        self.openings.as_ref().map_or(wanted, |openings| openings.follower.ease(&wanted, TICK_S))
+        self.openings.as_ref().map_or(wanted, |follower| follower.ease(&wanted, TICK_S))
     }
 
     /// The set-point that was sent in the end.
     pub fn flew(&mut self, set_point: &Vector3<f64>) {
-        if let Some(Openings { follower, .. }) = &mut self.openings {
+        if let Some(follower) = &mut self.openings {
             follower.flew(set_point);
         }
     }
@@ -135,7 +129,7 @@ impl Local {
     /// Somebody else moves the vehicle, or nobody.
     pub fn rest(&mut self) {
         self.pause();
-        if let Some(Openings { follower, .. }) = &mut self.openings {
+        if let Some(follower) = &mut self.openings {
             follower.rest();
         }
     }

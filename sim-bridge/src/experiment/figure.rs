@@ -179,6 +179,6 @@ mod tests {
         map.is_map = true;
         let (across, up) = map.ranges();
         let shape = (across.end - across.start) / (up.end - up.start);
-        assert!((shape - 636.0 / 412.0).abs() < 1e-9, "{shape}");
+        assert!((shape - 624.0 / 412.0).abs() < 1e-9, "{shape}");
     }
 }

@@ -161,12 +161,7 @@ impl Targets {
     }
 
     /// From where to where each vehicle flies, so assigned that the straight ways are shortest together.
-    fn ends(
-        &self,
-        vehicles: usize,
-        height_m: f64,
-        airspace: &Airspace,
-    ) -> Result<Vec<(Vector3<f64>, Vector3<f64>)>, TargetsError> {
+    fn ends(&self, vehicles: usize, height_m: f64, airspace: &Airspace) -> Result<Vec<Ends>, TargetsError> {
         let [one, other] = self.from_m[..] else { return Err(TargetsError::Line(self.from_m.len())) };
         let start = |k: usize| one.lerp(&other, (k as f64 + 0.5) / vehicles as f64) + Vector3::z() * height_m;
         let middle = one.lerp(&other, 0.5);
@@ -205,6 +200,9 @@ impl Targets {
         self.mountain.iter().enumerate().flat_map(steps).collect()
     }
 }
+
+/// From where to where a vehicle flies.
+type Ends = (Vector3<f64>, Vector3<f64>);
 
 /// P3's cost at the scale of small vehicles: its distances shrink from a kilometre to a hundred metres and less.
 fn cost(cruise_m_s: f64) -> RouteCost {

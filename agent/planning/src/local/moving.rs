@@ -1,4 +1,7 @@
 //! Obstacles that move: found in a lidar's returns, followed from scan to scan, and predicted with growing uncertainty.
+//!
+//! Motion is horizontal. The height of a return is that of the lidar's plane, which pitches and climbs with the vehicle: seen from
+//! there every trunk goes up and down.
 
 use std::time::Duration;
 
@@ -26,8 +29,10 @@ pub struct MovingConfig {
     pub stays_m: f64,
     /// Slower than this a thing stands still, m/s.
     pub slowest_m_s: f64,
-    /// A thing moves once it is this far from where it was first seen, metres.
+    /// A thing moves once it is this far from where it was first seen, metres, and the map has nothing there any more ...
     pub moved_m: f64,
+    /// ... or once it is so far from there that no part of a trunk that comes into view could explain it, metres.
+    pub surely_moved_m: f64,
     /// Seen less often than this it may be anything.
     pub fewest_sightings: u32,
     /// Mean distance from where it was expected beyond which it is not one thing, metres.
@@ -50,6 +55,7 @@ impl Default for MovingConfig {
             stays_m: 0.3,
             slowest_m_s: 0.4,
             moved_m: 0.7,
+            surely_moved_m: 1.2,
             fewest_sightings: 6,
             most_surprise_m: 0.2,
             sigma_m: [0.1, 0.5],
@@ -113,12 +119,13 @@ impl Tracker {
         let mut lost: Vec<Track> = std::mem::take(&mut self.tracks);
         lost.retain(|track| now.saturating_sub(track.seen).as_secs_f64() < forget_s);
         for Thing { centre, radius_m, surface } in self.things(returns) {
-            let surprise = |track: &Track| (centre - track.expected(now)).norm();
+            let surprise = |track: &Track| (centre - track.expected(now)).xy().norm();
             let nearest = (0..lost.len()).min_by(|a, b| surprise(&lost[*a]).total_cmp(&surprise(&lost[*b])));
             self.tracks.push(match nearest.filter(|index| surprise(&lost[*index]) < gate_m) {
                 Some(index) => {
                     let track = lost.swap_remove(index);
-                    let expected = track.expected(now);
+                    let mut expected = track.expected(now);
+                    expected.z = centre.z;
                     Track {
                         position: expected + (centre - expected) * place_share,
                         velocity: track.velocity + (centre - expected) * velocity_share,
@@ -152,20 +159,24 @@ impl Tracker {
 
     /// What moves, where it is expected `now`. Its uncertainty has grown since it was last seen, and it keeps no distance.
     ///
-    /// Whatever moves has left the place where it was first seen: in the `map` what was seen of it there is free. The centre of
-    /// what stands may seem to move as more of it comes into view; its surface does not.
+    /// Whatever moves has left the place where it was first seen: in the `map` what was seen of it there is free, though a map
+    /// takes its time to clear. The centre of what stands may seem to move as more of it comes into view, but not far; its surface does not.
     pub fn moving<'a>(
         &'a self,
         now: Duration,
         map: &'a ClearanceMap,
     ) -> impl Iterator<Item = Neighbour> + 'a {
         let MovingConfig { sigma_m: [sigma_m, growth_m_s], .. } = self.config;
+        let has_left = move |track: &Track| {
+            let way_m = (track.position - track.first_seen).xy().norm();
+            way_m > self.config.surely_moved_m
+                || (way_m > self.config.moved_m && map.clearance(&track.first_surface) > self.config.stays_m)
+        };
         let moves = move |track: &&Track| {
             track.sightings >= self.config.fewest_sightings
                 && track.surprise_m < self.config.most_surprise_m
                 && track.velocity.norm() > self.config.slowest_m_s
-                && (track.position - track.first_seen).norm() > self.config.moved_m
-                && map.clearance(&track.first_surface) > self.config.stays_m
+                && has_left(track)
         };
         self.tracks.iter().filter(moves).map(move |track| Neighbour {
             id: track.id,
@@ -288,15 +299,25 @@ mod tests {
     }
 
     #[test]
+    fn a_trunk_does_not_move_when_the_vehicle_climbs() {
+        let mut tracker = Tracker::new(MovingConfig::default());
+        for tick in 0..20 {
+            let eye = Vector3::new(0.0, 0.0, 2.0 + 0.15 * tick as f64);
+            tracker.look(at(tick), &seen(&eye, &Vector3::new(4.0, -1.0, eye.z), 0.25));
+        }
+        assert_eq!(tracker.moving(at(19), &free()).count(), 0);
+    }
+
+    #[test]
     fn what_still_stands_where_it_was_first_seen_has_not_moved() {
         let mut tracker = Tracker::new(MovingConfig::default());
         let place = |tick: u64| Vector3::new(4.1, -1.9 + 0.12 * tick as f64, 3.1);
-        for tick in 0..20 {
+        for tick in 0..10 {
             tracker.look(at(tick), &seen(&Vector3::new(0.0, 0.0, 3.1), &place(tick), 0.25));
         }
         let mut map = free();
         seen(&Vector3::new(0.0, 0.0, 3.1), &place(0), 0.25).iter().for_each(|point| map.insert(point));
-        assert_eq!(tracker.moving(at(19), &map).count(), 0);
+        assert_eq!(tracker.moving(at(9), &map).count(), 0);
     }
 
     #[test]
