@@ -4,7 +4,7 @@ use skein_planning::traffic::{Apart, Move, Traveller, TravellerConfig, closest};
 
 use super::places::Place;
 
-pub const APART: Apart = Apart { half_cells: 1.96, downwash: 2.0 };
+pub const APART: Apart = Apart { half_cells: 1.6, downwash: 2.0 };
 const CONFIG: TravellerConfig = TravellerConfig { apart: APART, budget: 60_000 };
 /// Metres.
 const RANGE_M: f64 = 3.0;

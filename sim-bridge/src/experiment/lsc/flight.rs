@@ -33,8 +33,8 @@ const ROUNDS: usize = 3;
 const RADIO_RANGE_M: f64 = 3.0;
 /// Distance of hulls from obstacles in plans, m: for what the vehicle deviates from them.
 const OBSTACLE_MARGIN_M: f64 = 0.07;
-/// Distance of hulls from one another in plans, m: just under what is left of a cell, so that neighbours in a row may rest.
-const VEHICLE_MARGIN_M: f64 = 0.19;
+/// Distance of hulls from one another in plans, m. With more, commitments could meet before vehicles hear one another.
+const VEHICLE_MARGIN_M: f64 = 0.1;
 /// A vehicle is never planned lower than this, m.
 const LEAST_HEIGHT_M: f64 = 0.4;
 /// Most states that a plan expands.
