@@ -4,6 +4,7 @@
 //! This crate turns what it has seen into the velocity it should fly, one arrow at a time: rays -> [`map`] ->
 //! path ([`global`]) -> velocity along it ([`local`]) -> velocity that keeps its distance ([`separation`]).
 //! [`passage`] finds the places that only one vehicle should be in.
+//! In [`traffic`] vehicles that know the map agree, among themselves, who is where and when.
 //!
 //! What is known beforehand, an [`airspace`] of terrain and threats, is planned through before take-off: [`route`] by
 //! [`particle_swarm`], with [`assignment`] of vehicles to targets. [`coverage`] and [`formation`] make missions.
@@ -41,5 +42,6 @@ pub mod passage;
 mod path;
 pub mod route;
 pub mod separation;
+pub mod traffic;
 
 pub use path::{Corner, Path, Projection};

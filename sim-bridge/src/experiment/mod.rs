@@ -7,6 +7,7 @@ mod circle;
 mod dstar_grid;
 mod feasibility;
 mod figure;
+mod lsc;
 mod performance;
 mod report;
 mod right_of_way;
@@ -74,6 +75,11 @@ pub const EXPERIMENTS: &[Experiment] = &[
         name: "dstar-grid",
         about: "D* with a collision factor on the marker grid, and re-planning by D* Lite (Zhang 2019)",
         run: dstar_grid::run,
+    },
+    Experiment {
+        name: "lsc",
+        about: "LSC-DR's ten-agent missions in forests and dense mazes (Park 2022)",
+        run: lsc::run,
     },
     Experiment {
         name: "swarm-planning",

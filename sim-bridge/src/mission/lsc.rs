@@ -1,10 +1,85 @@
 //! The missions of LSC planner experiments (Park et al.): JSON with `#` comments, one start and goal per agent.
 
 use nalgebra::Vector3;
-use skein_world::VehicleModel;
+use skein_world::{Aabb, VehicleModel};
 
-use super::json::Node;
+use super::json::{Document, Node};
 use super::{Ends, Mission, MissionError, MissionSet, Waypoint};
+
+/// A mission as the experiment sets it: who flies from where to where, within which bounds and limits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LscMission {
+    /// Where vehicles may fly.
+    pub bounds: Aabb,
+    /// Who flies.
+    pub agents: Vec<LscAgent>,
+}
+
+/// One vehicle of an [`LscMission`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LscAgent {
+    /// Where it hovers before, world ENU, m.
+    pub start: Vector3<f64>,
+    /// Where it hovers in the end, world ENU, m.
+    pub goal: Vector3<f64>,
+    /// Radius of the vehicle, m.
+    pub radius_m: f64,
+    /// Greatest speed on each axis, m/s.
+    pub max_speed_m_s: Vector3<f64>,
+    /// Greatest acceleration on each axis, m/s^2.
+    pub max_accel_m_s2: Vector3<f64>,
+    /// Heights of others count less by this factor, for the air below a vehicle.
+    pub downwash: f64,
+}
+
+impl LscMission {
+    /// Reads a mission; `file` is what errors call it.
+    ///
+    /// # Errors
+    /// With file, line, field and what was expected there.
+    pub fn read(text: &str, file: &str) -> Result<Self, MissionError> {
+        let document = Document::parse(text, file)?;
+        let root = document.root();
+        let kinds = root.member("quadrotors")?;
+        let world = root.member("world")?;
+        let [world] = &world.elements()?[..] else { return Err(world.mismatch("one world")) };
+        let dimension = world.member("dimension")?;
+        let [x_min, y_min, z_min, x_max, y_max, z_max] = dimension.numbers::<6>()?;
+        let bounds = Aabb { min: Vector3::new(x_min, y_min, z_min), max: Vector3::new(x_max, y_max, z_max) };
+        if (0..3).any(|axis| bounds.min[axis] >= bounds.max[axis]) {
+            return Err(dimension.mismatch("three least coordinates, then three greater ones"));
+        }
+        let agents = root.member("agents")?;
+        let read = agents
+            .elements()?
+            .iter()
+            .map(|one| LscAgent::read(one, &kinds))
+            .collect::<Result<Vec<_>, _>>()?;
+        if read.is_empty() {
+            return Err(agents.mismatch("at least one agent"));
+        }
+        Ok(Self { bounds, agents: read })
+    }
+}
+
+impl LscAgent {
+    fn read(agent: &Node<'_>, kinds: &Node<'_>) -> Result<Self, MissionError> {
+        let kind = kinds.member(agent.member("type")?.text()?)?;
+        let positive = |limit: &str| {
+            let node = kind.member(limit)?;
+            let limits = Vector3::from(node.numbers::<3>()?);
+            if limits.min() > 0.0 { Ok(limits) } else { Err(node.mismatch("three numbers above 0")) }
+        };
+        Ok(Self {
+            start: Vector3::from(agent.member("start")?.numbers::<3>()?),
+            goal: Vector3::from(agent.member("goal")?.numbers::<3>()?),
+            radius_m: kind.member("radius")?.number_in(0.01, 10.0, "m")?,
+            max_speed_m_s: positive("max_vel")?,
+            max_accel_m_s2: positive("max_acc")?,
+            downwash: kind.member("downwash")?.number_in(1.0, 100.0, "")?,
+        })
+    }
+}
 
 /// Reads the `agents`. Starts are taken down to the ground; goals keep their height.
 pub fn read(root: &Node<'_>) -> Result<MissionSet, MissionError> {

@@ -13,6 +13,7 @@ use skein_mav::Datum;
 
 pub use apply::apply_missions;
 pub use error::{MissionError, Warning};
+pub use lsc::{LscAgent, LscMission};
 
 use json::Document;
 
