@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 the mission or check failed, 2 wrong usage or input.
 
 use std::net::SocketAddr;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -169,13 +170,13 @@ pub struct SeparationCampaign {
     #[arg(long, value_name = "N", default_value_t = 16)]
     pub vehicles: usize,
     /// Mean time that a message takes; each takes from half to one and a half of it.
-    #[arg(long, value_name = "MS", default_value_t = 300.0)]
+    #[arg(long, value_name = "MS", default_value_t = 300.0, value_parser = latency_ms)]
     pub latency_ms: f64,
     /// Share of messages that are lost.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.3)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.3, value_parser = share)]
     pub loss: f64,
     /// How long bids hold elsewhere without being renewed: several times as long as a message takes there and back.
-    #[arg(long, value_name = "MS", default_value_t = 4000.0)]
+    #[arg(long, value_name = "MS", default_value_t = 4000.0, value_parser = lease_ms)]
     pub lease_ms: f64,
     /// How many at once; as many as this computer has processors if not given.
     #[arg(long, value_name = "N")]
@@ -468,6 +469,28 @@ fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
         _ => Err("expected a number above 0".to_owned()),
+    }
+}
+
+fn latency_ms(text: &str) -> Result<f64, String> {
+    within(text, 0.0..=60_000.0)
+}
+
+fn lease_ms(text: &str) -> Result<f64, String> {
+    within(text, 100.0..=10_000.0)
+}
+
+fn within(text: &str, range: RangeInclusive<f64>) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if range.contains(&number) => Ok(number),
+        _ => Err(format!("expected a number from {} to {}", range.start(), range.end())),
+    }
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (0.0..1.0).contains(&number) => Ok(number),
+        _ => Err("expected a number from 0 to below 1".to_owned()),
     }
 }
 

@@ -37,6 +37,23 @@ fn no_vehicles_is_no_swarm() {
 }
 
 #[test]
+fn a_network_that_cannot_be_is_refused_by_its_option() {
+    for (option, value) in [
+        ("--lease-ms", "-5"),
+        ("--lease-ms", "NaN"),
+        ("--latency-ms", "-5"),
+        ("--latency-ms", "1e300"),
+        ("--loss", "1"),
+    ] {
+        let given = format!("{option}={value}");
+        assert_refused(
+            &["campaign", "separation", "--seeds", "1", &given],
+            &[option, "expected a number from"],
+        );
+    }
+}
+
+#[test]
 fn malformed_files_are_refused_by_file_and_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let scenario = write(folder.path(), "bad.toml", "name = \"bad\"\ncruise_speed_m_s = \"fast\"\n");
