@@ -139,6 +139,13 @@ fn a_value_out_of_range_is_refused_with_its_field_and_what_was_expected() {
             "a number above 0",
         ),
         ("loss = 0.1", "loss = 1.0", "8: field `network.loss`", "a number from 0 to below 1"),
+        (
+            "latency_ms = 20",
+            "latency_ms = 1e300",
+            "14: field `network.latency_ms`",
+            "a number from 0 to 60000",
+        ),
+        ("loss = 0.1", "lease_ms = -5", "12: field `network.lease_ms`", "a number from 100 to 10000"),
         ("radius_m = 0.3", "radius_m = nan", "25: field `obstacle[0].cylinder.radius_m`", "a number above 0"),
         ("[5.0, 0.0, 2.5]]", "[5.0, inf, 2.5]]", "15: field `vehicle[0].waypoints_m`", "finite"),
         ("order = \"hold\"", "order = \"stop\"", "9: field `order[1].order`", "`hold`"),

@@ -19,6 +19,11 @@ pub fn share<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error
     number(deserializer, "a number from 0 to below 1", |v| (0.0..1.0).contains(&v))
 }
 
+/// What a message takes, in milliseconds.
+pub fn latency_ms<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    number(deserializer, "a number from 0 to 60000", |v| (0.0..=60_000.0).contains(&v))
+}
+
 /// A lease, in milliseconds.
 pub fn lease_ms<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     number(deserializer, "a number from 100 to 10000", |v| (100.0..=10_000.0).contains(&v))

@@ -119,7 +119,7 @@ impl VehiclePlan {
 #[serde(default, deny_unknown_fields)]
 pub struct Network {
     /// Mean one-way delay, in milliseconds.
-    #[serde(deserialize_with = "field::non_negative")]
+    #[serde(deserialize_with = "field::latency_ms")]
     pub latency_ms: f64,
     /// Share of messages that are lost, 0 to below 1.
     #[serde(deserialize_with = "field::share")]
