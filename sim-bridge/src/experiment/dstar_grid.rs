@@ -1,18 +1,20 @@
 //! Zhang 2019: D* with a collision factor, and elision, on the marker grid; and what D* is for, planning again
 //! when the map changes, beside a search from scratch.
 
-use anyhow::ensure;
+use std::fmt;
+
 use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 use serde_json::json;
 use skein_planning::Path;
 use skein_planning::global::{DStarLite, Effort, Route, Search, Unsolved, elide_collinear};
 use skein_planning::grid::{Grid, OccupancyGrid, SizeError, StepCosts};
 use skein_planning::map::VoxelIndex;
 
-use super::{Bound, Figure, Line, Options, Report, Style};
-use crate::bench::quantile::quantile;
+use super::{Bound, Figure, Line, Options, Report, Style, runs};
+use crate::bench::quantile::{median, quantile};
 use crate::cpu_time;
 
 /// Cells along a side of the marker grid.
@@ -35,7 +37,11 @@ const REACH_M: f64 = 10.0;
 /// The vehicle moves on by a cell after so many changes.
 const CHANGES_PER_STEP: usize = 4;
 /// Runs of each world, unless the command line says otherwise.
-const RUNS: usize = 3;
+const RUNS: usize = 1;
+/// Changes from one line of progress to the next.
+const CHANGES_PER_LINE: usize = 100;
+/// How many times as fast as a fresh search planning again must be, by the medians.
+const SPEEDUP: f64 = 10.0;
 /// Two sums of the same costs in different order differ by less.
 const SAME_COST: f64 = 1e-6;
 
@@ -127,6 +133,9 @@ enum World {
     /// A fifth of the cells blocked, at random.
     Clutter,
 }
+
+/// All of them.
+const WORLDS: [World; 2] = [World::Rooms, World::Clutter];
 
 impl World {
     fn name(self) -> &'static str {
@@ -284,95 +293,140 @@ impl Flight {
     }
 }
 
+/// Of processor time, in milliseconds.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Spread {
+    median: f64,
+    mean: f64,
+    p95: f64,
+    p99: f64,
+    max: f64,
+}
+
+impl Spread {
+    fn of(times_ms: &[f64]) -> Spread {
+        let mut sorted = times_ms.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let [median, p95, p99, max] = [0.5, 0.95, 0.99, 1.0].map(|share| quantile(&sorted, share));
+        let mean = sorted.iter().sum::<f64>() / sorted.len().max(1) as f64;
+        Spread { median, mean, p95, p99, max }
+    }
+}
+
+impl fmt::Display for Spread {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Spread { median, mean, p95, max, .. } = self;
+        write!(f, "{median:.3} / {mean:.3} / {p95:.3} / {max:.1}")
+    }
+}
+
+/// What came of all changes in a world that a seed has made.
+struct Run {
+    world: World,
+    seed: u64,
+    times: Times,
+    again: Spread,
+    fresh: Spread,
+}
+
+impl Run {
+    fn of(world: World, seed: u64, changes: usize) -> anyhow::Result<Run> {
+        let mut flight = Flight::new(world, seed)?;
+        let mut route = Vec::new();
+        for number in 1..=changes {
+            flight.step(number, &mut route)?;
+            if number.is_multiple_of(CHANGES_PER_LINE) {
+                eprintln!("dstar-grid: {}, seed {seed}: {number} of {changes} changes", world.name());
+            }
+        }
+        let times = flight.times;
+        let [again, fresh] = [&times.again, &times.fresh].map(|times| Spread::of(times));
+        Ok(Run { world, seed, times, again, fresh })
+    }
+
+    /// How many times as fast planning again is, by the medians.
+    fn speedup(&self) -> f64 {
+        self.fresh.median / self.again.median
+    }
+
+    fn name(&self) -> String {
+        format!("{}, seed {}", self.world.name(), self.seed)
+    }
+
+    fn set_goals(&self, report: &mut Report) {
+        let apart = format!("{}: greatest difference from a fresh search's cost", self.name());
+        report.goal(&apart, self.times.apart, Bound::AtMost(SAME_COST));
+        let speedup = format!("{}: times as fast, medians", self.name());
+        report.goal(&speedup, self.speedup(), Bound::AtLeast(SPEEDUP));
+    }
+
+    fn row(&self) -> Vec<String> {
+        vec![
+            self.name(),
+            self.again.to_string(),
+            self.fresh.to_string(),
+            format!("{:.0}", self.speedup()),
+            format!("{:.1}", self.fresh.mean / self.again.mean),
+            format!("{:.0}", self.times.first.first().copied().unwrap_or_default()),
+            self.times.unreachable.to_string(),
+        ]
+    }
+
+    fn to_json(&self) -> serde_json::Value {
+        let Times { again, fresh, first, unreachable, apart } = &self.times;
+        let ratios = again.iter().zip(fresh).map(|(again, fresh)| fresh / again).collect();
+        json!({
+            "seed": self.seed,
+            "changes": again.len(),
+            "replan_ms": self.again,
+            "fresh_ms": self.fresh,
+            "first_ms": first,
+            "speedup_of_medians": self.speedup(),
+            "median_speedup": median(ratios),
+            "speedup_of_means": self.fresh.mean / self.again.mean,
+            "unreachable": unreachable,
+            "cost_apart": apart,
+        })
+    }
+}
+
 /// Re-planning after each of many changes near a moving vehicle.
 fn replanning(report: &mut Report, runs: usize, changes: usize) -> anyhow::Result<()> {
+    let seeds = 1..=runs as u64;
+    let cases: Vec<(World, u64)> = seeds.flat_map(|seed| WORLDS.map(|world| (world, seed))).collect();
+    let all = runs::in_turn("dstar-grid", &cases, |(world, seed)| Run::of(*world, *seed, changes))?;
     let mut rows = Vec::new();
     let mut figure = Figure {
         x: "time to plan again (log10 of ms)".into(),
         y: "share of changes".into(),
         ..Figure::default()
     };
-    let mut all = serde_json::Map::new();
-    for world in [World::Rooms, World::Clutter] {
-        let mut worst_median_speedup = f64::INFINITY;
-        let (mut again, mut fresh) = (Vec::new(), Vec::new());
-        let mut seeds = Vec::new();
-        for seed in 1..=runs as u64 {
-            eprint!("\rdstar-grid: {}, run {seed} of {runs}   ", world.name());
-            let mut flight = Flight::new(world, seed)?;
-            let mut route = Vec::new();
-            for number in 1..=changes {
-                flight.step(number, &mut route)?;
-            }
-            let Times { again: mut these, fresh: mut those, first, unreachable, apart } = flight.times;
-            ensure!(apart.is_finite(), "a cost is not a number");
-            let mut ratios: Vec<f64> = these.iter().zip(&those).map(|(again, fresh)| fresh / again).collect();
-            [&mut these, &mut those, &mut ratios].into_iter().for_each(|times| times.sort_by(f64::total_cmp));
-            let speedup = quantile(&those, 0.5) / quantile(&these, 0.5);
-            worst_median_speedup = worst_median_speedup.min(speedup);
-            seeds.push(json!({
-                "seed": seed,
-                "replan_ms": spread(&these),
-                "fresh_ms": spread(&those),
-                "first_ms": first,
-                "speedup_of_medians": speedup,
-                "median_speedup": quantile(&ratios, 0.5),
-                "speedup_of_means": mean(&those) / mean(&these),
-                "unreachable": unreachable,
-                "cost_apart": apart,
-            }));
-            let what = format!("{}, seed {seed}", world.name());
-            report.goal(
-                &format!("{what}: greatest difference from a fresh search's cost"),
-                apart,
-                Bound::AtMost(SAME_COST),
-            );
-            report.goal(&format!("{what}: times as fast, medians"), speedup, Bound::AtLeast(10.0));
-            rows.push(vec![
-                what,
-                format!("{:.3} / {:.3} / {:.1}", quantile(&these, 0.5), mean(&these), quantile(&these, 0.99)),
-                format!("{:.3} / {:.3} / {:.1}", quantile(&those, 0.5), mean(&those), quantile(&those, 0.99)),
-                format!("{speedup:.0}"),
-                format!("{:.1}", mean(&those) / mean(&these)),
-                format!("{:.0}", first.first().copied().unwrap_or_default()),
-                unreachable.to_string(),
-            ]);
-            again.extend(these);
-            fresh.extend(those);
-        }
-        eprintln!();
+    let mut worlds = serde_json::Map::new();
+    for world in WORLDS {
+        let here: Vec<&Run> = all.iter().filter(|run| run.world == world).collect();
+        here.iter().for_each(|run| run.set_goals(report));
+        rows.extend(here.iter().map(|run| run.row()));
+        let worst = here.iter().map(|run| run.speedup()).fold(f64::INFINITY, f64::min);
+        let seeds: Vec<_> = here.iter().map(|run| run.to_json()).collect();
+        worlds.insert(world.name().to_owned(), json!({ "seeds": seeds, "worst_speedup_of_medians": worst }));
+        let again = here.iter().flat_map(|run| run.times.again.iter().copied()).collect();
+        let fresh = here.iter().flat_map(|run| run.times.fresh.iter().copied()).collect();
         for (name, style, times) in
             [("D* Lite", Style::Solid, again), ("A* from scratch", Style::Reference, fresh)]
         {
-            figure.lines.push(Line {
-                name: format!("{name}, {}", world.name()),
-                style,
-                points: distribution(times),
-            });
+            let points = distribution(times);
+            figure.lines.push(Line { name: format!("{name}, {}", world.name()), style, points });
         }
-        all.insert(
-            world.name().to_owned(),
-            json!({ "seeds": seeds, "worst_speedup_of_medians": worst_median_speedup }),
-        );
     }
-    report.number("replanning", all);
+    report.number("replanning", worlds);
     report.number("changes", changes);
     report.table(
         "Planning again after a change within 10 m of the vehicle, on 200 x 200 x 40 m in cells of 1 m; ms of processor time",
-        &["", "D* Lite: median / mean / p99", "A* from scratch", "medians", "means", "first plan", "no way"],
+        &["", "D* Lite: median / mean / p95 / max", "A* from scratch", "medians", "means", "first plan", "no way"],
         rows,
     );
     report.figure("replanning", figure);
     Ok(())
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
-}
-
-fn spread(sorted: &[f64]) -> serde_json::Value {
-    let [median, p95, p99, max] = [0.5, 0.95, 0.99, 1.0].map(|share| quantile(sorted, share));
-    json!({ "median": median, "mean": mean(sorted), "p95": p95, "p99": p99, "max": max })
 }
 
 /// The share of values below each of a hundred of them.

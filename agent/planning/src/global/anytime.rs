@@ -200,7 +200,7 @@ impl Search {
         *self.nodes.slot(start) =
             Node { g: 0.0, generation: self.generation, arrived_by: ROOT, closed_in: 0 };
         self.open.reset(self.weight * h, self.least_costs[0]);
-        self.open.push(Open { key: self.weight * h, tie: 0.0, cell: Packed::of(start) });
+        self.open.push(self.weight * h, greatest_first(0.0), Packed::of(start));
     }
 
     /// Goes on with a search, for at most `expansions` cells. `None` if there is no answer yet.
@@ -240,11 +240,11 @@ impl Search {
     /// Whether the former came first.
     fn improve(&mut self, lattice: &impl Lattice, limit: usize) -> bool {
         while let Some(next) = self.open.peek() {
-            if self.goal_g <= next.key {
+            if self.open.rank(self.goal_g) <= next.rank {
                 return true;
             }
             let node = self.nodes.slot(next.cell.unpacked());
-            if node.closed_in == self.round || -next.tie > node.g {
+            if node.closed_in == self.round || g_of(&next) > node.g {
                 self.open.pop();
                 continue;
             }
@@ -252,18 +252,20 @@ impl Search {
                 return false;
             }
             node.closed_in = self.round;
+            let arrived_by = usize::from(node.arrived_by);
             self.open.pop();
             self.expanded += 1;
-            self.expand(lattice, next);
+            self.expand(lattice, next, arrived_by);
         }
         true
     }
 
-    fn expand(&mut self, lattice: &impl Lattice, next: Open) {
-        let here = next.cell.unpacked();
-        lattice.steps_from(here, |number, cost| {
+    fn expand(&mut self, lattice: &impl Lattice, next: Open, arrived_by: usize) {
+        let (here, here_g) = (next.cell.unpacked(), g_of(&next));
+        let leaves_out = self.seeks_least() && arrived_by < MOVES.len();
+        let relax = |number: usize, cost: f64| {
             let there = moved(here, MOVES[number].by);
-            let g = cost - next.tie;
+            let g = here_g + cost;
             let node = self.nodes.slot(there);
             if node.generation != self.generation {
                 *node =
@@ -279,14 +281,19 @@ impl Search {
                 return;
             }
             let h = octile(there, self.goal, self.least_costs);
-            self.open.push(Open { key: g + self.weight * h, tie: -g, cell: Packed::of(there) });
+            self.open.push(g + self.weight * h, greatest_first(g), Packed::of(there));
             if h < self.nearest.1 {
                 self.nearest = (there, h);
             }
             if there == self.goal {
                 self.goal_g = g;
             }
-        });
+        };
+        if leaves_out {
+            lattice.steps_after(here, arrived_by, relax);
+        } else {
+            lattice.steps_from(here, relax);
+        }
     }
 
     /// Works out what the path known is proven to cost at most, in the least. With all settled, the weight is a proof too.
@@ -309,7 +316,7 @@ impl Search {
         let keys = unfinished.iter().map(|(_, g, h)| g + self.weight * h);
         self.open.reset(keys.fold(f64::INFINITY, f64::min), self.least_costs[0]);
         for (cell, g, h) in unfinished {
-            self.open.push(Open { key: g + self.weight * h, tie: -g, cell: Packed::of(cell) });
+            self.open.push(g + self.weight * h, greatest_first(g), Packed::of(cell));
         }
         self.inconsistent.clear();
         self.round += 1;
@@ -319,7 +326,7 @@ impl Search {
     fn unfinished(&self) -> impl Iterator<Item = (VoxelIndex, f64, f64)> + '_ {
         let open = self.open.iter().filter(|entry| {
             let node = self.nodes.get(entry.cell.unpacked());
-            node.closed_in != self.round && -entry.tie == node.g
+            node.closed_in != self.round && g_of(entry) == node.g
         });
         let cells = open.map(|entry| entry.cell.unpacked()).chain(self.inconsistent.iter().copied());
         cells.map(|cell| (cell, self.nodes.get(cell).g, self.heuristic(cell)))
@@ -344,9 +351,26 @@ impl Search {
         cells
     }
 
+    /// Whether the first path found is the best, so that no cell is expanded before its `g` is the least.
+    fn seeks_least(&self) -> bool {
+        self.effort.weight <= 1.0
+    }
+
     fn heuristic(&self, cell: VoxelIndex) -> f64 {
         octile(cell, self.goal, self.least_costs)
     }
+}
+
+/// The tie that puts the greatest `g` first.
+#[inline]
+fn greatest_first(g: f64) -> u64 {
+    !g.to_bits()
+}
+
+/// The `g` that such a tie was made of.
+#[inline]
+fn g_of(open: &Open) -> f64 {
+    f64::from_bits(!open.tie)
 }
 
 /// What a way through neighbours costs; infinite if a step of it does not exist.

@@ -324,19 +324,6 @@ impl Lattice for Rooms<'_> {
             }
         }
     }
-
-    fn steps_into(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
-        for step in &MOVES {
-            let before = moved(cell, step.by);
-            if self.contains(before) {
-                self.steps_from(before, |number, cost| {
-                    if moved(before, MOVES[number].by) == cell {
-                        visit(number, cost);
-                    }
-                });
-            }
-        }
-    }
 }
 
 impl Rooms<'_> {

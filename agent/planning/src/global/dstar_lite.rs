@@ -2,10 +2,10 @@
 
 use super::open_list::{Open, OpenList};
 use super::{Route, Unsolved};
-use crate::grid::{Bricks, Lattice, MOVES, Packed, moved, octile};
+use crate::grid::{Bricks, ReversibleLattice, MOVES, Packed, moved, octile};
 use crate::map::VoxelIndex;
 
-/// A search from the goal to a vehicle that moves, over a [`Lattice`] that changes.
+/// A search from the goal to a vehicle that moves, over a [`ReversibleLattice`] that changes.
 ///
 /// It keeps, for every cell, the cost `g` of the way to the goal as it was when last expanded, and `rhs`, what the
 /// neighbours' `g` make of it now. Where the two differ the cell waits in the open list under the key
@@ -81,7 +81,7 @@ const OPEN_AT_LEAST: usize = 4096;
 impl DStarLite {
     /// A search from `goal` to `start`, both cells of the lattice. [`DStarLite::plan`] does the work.
     #[must_use]
-    pub fn new(lattice: &impl Lattice, start: VoxelIndex, goal: VoxelIndex) -> DStarLite {
+    pub fn new(lattice: &impl ReversibleLattice, start: VoxelIndex, goal: VoxelIndex) -> DStarLite {
         let mut search = DStarLite {
             nodes: Bricks::default(),
             open: OpenList::default(),
@@ -113,7 +113,7 @@ impl DStarLite {
 
     /// Cells have changed: that they are blocked, or anything else that the cost of steps from them or their neighbours
     /// depends on. Told after the change, before the next [`DStarLite::plan`]. Cells outside the lattice are ignored.
-    pub fn heed(&mut self, lattice: &impl Lattice, changed: &[VoxelIndex]) {
+    pub fn heed(&mut self, lattice: &impl ReversibleLattice, changed: &[VoxelIndex]) {
         self.fit_keys();
         let around = |cell: &VoxelIndex| {
             let cell = *cell;
@@ -133,7 +133,7 @@ impl DStarLite {
     ///
     /// # Errors
     /// There is no way; or the budget was spent first, and the next call goes on from there.
-    pub fn plan(&mut self, lattice: &impl Lattice, budget: usize) -> Result<Route, Unsolved> {
+    pub fn plan(&mut self, lattice: &impl ReversibleLattice, budget: usize) -> Result<Route, Unsolved> {
         self.fit_keys();
         let mut expanded = 0;
         while let Some(next) = self.next() {
@@ -156,19 +156,20 @@ impl DStarLite {
     /// The first entry of the open list, if it may matter to the way from the start.
     fn next(&mut self) -> Option<Open> {
         let reached = self.nodes.get(self.start).least() + self.km;
-        self.open.peek().filter(|next| next.key <= reached + ROUNDING * (1.0 + reached))
+        let last = self.open.rank(reached + ROUNDING * (1.0 + reached));
+        self.open.peek().filter(|next| next.rank <= last)
     }
 
     /// Takes an entry of the open list; whether its cell was expanded.
-    fn settle(&mut self, lattice: &impl Lattice, next: Open) -> bool {
+    fn settle(&mut self, lattice: &impl ReversibleLattice, next: Open) -> bool {
         let cell = next.cell.unpacked();
         let node = self.nodes.get(cell);
-        if node.is_consistent() || node.least() != next.tie {
+        if node.is_consistent() || node.least().to_bits() != next.tie {
             return false;
         }
         let key = self.key(cell);
-        if next.key + ROUNDING * (1.0 + key) < key {
-            self.open.push(Open { key, ..next });
+        if next.rank < self.open.rank(key) {
+            self.open.push(key, next.tie, next.cell);
             return false;
         }
         if node.g > node.rhs {
@@ -180,7 +181,7 @@ impl DStarLite {
     }
 
     /// The way from a cell has become cheaper: so may be those through it.
-    fn lower(&mut self, lattice: &impl Lattice, here: VoxelIndex, g: f64) {
+    fn lower(&mut self, lattice: &impl ReversibleLattice, here: VoxelIndex, g: f64) {
         self.nodes.slot(here).g = g;
         lattice.steps_into(here, |number, cost| {
             let before = before(here, number);
@@ -193,7 +194,7 @@ impl DStarLite {
     }
 
     /// The way from a cell has become dearer: those that led through it must be found again.
-    fn raise(&mut self, lattice: &impl Lattice, here: VoxelIndex, g: f64) {
+    fn raise(&mut self, lattice: &impl ReversibleLattice, here: VoxelIndex, g: f64) {
         self.nodes.slot(here).g = f64::INFINITY;
         self.push(here);
         lattice.steps_into(here, |number, cost| {
@@ -205,7 +206,7 @@ impl DStarLite {
     }
 
     /// Works `rhs` out anew from the neighbours.
-    fn renew(&mut self, lattice: &impl Lattice, cell: VoxelIndex) {
+    fn renew(&mut self, lattice: &impl ReversibleLattice, cell: VoxelIndex) {
         if cell == self.goal {
             return;
         }
@@ -225,7 +226,7 @@ impl DStarLite {
     fn push(&mut self, cell: VoxelIndex) {
         let node = self.nodes.get(cell);
         if !node.is_consistent() {
-            self.open.push(Open { key: self.key(cell), tie: node.least(), cell: Packed::of(cell) });
+            self.open.push(self.key(cell), node.least().to_bits(), Packed::of(cell));
         }
     }
 
@@ -247,7 +248,7 @@ impl DStarLite {
     }
 
     /// From the start, always to the neighbour through which the way is cheapest.
-    fn route(&self, lattice: &impl Lattice, expanded: usize) -> Option<Route> {
+    fn route(&self, lattice: &impl ReversibleLattice, expanded: usize) -> Option<Route> {
         let mut cells = vec![self.start];
         let (mut here, mut cost) = (self.start, 0.0);
         let mut left = f64::INFINITY;

@@ -1,8 +1,8 @@
 //! What a search must know of a grid: its size, its steps, and what they cost.
 
-use std::f64::consts::SQRT_2;
-
-use super::{CENTRE, MOVES, OccupancyGrid, SQRT_3, moved};
+use super::detours::{self, Worth};
+use super::moves::LENGTHS;
+use super::{CENTRE, MOVES, OccupancyGrid, moved, moves_to, unswept};
 use crate::map::VoxelIndex;
 
 /// A box of cells with steps between neighbours.
@@ -20,6 +20,19 @@ pub trait Lattice {
     /// Tells `visit` every step that leads from `cell`: its move and its cost.
     fn steps_from(&self, cell: VoxelIndex, visit: impl FnMut(usize, f64));
 
+    /// The same without some that a cheapest way which came to `cell` by a move need not take. What is left out leads where
+    /// one also gets from the cell before, without `cell`: for less, or for the same if the last step of that way
+    /// is of a lesser kind ([`Move::kind`](super::Move::kind)).
+    ///
+    /// A search of least cost finds the same costs with it. For if the cheapest ways to some cell end in steps left out,
+    /// then each also has a neighbour before it whose last step is of a lesser kind, and there are but three kinds.
+    fn steps_after(&self, cell: VoxelIndex, _arrived_by: usize, visit: impl FnMut(usize, f64)) {
+        self.steps_from(cell, visit);
+    }
+}
+
+/// A lattice that can be searched from the goal to the start.
+pub trait ReversibleLattice: Lattice {
     /// Tells `visit` every step that leads into `cell`: its move and its cost, to the last bit as
     /// [`Lattice::steps_from`] tells it.
     fn steps_into(&self, cell: VoxelIndex, visit: impl FnMut(usize, f64));
@@ -42,7 +55,7 @@ pub struct StepCosts {
 impl StepCosts {
     /// Lengths in cells, no corners cut: what published optimal lengths hold for (Sturtevant 2012).
     pub const EUCLIDEAN: StepCosts =
-        StepCosts { lengths: [1.0, SQRT_2, SQRT_3], cuts_corners: false, collision_factor: 0.0 };
+        StepCosts { lengths: LENGTHS, cuts_corners: false, collision_factor: 0.0 };
 
     /// Zhang's plain D*: straight 10, diagonal 14, corners cut.
     pub const ZHANG_PLAIN: StepCosts =
@@ -55,6 +68,8 @@ impl StepCosts {
     pub const FLYING: StepCosts = StepCosts { collision_factor: 0.8, ..Self::EUCLIDEAN };
 }
 
+/// All 26 neighbours, as bits of a neighbourhood.
+const NEIGHBOURS: u32 = 0o777_777_777 & !CENTRE;
 /// The straight neighbours, through the cell's faces, as bits of its neighbourhood.
 const STRAIGHT: u32 = 0o020_252_020;
 
@@ -70,30 +85,41 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// What a step from `cell` costs beyond its length.
-    fn penalty(&self, cell: VoxelIndex) -> f64 {
+    /// What a step from `cell` costs beyond its length, given its neighbourhood.
+    #[inline]
+    fn penalty(&self, cell: VoxelIndex, around: u32) -> f64 {
         let factor = self.costs.collision_factor;
         if factor == 0.0 {
             return 0.0;
         }
-        let blocked = self.cells.blocked_around(cell) & !self.cells.outside_around(cell);
+        let blocked = around & !self.cells.outside_around(cell);
         let straight = if blocked & STRAIGHT == 0 { 0.0 } else { factor };
         let diagonal = if blocked & !STRAIGHT & !CENTRE == 0 { 0.0 } else { factor / 2.0 };
         straight + diagonal
     }
 
-    /// The moves that lead from a free cell, or, reversed, into it, with their lengths.
+    /// The ends of the moves that lead from a cell with such a neighbourhood, or, reversed, into it.
     #[inline]
-    fn passable(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
-        let blocked = self.cells.blocked_around(cell);
+    fn passable(&self, blocked: u32) -> u32 {
         if blocked & CENTRE != 0 {
-            return;
+            0
+        } else if self.costs.cuts_corners {
+            !blocked & NEIGHBOURS
+        } else {
+            unswept(blocked)
         }
-        for (number, step) in MOVES.iter().enumerate() {
-            let needed = if self.costs.cuts_corners { step.end } else { step.swept };
-            if blocked & needed == 0 {
-                visit(number, self.costs.lengths[step.kind]);
-            }
+    }
+
+    /// Which detours are worth as much as a way through a cell from which steps cost so much beyond their length.
+    fn worth(&self, penalty: f64) -> Worth {
+        let StepCosts { lengths, cuts_corners, collision_factor } = self.costs;
+        if cuts_corners || lengths != LENGTHS || collision_factor < 0.0 {
+            Worth::None
+        } else if penalty >= collision_factor + collision_factor / 2.0 {
+            // No other cell's can be greater.
+            Worth::Any
+        } else {
+            Worth::Direct
         }
     }
 }
@@ -109,14 +135,31 @@ impl Lattice for Grid {
 
     #[inline]
     fn steps_from(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
-        let penalty = self.penalty(cell);
-        self.passable(cell, |number, length| visit(number, length + penalty));
+        let around = self.cells.blocked_around(cell);
+        let penalty = self.penalty(cell, around);
+        moves_to(self.passable(around))
+            .for_each(|number| visit(number, self.costs.lengths[MOVES[number].kind] + penalty));
     }
 
     #[inline]
+    fn steps_after(&self, cell: VoxelIndex, arrived_by: usize, mut visit: impl FnMut(usize, f64)) {
+        let around = self.cells.blocked_around(cell);
+        let penalty = self.penalty(cell, around);
+        let needed = detours::without(self.passable(around), around, arrived_by, self.worth(penalty));
+        moves_to(needed).for_each(|number| visit(number, self.costs.lengths[MOVES[number].kind] + penalty));
+    }
+}
+
+impl ReversibleLattice for Grid {
+    #[inline]
     fn steps_into(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
-        self.passable(cell, |number, length| {
-            visit(25 - number, length + self.penalty(moved(cell, MOVES[number].by)));
+        moves_to(self.passable(self.cells.blocked_around(cell))).for_each(|number| {
+            let before = moved(cell, MOVES[number].by);
+            let penalty = match self.costs.collision_factor {
+                0.0 => 0.0,
+                _ => self.penalty(before, self.cells.blocked_around(before)),
+            };
+            visit(25 - number, self.costs.lengths[MOVES[number].kind] + penalty);
         });
     }
 }

@@ -4,14 +4,15 @@
 //! experiments; the vehicle's own map is another.
 
 mod bricks;
+mod detours;
 mod lattice;
 mod moves;
 pub mod movingai;
 mod occupancy;
 
-pub use lattice::{Grid, Lattice, StepCosts};
+pub use lattice::{Grid, Lattice, ReversibleLattice, StepCosts};
 pub use moves::{MOVES, Move, octile};
 pub use occupancy::{OccupancyGrid, SizeError};
 
 pub(crate) use bricks::Bricks;
-pub(crate) use moves::{CENTRE, Packed, SQRT_3, moved};
+pub(crate) use moves::{CENTRE, Packed, SQRT_3, moved, moves_to, unswept};

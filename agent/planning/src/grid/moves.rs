@@ -26,11 +26,14 @@ pub struct Move {
     pub end: u32,
 }
 
+/// Length of a move of each kind, in cells.
+pub(super) const LENGTHS: [f64; 3] = [1.0, SQRT_2, SQRT_3];
+
 /// The moves to all 26 neighbours: z slowest, x fastest, from -1 to 1. The reverse of move `n` is move `25 - n`.
 pub const MOVES: [Move; 26] = moves();
 
 /// The bit of a neighbour in a neighbourhood of 27 cells.
-const fn bit(by: [i8; 3]) -> u32 {
+pub(super) const fn bit(by: [i8; 3]) -> u32 {
     1 << ((by[2] + 1) * 9 + (by[1] + 1) * 3 + by[0] + 1)
 }
 
@@ -42,7 +45,7 @@ const fn moves() -> [Move; 26] {
         let by = [place % 3 - 1, place / 3 % 3 - 1, place / 9 - 1];
         if place != 13 {
             let kind = (by[0] * by[0] + by[1] * by[1] + by[2] * by[2] - 1) as usize;
-            let length = [1.0, SQRT_2, SQRT_3][kind];
+            let length = LENGTHS[kind];
             moves[number] = Move { by, kind, length, swept: swept(by), end: bit(by) };
             number += 1;
         }
@@ -61,6 +64,32 @@ const fn swept(by: [i8; 3]) -> u32 {
         axes += 1;
     }
     bits & !bit([0; 3])
+}
+
+/// Cells of a neighbourhood that lie in its middle along x, y and z, as bits.
+const MIDDLE: [u32; 3] = [0o222_222_222, 0o070_070_070, 0o000_777_000];
+/// All 27 cells of a neighbourhood.
+const NEIGHBOURHOOD: u32 = 0o777_777_777;
+
+/// The ends of the moves whose boxes are free ([`Move::swept`]), of a neighbourhood with these cells blocked and its middle
+/// free. Along one axis after the other, what is blocked in the middle blocks what lies further out.
+#[inline]
+pub(crate) fn unswept(blocked: u32) -> u32 {
+    let spread = |blocked: u32, middle: u32, apart: u32| {
+        blocked | (blocked & middle) << apart | (blocked & middle) >> apart
+    };
+    let [x, y, z] = MIDDLE;
+    !spread(spread(spread(blocked, x, 1), y, 3), z, 9) & NEIGHBOURHOOD & !CENTRE
+}
+
+/// The numbers of the moves with these ends.
+#[inline]
+pub(crate) fn moves_to(mut ends: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let place = ends.trailing_zeros();
+        ends &= ends.wrapping_sub(1);
+        (place < u32::BITS).then_some(place as usize - usize::from(place > 13))
+    })
 }
 
 /// Where a move leads from a cell; below zero, to the far end of the integers, which is in no grid.
@@ -108,6 +137,8 @@ pub fn octile(from: VoxelIndex, to: VoxelIndex, costs: [f64; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -118,6 +149,15 @@ mod tests {
             assert_eq!(MOVES[25 - number].by, step.by.map(|c| -c));
             assert_eq!(step.swept.count_ones(), [1, 3, 7][step.kind]);
             assert!(step.swept & step.end != 0);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_moves_found_are_those_whose_boxes_are_free(blocked in 0..=NEIGHBOURHOOD) {
+            let blocked = blocked & !CENTRE;
+            let free: Vec<usize> = (0..26).filter(|number| blocked & MOVES[*number].swept == 0).collect();
+            prop_assert_eq!(moves_to(unswept(blocked)).collect::<Vec<_>>(), free);
         }
     }
 

@@ -145,15 +145,6 @@ impl Lattice for LegLattice<'_> {
             }
         }
     }
-
-    fn steps_into(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
-        let here = self.point(cell);
-        for (number, there) in self.neighbours(cell) {
-            if let Some(leg_m) = self.leg_m(&there, &here) {
-                visit(MOVES.len() - 1 - number, leg_m);
-            }
-        }
-    }
 }
 
 /// The same route with legs no longer than asked.
