@@ -2,7 +2,7 @@
 
 use super::open_list::{Open, OpenList};
 use super::{Route, Unsolved};
-use crate::grid::{Bricks, ReversibleLattice, MOVES, Packed, moved, octile};
+use crate::grid::{Bricks, MOVES, Packed, ReversibleLattice, moved, octile};
 use crate::map::VoxelIndex;
 
 /// A search from the goal to a vehicle that moves, over a [`ReversibleLattice`] that changes.
