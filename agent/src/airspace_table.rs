@@ -203,3 +203,40 @@ fn is_finite(place: &[f64; 2]) -> bool {
 fn is_length(length_m: f64) -> bool {
     length_m > 0.0 && length_m.is_finite()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn no_fly(centre_m: Option<[f64; 2]>, radius_m: Option<f64>, corners_m: &[[f64; 2]]) -> AirspaceTable {
+        let corners_m = corners_m.to_vec();
+        let zone = NoFlyTable { centre_m, radius_m, corners_m, floor_m: lowest_m(), ceiling_m: 9.0 };
+        AirspaceTable { no_fly: vec![zone], ..AirspaceTable::default() }
+    }
+
+    #[test]
+    fn an_airspace_is_what_its_table_describes_and_the_other_way_round() {
+        let mut table = no_fly(Some([1.0, 2.0]), Some(3.0), &[]);
+        table.no_fly.extend(no_fly(None, None, &[[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]]).no_fly);
+        table.threat = vec![ThreatTable { centre_m: [7.0, 8.0], radius_m: 2.0 }];
+        table.mountain = vec![MountainTable { centre_m: [5.0, 5.0], height_m: 6.0, slope_m: [1.0, 2.0] }];
+        let heights_m = vec![vec![0.0, 1.0], vec![2.0, 3.0]];
+        table.terrain = Some(TerrainTable { corner_m: [0.0, 0.0], spacing_m: 5.0, heights_m });
+        let airspace = table.check().unwrap();
+        assert_eq!((airspace.no_fly.len(), airspace.prisms.len(), airspace.threats.len()), (1, 1, 1));
+        assert_eq!(AirspaceTable::of(&airspace), table);
+    }
+
+    #[test]
+    fn what_is_no_zone_is_named() {
+        for wrong in [
+            no_fly(Some([1.0, 2.0]), None, &[]),
+            no_fly(Some([1.0, 2.0]), Some(-1.0), &[]),
+            no_fly(Some([f64::NAN, 2.0]), Some(1.0), &[]),
+            no_fly(None, None, &[[0.0, 0.0], [1.0, 1.0]]),
+            no_fly(Some([1.0, 2.0]), Some(1.0), &[[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]]),
+        ] {
+            assert_eq!(wrong.check().unwrap_err().field, "no_fly[0]");
+        }
+    }
+}

@@ -252,8 +252,8 @@ mod tests {
         let room = |x, y, z| keep_out().room_m(&Vector3::new(x, y, z));
         assert!((room(-20.0, 27.0, 5.0) - 1.0).abs() < 1e-9, "beside the cylinder");
         assert!((room(-20.0, 20.0, 15.0) - 2.0).abs() < 1e-9, "above it");
-        assert!((room(-15.0, -15.0, 5.0) - 4.0).abs() < 1e-9, "in the notch of the L");
-        assert!(room(-25.0, -15.0, 5.0) < -5.0, "in its arm");
+        assert!((room(-15.0, -15.0, 11.0) - 4.0).abs() < 1e-9, "in the notch of the L");
+        assert!(room(-25.0, -15.0, 7.0) < -5.0, "in its arm");
         assert!(room(20.0, -20.0, 11.4) < 0.0 && room(20.0, -20.0, 11.6) > 0.0, "over the peak");
         assert!(room(20.0, 20.0, 9.1) > 0.0 && room(20.0, 20.0, 8.9) < 0.0, "over the threat");
         assert_eq!(KeepOut::new(Airspace::default(), 1.0, 1.0).room_m(&Vector3::zeros()), f64::INFINITY);
@@ -274,7 +274,8 @@ mod tests {
         assert!(keep_out.room_m(&open) >= 0.0 && (open - inside).norm() < 4.7, "{open}");
         let south = keep_out.nearest_open(&inside, |place| place.y < 18.0).unwrap();
         assert!(south.y < 18.0 && keep_out.room_m(&south) >= 0.0);
-        assert_eq!(keep_out.nearest_open(&Vector3::zeros(), |_| true), Some(Vector3::zeros()));
+        let outside = Vector3::new(0.0, 0.0, 5.0);
+        assert_eq!(keep_out.nearest_open(&outside, |_| true), Some(outside));
     }
 
     #[test]
