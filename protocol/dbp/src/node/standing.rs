@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use crate::NodeName;
 use crate::node::Node;
 use crate::verify::row::{Family, Part, Row};
+use crate::{BidRecord, NodeName};
 
 impl Node {
     /// Writes where the node stands. Numbers that only grow are written as such, so that they can be counted anew.
@@ -113,6 +113,14 @@ impl Node {
         self.peers.iter().any(|(name, peer)| name == node && peer.alive)
     }
 
+    /// Whether this copy of a record, or a newer record, has been taken in.
+    pub(crate) fn has_taken_in(&self, record: &BidRecord) -> bool {
+        self.table.bidders.get(&record.node).is_some_and(|bidder| {
+            let taken = (bidder.incarnation, bidder.epoch, bidder.sent_at);
+            taken >= (record.incarnation, record.epoch, record.sent_at)
+        })
+    }
+
     /// Whether `guarded` events are kept back since the start.
     pub(crate) fn is_guarding(&self) -> bool {
         self.guarding
@@ -145,8 +153,52 @@ impl Node {
         self.peers.silence(node);
     }
 
+    /// Holds the clock of its b-threads at the start of the run, so that deadlines pass only where they are let.
+    pub(crate) fn hold_clock(&mut self) {
+        self.held_clock = Some(Duration::ZERO);
+    }
+
+    /// The b-threads with an open deadline.
+    pub(crate) fn deadlines(&self) -> impl Iterator<Item = &str> {
+        self.program.bids().filter(|(_, bid, _)| bid.given_deadline().is_some()).map(|(name, ..)| name)
+    }
+
+    /// Lets the deadline of a b-thread pass.
+    pub(crate) fn let_deadline_pass(&mut self, bthread: &str) {
+        let now = self.program_now();
+        self.program.fire_deadline(bthread, now);
+    }
+
     /// Lets the longest lease pass since the start.
     pub(crate) fn let_guard_end(&mut self) {
         self.started = Some(Duration::ZERO);
+    }
+}
+
+/// What runs that are held against the verifier's model ask.
+#[cfg(test)]
+impl Node {
+    /// Takes leases by which nothing is held to run on: nobody renews them, and nothing ends with them.
+    pub(crate) fn overlook_idle_leases(&mut self) {
+        for outbox in self.outboxes.values_mut().filter(|outbox| !outbox.upholds_any()) {
+            outbox.acked_sent_at = self.now;
+        }
+        let idle = |bidder: &&mut crate::table::Bidder| bidder.bids.is_empty() && bidder.released.is_empty();
+        self.table.bidders.values_mut().filter(idle).for_each(|bidder| bidder.live = true);
+    }
+
+    /// Whether a block holds at `home` as long as this node is sure of it.
+    pub(crate) fn relies_on(&self, home: &NodeName) -> bool {
+        self.outboxes.get(home).is_some_and(|outbox| outbox.upholds_any())
+    }
+
+    /// The newest epoch of this node's bids that `home` has acknowledged.
+    pub(crate) fn acknowledged_by(&self, home: &NodeName) -> u64 {
+        self.outboxes.get(home).map_or(0, |outbox| outbox.acked_epoch)
+    }
+
+    /// The number of the last occurrence of `home` that this node was told of.
+    pub(crate) fn applied(&self, home: &NodeName) -> u64 {
+        self.streams.get(home).map_or(0, crate::stream::Stream::applied)
     }
 }

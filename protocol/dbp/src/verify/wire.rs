@@ -22,6 +22,8 @@ impl Wire {
             row.plain(record.incarnation);
             row.optional(record.home_incarnation);
             row.number(Family::Epoch(from.clone(), record.incarnation, to.name().clone()), record.epoch);
+            // A copy that has been taken in does not count again, but a newer one of the same content does.
+            row.flag(to.has_taken_in(record));
             let since = to.occurred_since(record.applied);
             row.list(&record.bids, |row, bid| {
                 row.bid(from, record.incarnation, bid);
