@@ -137,6 +137,14 @@ impl Node {
         self.history.latest_seq()
     }
 
+    /// Lets so much time pass that `home` is to be sent another copy, while it surely keeps what it has acknowledged.
+    pub(crate) fn let_renewal_fall_due(&mut self, home: &NodeName) {
+        if let Some(outbox) = self.outboxes.get_mut(home) {
+            outbox.acked_sent_at = outbox.acked_sent_at.min(self.now - self.config.lease / 2);
+            outbox.sent_at = None;
+        }
+    }
+
     /// Lets the time pass in which `home` surely keeps what this node has stated there; a fresh copy is due.
     pub(crate) fn let_hold_lapse(&mut self, home: &NodeName) {
         if let Some(outbox) = self.outboxes.get_mut(home) {
@@ -145,11 +153,21 @@ impl Node {
         }
     }
 
-    /// Lets the lease pass of what `node` has stated here, and of its last sign of life.
-    pub(crate) fn let_lease_lapse(&mut self, node: &NodeName) {
+    /// Whether bids of `node` stand here that its lease keeps.
+    pub(crate) fn holds_bids_of(&self, node: &NodeName) -> bool {
+        self.table.bidders.get(node).is_some_and(|bidder| bidder.live && !bidder.bids.is_empty())
+    }
+
+    /// Lets the lease pass of what `node` has stated here.
+    pub(crate) fn let_bids_lapse(&mut self, node: &NodeName) {
         if let Some(bidder) = self.table.bidders.get_mut(node) {
             bidder.heard_at = Duration::ZERO;
         }
+    }
+
+    /// Lets the lease pass of what `node` has stated here, and of its last sign of life.
+    pub(crate) fn let_lease_lapse(&mut self, node: &NodeName) {
+        self.let_bids_lapse(node);
         self.peers.silence(node);
     }
 
@@ -192,9 +210,15 @@ impl Node {
         self.outboxes.get(home).is_some_and(|outbox| outbox.upholds_any())
     }
 
-    /// The newest epoch of this node's bids that `home` has acknowledged.
-    pub(crate) fn acknowledged_by(&self, home: &NodeName) -> u64 {
-        self.outboxes.get(home).map_or(0, |outbox| outbox.acked_epoch)
+    /// Whether the lease of what `node` bids here runs.
+    pub(crate) fn keeps_lease_of(&self, node: &NodeName) -> bool {
+        self.table.bidders.get(node).is_some_and(|bidder| bidder.live)
+    }
+
+    /// The epoch of the bids of which this node sends copies to `home`.
+    pub(crate) fn states(&self, home: &NodeName) -> Option<u64> {
+        let outbox = self.outboxes.get(home)?;
+        outbox.next_deadline(self.config.lease).map(|_| outbox.epoch)
     }
 
     /// The number of the last occurrence of `home` that this node was told of.

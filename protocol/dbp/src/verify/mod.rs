@@ -48,7 +48,7 @@ pub struct Member {
 /// What may go wrong, and how often.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Faults {
-    /// Whether an older record of bids may still arrive once a newer one was sent.
+    /// Whether an older record of bids, or an older acknowledgement, may still arrive once a newer one was sent.
     pub delay: bool,
     /// How many leases may lapse.
     pub lapses: u32,
@@ -187,7 +187,7 @@ impl NetworkVerifier {
             "more than {lapses} lapses, {restarts} restarts, {repeats} repetitions and {partitions} partitions"
         )];
         if !delay {
-            left_out.push("records of bids that arrive after a newer one was sent".to_owned());
+            left_out.push("bids and acknowledgements that arrive after a newer one was sent".to_owned());
         }
         if !late_facts {
             left_out.push("facts of one node that take time to arrive at another".to_owned());

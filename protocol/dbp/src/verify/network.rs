@@ -13,7 +13,7 @@ use super::row::{Family, Part, Row};
 use super::wire::Wire;
 use super::{Faults, Invariant, Member, MoveCounts, NetworkView};
 use crate::node::Node;
-use crate::{BidRecord, Kept, Message, NodeConfig, NodeError, NodeName, Presence, Recipient, facts};
+use crate::{BidAck, BidRecord, Kept, Message, NodeConfig, NodeError, NodeName, Presence, Recipient, facts};
 
 /// When the network starts: later than any lease, so that what was last heard at time zero has lapsed.
 const START: Duration = Duration::from_secs(1 << 20);
@@ -47,15 +47,17 @@ struct Network {
 pub(super) enum Step {
     /// Its b-threads begin.
     Begin(NodeName),
-    /// The record at this place of the wire from a bidder arrives, and those before it never will.
+    /// The record at this place of the wire from a bidder arrives, and those before it count no more.
     Record {
         from: NodeName,
         to: NodeName,
         at: usize,
     },
+    /// So does an acknowledgement.
     Ack {
         from: NodeName,
         to: NodeName,
+        at: usize,
     },
     Occurrence {
         from: NodeName,
@@ -77,7 +79,12 @@ pub(super) enum Step {
         holder: NodeName,
         home: NodeName,
     },
-    /// The home lets go.
+    /// The home lets go of its bids, while it still counts it as alive: a sign of life has come since.
+    BidsLapse {
+        holder: NodeName,
+        home: NodeName,
+    },
+    /// The home lets go, and counts the holder as lost.
     LeaseLapses {
         holder: NodeName,
         home: NodeName,
@@ -252,9 +259,13 @@ impl NetworkModel {
                     steps.push(Step::HoldLapses { holder: from, home: to });
                 }
             } else if home.hears(&from) {
+                let (holder, home_holds) = (from.clone(), home.holds_bids_of(&from));
                 let pair = (from, to);
                 if network.lapses > 0 || is_cut || network.lapsing.contains(&pair) {
-                    let (holder, home) = pair;
+                    let home = pair.1;
+                    if home_holds {
+                        steps.push(Step::BidsLapse { holder: holder.clone(), home: home.clone() });
+                    }
                     steps.push(Step::LeaseLapses { holder, home });
                 }
             }
@@ -331,8 +342,8 @@ impl NetworkModel {
                 network.hand_over(to, now, record.map(Message::Bid));
                 self.go_on(network, to, choices)
             }
-            Step::Ack { from, to } => {
-                let ack = network.wire(from, to).ack.take();
+            Step::Ack { from, to, at } => {
+                let ack = network.wire(from, to).acks.drain(..=*at).next_back();
                 network.hand_over(to, now, ack.map(Message::Ack));
                 self.go_on(network, to, choices)
             }
@@ -367,22 +378,35 @@ impl NetworkModel {
                     network.lapses -= 1;
                     network.lapsing.insert((holder.clone(), home.clone()));
                 }
+                // The copies that were sent before may arrive yet.
+                network.with(holder, |node| node.let_renewal_fall_due(home));
+                let mut selected = self.go_on(network, holder, choices);
                 network.with(holder, |node| node.let_hold_lapse(home));
                 // An acknowledgement on its way is of a copy sent before.
-                network.wire(home, holder).ack = None;
-                self.go_on(network, holder, choices)
+                network.wire(home, holder).acks.clear();
+                selected.extend(self.go_on(network, holder, choices));
+                selected
+            }
+            Step::BidsLapse { holder, home } => {
+                network.pay_for_lapse(holder, home);
+                if !network.are_cut_off(holder, home) {
+                    network.lapsing.insert((holder.clone(), home.clone()));
+                }
+                network.with(home, |node| node.let_bids_lapse(holder));
+                self.let_go(network, holder, home, choices)
             }
             Step::LeaseLapses { holder, home } => {
-                if !network.lapsing.remove(&(holder.clone(), home.clone()))
-                    && !network.are_cut_off(holder, home)
-                {
-                    network.lapses -= 1;
-                }
-                network.wire(home, holder).ack = None;
+                network.pay_for_lapse(holder, home);
                 network.with(home, |node| node.let_lease_lapse(holder));
-                let mut selected = self.go_on(network, home, choices);
-                network.with(holder, |node| node.let_hold_lapse(home));
-                selected.extend(self.go_on(network, holder, choices));
+                let selected = self.let_go(network, holder, home, choices);
+                // Its signs of life come again.
+                let life = network.nodes.get(holder).map(|node| (node.incarnation(), node.latest_seq()));
+                let member = self.members.iter().find(|member| member.config.name == *holder);
+                if let (Some((life, seq)), Some(member)) = (life, member)
+                    && let Message::Presence(presence) = presence(member, life, START, seq)
+                {
+                    network.wire(holder, home).presence = Some(presence);
+                }
                 selected
             }
             Step::Deadline { node, bthread } => {
@@ -395,6 +419,21 @@ impl NetworkModel {
                 self.go_on(network, node, choices)
             }
         }
+    }
+
+    /// A home and then the holder go on after a lapse. What the holder states again is a fresh copy.
+    fn let_go(
+        &mut self,
+        network: &mut Network,
+        holder: &NodeName,
+        home: &NodeName,
+        choices: &mut Choices,
+    ) -> Vec<String> {
+        network.wire(home, holder).acks.clear();
+        let mut selected = self.go_on(network, home, choices);
+        network.with(holder, |node| node.let_hold_lapse(home));
+        selected.extend(self.go_on(network, holder, choices));
+        selected
     }
 
     /// Begins a new life of a node, which finds the others alive. What was on its way to the old one is lost.
@@ -508,7 +547,7 @@ impl Step {
         match self {
             Step::Begin(node) => Event::new(format!("{node} begins")),
             Step::Record { from, to, .. } => Event::new(format!("{to} takes in what {from} bids")),
-            Step::Ack { from, to } => Event::new(format!("{to} hears that {from} has taken in its bids")),
+            Step::Ack { from, to, .. } => Event::new(format!("{to} hears that {from} has taken in its bids")),
             Step::Occurrence { from, to } => Event::new(format!("{to} hears what occurred at {from}")),
             Step::Presence { from, to } => Event::new(format!("{to} hears that {from} lives")),
             Step::Twice(step) => {
@@ -518,7 +557,10 @@ impl Step {
             Step::Cut(one, other) => Event::new(format!("{one} and {other} are cut off from one another")),
             Step::Heal(one, other) => Event::new(format!("{one} and {other} are joined again")),
             Step::HoldLapses { holder, home } => Event::new(format!("{holder} is no longer sure of {home}")),
-            Step::LeaseLapses { holder, home } => Event::new(format!("{home} lets go of what {holder} bids")),
+            Step::BidsLapse { holder, home } => Event::new(format!("{home} lets go of what {holder} bids")),
+            Step::LeaseLapses { holder, home } => {
+                Event::new(format!("{home} lets go of what {holder} bids, and counts it as lost"))
+            }
             Step::GuardEnds(node) => Event::new(format!("{node} has waited for the longest lease")),
             Step::Deadline { node, bthread } => {
                 Event::new(format!("the deadline of {node}#{bthread} passes"))
@@ -532,13 +574,14 @@ impl Step {
         match self {
             Step::Begin(_) => "beginning",
             Step::Record { at: 1.., .. } => "loss of older bids",
+            Step::Ack { at: 1.., .. } => "loss of older acknowledgements",
             Step::Record { .. } | Step::Ack { .. } | Step::Occurrence { .. } | Step::Presence { .. } => {
                 "arrival"
             }
             Step::Twice(_) => "repetition",
             Step::Cut(..) => "partition",
             Step::Heal(..) => "end of a partition",
-            Step::HoldLapses { .. } | Step::LeaseLapses { .. } => "lapse",
+            Step::HoldLapses { .. } | Step::BidsLapse { .. } | Step::LeaseLapses { .. } => "lapse",
             Step::GuardEnds(_) => "end of a guard",
             Step::Deadline { .. } => Self::DEADLINE,
             Step::Restart(_) => "restart",
@@ -549,7 +592,7 @@ impl Step {
     fn due(&self) -> Option<Due> {
         Some(match self {
             Step::Record { from, to, .. } => Due::Record(from.clone(), to.clone()),
-            Step::Ack { from, to } => Due::Ack(from.clone(), to.clone()),
+            Step::Ack { from, to, .. } => Due::Ack(from.clone(), to.clone()),
             Step::Occurrence { from, to } => Due::Occurrence(from.clone(), to.clone()),
             Step::Presence { from, to } => Due::Presence(from.clone(), to.clone()),
             Step::Twice(step) => return step.due(),
@@ -558,7 +601,7 @@ impl Step {
             Step::Deadline { node, bthread } => Due::Deadline(node.clone(), bthread.clone()),
             Step::Begin(_) | Step::Cut(..) | Step::Restart(_) => return None,
             // A lease need not lapse: its holder renews it.
-            Step::HoldLapses { .. } | Step::LeaseLapses { .. } => return None,
+            Step::HoldLapses { .. } | Step::BidsLapse { .. } | Step::LeaseLapses { .. } => return None,
         })
     }
 }
@@ -703,7 +746,8 @@ impl Network {
         let records =
             (0..wire.records.len()).map(|at| Step::Record { from: from.clone(), to: to.clone(), at });
         let mut arrivals: Vec<Step> = records.collect();
-        arrivals.extend(wire.ack.as_ref().map(|_| Step::Ack { from: from.clone(), to: to.clone() }));
+        let ack = |at| Step::Ack { from: from.clone(), to: to.clone(), at };
+        arrivals.extend((0..wire.acks.len()).map(ack));
         let next = wire.occurrences.front();
         arrivals.extend(next.map(|_| Step::Occurrence { from: from.clone(), to: to.clone() }));
         let presence = wire.presence.as_ref();
@@ -714,7 +758,8 @@ impl Network {
     /// Puts what a step has delivered back on its way, as it was `before`: with what it had overtaken, and behind it what
     /// was sent since.
     fn put_again(&mut self, step: &Step, before: BTreeMap<(NodeName, NodeName), Rc<Wire>>) {
-        let (Step::Record { from, to, .. } | Step::Ack { from, to } | Step::Occurrence { from, to }) = step
+        let (Step::Record { from, to, .. } | Step::Ack { from, to, .. } | Step::Occurrence { from, to }) =
+            step
         else {
             return;
         };
@@ -732,7 +777,10 @@ impl Network {
                 };
                 wire.records.extend(since.into_iter().filter(is_new));
             }
-            Step::Ack { .. } => wire.ack = wire.ack.take().or_else(|| before.ack.clone()),
+            Step::Ack { .. } => {
+                let since = std::mem::replace(&mut wire.acks, before.acks.clone());
+                wire.acks.extend(since.into_iter().filter(|ack| !before.acks.contains(ack)));
+            }
             _ => {
                 if let Some(again) = before.occurrences.front() {
                     wire.occurrences.push_front(again.clone());
@@ -766,7 +814,14 @@ impl Network {
                     .retain(|older| older.epoch != record.epoch || older.incarnation != record.incarnation);
                 wire.records.push(record);
             }
-            Message::Ack(ack) => wire.ack = Some(ack),
+            Message::Ack(ack) => {
+                if !faults.delay {
+                    wire.acks.clear();
+                }
+                let content = |ack: &BidAck| (ack.home_incarnation, ack.incarnation, ack.epoch);
+                wire.acks.retain(|older| content(older) != content(&ack));
+                wire.acks.push(ack);
+            }
             Message::Occurrence(occurrence) => {
                 wire.occurrences.push_back(occurrence);
                 self.overflows |= wire.occurrences.len() > faults.most_under_way;
@@ -774,6 +829,14 @@ impl Network {
             // Nothing that a wire holds is lost for good, so no wish to hear it again is needed, and a sign of life says
             // nothing new but where it is put by hand.
             Message::Presence(_) | Message::Repair(_) => {}
+        }
+    }
+
+    /// One lapse more of those that there may be, unless this pair's has begun or a partition brings it about.
+    fn pay_for_lapse(&mut self, holder: &NodeName, home: &NodeName) {
+        let has_begun = self.lapsing.remove(&(holder.clone(), home.clone()));
+        if !has_begun && !self.are_cut_off(holder, home) {
+            self.lapses -= 1;
         }
     }
 
@@ -839,6 +902,9 @@ impl Choices {
         selectable.get(taken).map(|event| program.choose(event, now)).transpose()
     }
 }
+
+#[cfg(test)]
+mod runs;
 
 #[cfg(test)]
 mod tests {
