@@ -6,6 +6,7 @@ use serde::Deserialize;
 use skein_bp::script::Assignment;
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
+use skein_planning::airspace::Airspace;
 
 use crate::bthreads::LinkLossPolicy;
 
@@ -150,6 +151,8 @@ pub struct AgentConfig {
     pub lidar: bool,
     /// The geofence.
     pub fence: Fence,
+    /// Terrain, threats and no-fly zones that are known; its box counts for nothing, the fence does.
+    pub airspace: Airspace,
     /// What the vehicle can do.
     pub envelope: Envelope,
     /// How it plans.

@@ -7,6 +7,7 @@ use skein_bp::script::Assignment;
 use skein_bp::{Event, EventSet, Origin, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_mav::{Companion, CompanionConfig, Landed, SetPoint};
+use skein_planning::airspace::{Airspace, KeepOut};
 use skein_planning::map::MapError;
 use skein_wire::vocabulary::{
     ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, HOMEWARD, LAND, LANDED, LOAD, ORDER, PLAN, RETURN, SCRIPT,
@@ -41,6 +42,10 @@ const ABOVE_WAYPOINTS_M: f64 = 4.0;
 const BELOW_WAYPOINTS_M: f64 = 1.0;
 /// No path is lower than this above the take-off place, m.
 const LEAST_HEIGHT_M: f64 = 0.6;
+/// Paths keep this far out of zones, m: what a vehicle strays from its path, the error of its position, and its hull.
+const ZONE_MARGIN_M: f64 = 1.0;
+/// Paths keep this high above terrain that is known, m.
+const TERRAIN_CLEARANCE_M: f64 = 1.0;
 /// An agent that has not run for this long has let its set-points fall silent, and does not take them up by itself.
 const LONGEST_PAUSE: Duration = SILENT_AFTER;
 /// Neighbours are heard this often at least, while they are, s.
@@ -224,7 +229,7 @@ impl AgentCore {
             }),
             name: own_name,
             neighbours,
-            perception: Perception::new(&config.fence, home, heights(&config))?,
+            perception: perception(&config)?,
             watches: Watches::new(me.clone()),
             failsafes: Failsafes::default(),
             flight: Flight::new(me.clone(), config.takeoff_height_m),
@@ -271,7 +276,8 @@ impl AgentCore {
         }
         let others: Vec<_> = self.neighbours.at(now).map(|neighbour| neighbour.position()).collect();
         self.perception.take_in(scan, &pose, &others);
-        self.guidance.look(scan.stamp, &pose.position, self.perception.returns(), scan.ranges_m.len());
+        let (returns, rays) = (self.perception.returns(), scan.ranges_m.len());
+        self.guidance.look(scan.stamp, &pose.position, returns, rays, self.perception.map());
     }
 
     /// The vehicle's estimated pose at a time near the newest telemetry.
@@ -717,6 +723,15 @@ impl AgentCore {
     pub fn name(&self) -> &NodeName {
         &self.name
     }
+}
+
+/// An empty map of where this mission may fly.
+fn perception(config: &AgentConfig) -> Result<Perception, MapError> {
+    let perception = Perception::new(&config.fence, Vector3::from(config.home), heights(config))?;
+    if config.airspace == Airspace::default() {
+        return Ok(perception);
+    }
+    Ok(perception.with_keep_out(KeepOut::new(config.airspace.clone(), ZONE_MARGIN_M, TERRAIN_CLEARANCE_M)))
 }
 
 /// The least and the greatest height in the world at which this mission may fly, metres.

@@ -4,6 +4,7 @@
 //! [`Link`](skein_wire::Link) to the other nodes, and carries its MAVLink bytes to the autopilot. So the same agent flies
 //! on a vehicle, over Zenoh on one host, and in lockstep.
 
+mod airspace_table;
 pub mod bthreads;
 mod config;
 mod core;
@@ -19,6 +20,7 @@ pub mod verify;
 mod watches;
 
 pub use self::{
+    airspace_table::{AirspaceError, AirspaceTable},
     config::{AgentConfig, Controller, Envelope, Fence, Layer, LocalPlanner, PassageRule, Planners},
     core::{AgentCore, AgentError, Outcome, SetPointRecord, Status},
     flight::FlightPhase,

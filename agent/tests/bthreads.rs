@@ -38,6 +38,7 @@ fn config() -> AgentConfig {
         return_altitude_m: RETURN_ALTITUDE_M,
         lidar: true,
         fence: Fence { min: [-20.0, -20.0, 0.0], max: [20.0, 20.0, 10.0] },
+        airspace: Default::default(),
         envelope: Envelope::default(),
         planners: Planners::default(),
         link_loss: LinkLossPolicy::Continue,

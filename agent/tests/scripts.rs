@@ -39,6 +39,7 @@ fn config() -> AgentConfig {
         return_altitude_m: 4.0,
         lidar: true,
         fence: Fence { min: [-60.0, -60.0, -1.0], max: [60.0, 60.0, 20.0] },
+        airspace: Default::default(),
         envelope: Envelope::default(),
         planners: Planners::default(),
         link_loss: LinkLossPolicy::Continue,

@@ -62,7 +62,9 @@ fn world(scene: &Scene) -> String {
 
 fn missions(set: &MissionSet) -> String {
     let waypoints: usize = set.missions.iter().map(|m| m.waypoints.len()).sum();
-    format!("{} routes with {waypoints} waypoints in all", set.missions.len())
+    let zones = set.airspace.no_fly.len() + set.airspace.prisms.len();
+    let zones = if zones == 0 { String::new() } else { format!(", {zones} no-fly zones") };
+    format!("{} routes with {waypoints} waypoints in all{zones}", set.missions.len())
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use serde_json::json;
-use skein_agent::AgentConfig;
+use skein_agent::{AgentConfig, AirspaceTable};
 use skein_bp::script::Assignment;
 
 use crate::cli::{self, Network};
@@ -120,7 +120,7 @@ pub fn write(
     let ground = save("ground.toml", plan.ground(&agents, muster, launch_on_order))?;
     let agents = (0..).zip(&agents).map(|(index, agent)| {
         let stem = agent.node.replace('/', "-");
-        let mut text = plan.agent(index, agent);
+        let mut text = plan.agent(index, agent) + &airspace_tables(agent)?;
         for assignment in &agent.scripts {
             let file = format!("{stem}-{}.json", assignment.name());
             save(&file, serde_json::to_string_pretty(&assignment.script)?)?;
@@ -129,6 +129,16 @@ pub fn write(
         save(&format!("{stem}.toml"), text)
     });
     Ok(Files { world, ground, agents: agents.collect::<anyhow::Result<_>>()? })
+}
+
+/// What is known of the airspace, in an agent's configuration.
+fn airspace_tables(agent: &AgentConfig) -> anyhow::Result<String> {
+    let airspace = AirspaceTable::of(&agent.airspace);
+    if airspace == AirspaceTable::default() {
+        return Ok(String::new());
+    }
+    let tables = toml::Table::from_iter([("airspace".to_owned(), toml::Value::try_from(airspace)?)]);
+    Ok(format!("\n{}", toml::to_string(&tables)?))
 }
 
 /// A script in an agent's configuration. Names, texts, numbers and lists are written in JSON as in TOML.

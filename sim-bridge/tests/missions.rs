@@ -380,3 +380,47 @@ fn published_lsc_missions_are_read_with_their_worlds() -> Result<(), Box<dyn std
     }
     Ok(())
 }
+
+/// A plan whose geofence excludes a circle of 5 m at (20, 0) and a triangle around (0, 20), and includes a large circle.
+fn fenced(items: &[String]) -> String {
+    let corner = |x: f64, y: f64| {
+        let place = HOME.to_geodetic(&Vector3::new(x, y, 0.0));
+        format!("[{:.10}, {:.10}]", place.latitude_rad.to_degrees(), place.longitude_rad.to_degrees())
+    };
+    let circle = |x: f64, y: f64, radius_m: f64, inclusion: bool| {
+        let centre = corner(x, y);
+        format!(
+            r#"{{"circle": {{"center": {centre}, "radius": {radius_m}}}, "inclusion": {inclusion}, "version": 1}}"#
+        )
+    };
+    let corners = [corner(-4.0, 17.0), corner(4.0, 17.0), corner(0.0, 25.0)].join(", ");
+    let fence = format!(
+        r#""geoFence": {{"circles": [{}, {}], "polygons": [{{"inclusion": false, "polygon": [{corners}]}}], "version": 2}}"#,
+        circle(20.0, 0.0, 5.0, false),
+        circle(0.0, 0.0, 200.0, true),
+    );
+    let empty = r#""geoFence": {"circles": [], "polygons": [], "version": 2}"#;
+    plan(&HOME, items).replace(empty, &fence)
+}
+
+#[test]
+fn what_a_geofence_excludes_is_known_to_every_vehicle() {
+    let waypoint = item(16, 3, &format!("0, 0, 0, null, {}", at(&HOME, 40.0, 0.0, 5.0)));
+    let set = read(&fenced(&[waypoint]));
+    let [circle] = &set.airspace.no_fly[..] else { panic!("one circle: {:?}", set.airspace) };
+    assert!((circle.centre.x - 20.0).abs() < 0.01 && circle.centre.y.abs() < 0.01 && circle.radius_m == 5.0);
+    let [polygon] = &set.airspace.prisms[..] else { panic!("one polygon: {:?}", set.airspace) };
+    assert!((polygon.corners[2] - nalgebra::Vector2::new(0.0, 25.0)).norm() < 0.01);
+    assert_eq!(set.warnings.len(), 1, "a zone to stay inside of: {:?}", set.warnings);
+}
+
+#[test]
+fn an_item_inside_an_excluded_zone_is_refused_with_its_line() {
+    let waypoint = |x, y| item(16, 3, &format!("0, 0, 0, null, {}", at(&HOME, x, y, 5.0)));
+    for (x, y) in [(22.0, 1.0), (0.0, 20.0)] {
+        let text = refusal(&fenced(&[waypoint(9.0, 0.0), waypoint(x, y)]));
+        assert!(text.starts_with("f.plan:6: field `mission.items[1]`: expected a place outside"), "{text}");
+    }
+    let turned = fenced(&[waypoint(9.0, 0.0)]).replace("\"inclusion\": false", "\"inclusion\": 0");
+    assert!(refusal(&turned).contains("expected true or false"), "{}", refusal(&turned));
+}

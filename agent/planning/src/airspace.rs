@@ -1,6 +1,14 @@
 //! An airspace that is known beforehand: terrain, threats and no-fly zones.
 
+mod height_grid;
+mod keep_out;
+mod prism;
+
 use nalgebra::{Vector2, Vector3};
+
+pub use height_grid::{HeightGrid, HeightGridError};
+pub use keep_out::KeepOut;
+pub use prism::NoFlyPrism;
 
 /// Beyond this many slopes from its peak a mountain has ended: 2 mm are left there of 400 m.
 const FOOT_SLOPES: f64 = 3.5;
@@ -49,10 +57,14 @@ pub struct Airspace {
     pub upper: Vector3<f64>,
     /// The terrain; where mountains overlap, their heights add up.
     pub mountains: Vec<Mountain>,
+    /// Heights that mountains stand on, if the ground under them is not flat.
+    pub heights: Option<HeightGrid>,
     /// Threat zones; they are avoided as no-fly zones are.
     pub threats: Vec<ThreatZone>,
-    /// No-fly zones.
+    /// No-fly zones that are round.
     pub no_fly: Vec<NoFlyZone>,
+    /// No-fly zones over polygons.
+    pub prisms: Vec<NoFlyPrism>,
 }
 
 impl Mountain {
@@ -66,6 +78,11 @@ impl Mountain {
     fn most_in_m(&self, lower: &Vector2<f64>, upper: &Vector2<f64>) -> f64 {
         let nearest = self.centre.sup(lower).inf(upper);
         self.height_at_m(nearest.x, nearest.y)
+    }
+
+    /// Its steepest slope: `h / s sqrt(2 / e)`, at `s / sqrt(2)` from the peak.
+    fn steepest(&self) -> f64 {
+        self.height_m.abs() / self.slope_m.min() * (2.0 / std::f64::consts::E).sqrt()
     }
 }
 
@@ -90,10 +107,26 @@ impl NoFlyZone {
 }
 
 impl Airspace {
+    /// Adds what stands in another one; its heights take the place of this one's, if it has any. The box stays.
+    pub fn include(&mut self, other: Airspace) {
+        self.mountains.extend(other.mountains);
+        self.threats.extend(other.threats);
+        self.no_fly.extend(other.no_fly);
+        self.prisms.extend(other.prisms);
+        self.heights = other.heights.or(self.heights.take());
+    }
+
     /// Height of the terrain at a place, metres.
     #[must_use]
     pub fn terrain_m(&self, x: f64, y: f64) -> f64 {
-        self.mountains.iter().map(|mountain| mountain.height_at_m(x, y)).sum()
+        let ground_m = self.heights.as_ref().map_or(0.0, |heights| heights.height_m(x, y));
+        self.mountains.iter().map(|mountain| mountain.height_at_m(x, y)).sum::<f64>() + ground_m
+    }
+
+    /// A slope that the terrain does not exceed.
+    fn steepest(&self) -> f64 {
+        let mountains = self.mountains.iter().map(Mountain::steepest).sum::<f64>();
+        self.heights.as_ref().map_or(0.0, HeightGrid::steepest) + mountains
     }
 
     /// Height of a point above the terrain, metres.
@@ -106,7 +139,8 @@ impl Airspace {
     #[must_use]
     pub fn terrain_bound_m(&self, one: &Vector3<f64>, other: &Vector3<f64>) -> f64 {
         let (lower, upper) = (one.xy().inf(&other.xy()), one.xy().sup(&other.xy()));
-        self.mountains.iter().map(|mountain| mountain.most_in_m(&lower, &upper)).sum()
+        let ground_m = self.heights.as_ref().map_or(0.0, |heights| heights.most_in_m(&lower, &upper));
+        self.mountains.iter().map(|mountain| mountain.most_in_m(&lower, &upper)).sum::<f64>() + ground_m
     }
 
     /// How much of the straight way between two points lies in threat and no-fly zones, metres; where zones
@@ -115,7 +149,8 @@ impl Airspace {
     pub fn intrusion_m(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
         let threats: f64 = self.threats.iter().map(|zone| zone.share_inside(from, to)).sum();
         let no_fly: f64 = self.no_fly.iter().map(|zone| zone.share_inside(from, to)).sum();
-        let share = threats + no_fly;
+        let prisms: f64 = self.prisms.iter().map(|zone| zone.share_inside(from, to)).sum();
+        let share = threats + no_fly + prisms;
         if share > 0.0 { share * (to - from).norm() } else { 0.0 }
     }
 

@@ -14,12 +14,13 @@ use skein_planning::{
     },
     map::ClearanceMap,
     passage::{Passage, PassageConfig, first_passage},
-    separation::{self, FilterConfig, RepulsionConfig, filter, repulsion},
+    separation::{self, FilterConfig, Outcome, RepulsionConfig, filter, repulsion},
 };
 use skein_wire::vocabulary::{ARRIVED, LEAVE, PASSAGE, PATH_BLOCKED, PLANNED, STUCK, UNPLANNABLE};
 
 use super::evasion::{Evasion, Room, Way};
 use crate::{
+    bthreads::HOME_LEG,
     config::{Envelope, Fence, Layer, Planners},
     me::Me,
     neighbours::Neighbour,
@@ -62,6 +63,10 @@ const ROOM_AHEAD_M: f64 = 1.5;
 /// Speed at which a hovering vehicle goes back to its place, at most, m/s.
 const STATION_KEEPING_M_S: f64 = 0.5;
 
+/// Nearer than this is the same place, m.
+const SAME_PLACE_M: f64 = 1e-6;
+/// Walls of closed places are kept clear of from so far, m: further than any vehicle needs to stop.
+const WALLS_M: f64 = 15.0;
 /// A vehicle that is hemmed in leaves its height where it has this much room, m.
 const EVASION_M: f64 = 1.0;
 
@@ -219,8 +224,15 @@ impl Guidance {
     }
 
     /// Takes in the obstacle points of a scan of `rays` rays that was taken at `stamp` and `origin`; metres ENU.
-    pub fn look(&mut self, stamp: Duration, origin: &Vector3<f64>, returns: &[Vector3<f64>], rays: usize) {
-        self.local.look(stamp, origin, returns, rays);
+    pub fn look(
+        &mut self,
+        stamp: Duration,
+        origin: &Vector3<f64>,
+        returns: &[Vector3<f64>],
+        rays: usize,
+        map: &ClearanceMap,
+    ) {
+        self.local.look(stamp, origin, returns, rays, map.keep_out());
     }
 
     /// The flight is over.
@@ -271,8 +283,9 @@ impl Guidance {
         let Some(leg) = self.leg else {
             return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() });
         };
-        let target = map.voxels().clamp(&leg.target);
+        let clamped = map.voxels().clamp(&leg.target);
         // Outside the map, as beyond the fence, the way begins where the map does.
+        let target = self.open_goal(&leg, clamped, map);
         let is_inside = map.voxels().index_of(&motion.position).is_some();
         let start = if is_inside { motion.position } else { map.voxels().clamp(&motion.position) };
         if self.planners.without == Some(Layer::GlobalPath)
@@ -315,6 +328,24 @@ impl Guidance {
         let task = Task { leg: leg.number, start, goal: target, potential, discs, hull_m, margin_m };
         self.routes.begin(task, map);
         self.search(map)
+    }
+
+    /// Where to plan to instead of a place that is closed, if that is on the way to a target beyond the map, or home: the
+    /// nearest that is open; there the way home ends. Other waypoints are flown to as they are, or not at all.
+    fn open_goal(&mut self, leg: &Leg, goal: Vector3<f64>, map: &ClearanceMap) -> Vector3<f64> {
+        let is_target = (goal - leg.target).norm() < SAME_PLACE_M;
+        let Some(keep_out) = map.keep_out().filter(|_| !is_target || leg.number == HOME_LEG) else {
+            return goal;
+        };
+        let is_known = |place: &Vector3<f64>| {
+            let voxel = map.voxels().index_of(place);
+            voxel.is_some_and(|voxel| keep_out.room_m(&map.voxels().centre_of(voxel)) >= 0.0)
+        };
+        let open = keep_out.nearest_open(&goal, is_known).unwrap_or(goal);
+        if let Some(leg) = self.leg.as_mut().filter(|_| is_target && open != goal) {
+            leg.target = open;
+        }
+        open
     }
 
     /// Goes on with a plan that the ticks before were not enough for. Once in each tick, before anything else is planned.
@@ -444,8 +475,9 @@ impl Guidance {
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles either way.
     pub fn steer(&mut self, now: Duration, motion: &Motion, surroundings: &Surroundings<'_>) -> SetPoint {
-        let wish =
-            self.along_path(now, motion, surroundings.map).unwrap_or_else(|| self.keep_station(motion));
+        let wish = self
+            .along_path(now, motion, surroundings.map)
+            .unwrap_or_else(|| self.keep_station(motion, surroundings.map));
         let unheard = self.local.moving(now, surroundings.map);
         let others: Vec<_> = surroundings.neighbours.iter().copied().chain(unheard).collect();
         let push = match self.planners.without {
@@ -484,9 +516,17 @@ impl Guidance {
         if self.planners.without == Some(Layer::SafetyFilter) {
             return Kept { velocity: request.desired, evades: false };
         }
-        let obstacles: Vec<_> =
+        let mut obstacles: Vec<_> =
             surroundings.obstacles.iter().copied().chain(self.fence_ahead(request.position)).collect();
-        let filtered = filter(&request, others, &obstacles, &self.filter);
+        let solid = obstacles.len();
+        let walls = surroundings.map.keep_out().map(|keep_out| keep_out.walls(&request.position, WALLS_M));
+        obstacles.extend(walls.unwrap_or_default());
+        let mut filtered = filter(&request, others, &obstacles, &self.filter);
+        if obstacles.len() > solid && matches!(filtered.outcome, Outcome::Infeasible { .. }) {
+            // To touch somebody or something is worse than to enter a zone.
+            obstacles.truncate(solid);
+            filtered = filter(&request, others, &obstacles, &self.filter);
+        }
         let clearance_m = self.filter.obstacle_clearance_m;
         let room = || room(request.position, surroundings.map, clearance_m);
         let Some(way) = self.evasion.decide(now, &filtered.outcome, surroundings.rank, room) else {
@@ -511,12 +551,16 @@ impl Guidance {
     }
 
     /// At the place where the vehicle came to a stop, or to where others have pushed it.
-    fn keep_station(&mut self, motion: &Motion) -> Wish {
+    fn keep_station(&mut self, motion: &Motion, map: &ClearanceMap) -> Wish {
         self.local.pause();
         let place = self
             .hover_at
-            .filter(|place| (place - motion.position).norm() < GIVES_WAY_M)
-            .unwrap_or_else(|| self.local.stop(&motion.position, &motion.velocity));
+            .filter(|place| {
+                (place - motion.position).norm() < GIVES_WAY_M || leads_out(&motion.position, place, map)
+            })
+            .unwrap_or_else(|| {
+                open_place(&self.local.stop(&motion.position, &motion.velocity), &motion.position, map)
+            });
         self.hover_at = Some(place);
         let back = apf::limited(place - motion.position, STATION_KEEPING_M_S);
         Wish { velocity: back, height_m: place.z }
@@ -537,11 +581,25 @@ impl Guidance {
     }
 }
 
+/// Where to hover instead of at `place`, if that is closed: the nearest place that is open and to which the way is free.
+fn open_place(place: &Vector3<f64>, from: &Vector3<f64>, map: &ClearanceMap) -> Vector3<f64> {
+    let Some(keep_out) = map.keep_out() else { return *place };
+    let is_reached = |there: &Vector3<f64>| map.is_segment_clear(from, there, 0.0);
+    keep_out.nearest_open(place, is_reached).unwrap_or(*place)
+}
+
+/// Whether one place is closed and another is not.
+fn leads_out(from: &Vector3<f64>, to: &Vector3<f64>, map: &ClearanceMap) -> bool {
+    map.keep_out().is_some_and(|keep_out| keep_out.room_m(from) < 0.0 && keep_out.room_m(to) >= 0.0)
+}
+
 /// Whether a vehicle can leave its height, as far as the map reaches and tells.
 fn room(position: Vector3<f64>, map: &ClearanceMap, clearance_m: f64) -> Room {
     let leads_free = |way: Way| {
         let there = position + Vector3::z() * (way.sign() * EVASION_M);
-        map.voxels().index_of(&there).is_some() && map.is_segment_clear(&position, &there, clearance_m)
+        map.voxels().index_of(&there).is_some()
+            && map.is_segment_clear(&position, &there, clearance_m)
+            && map.is_open(&position, &there)
     };
     Room { up: leads_free(Way::Up), down: leads_free(Way::Down) }
 }

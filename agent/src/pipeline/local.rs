@@ -6,6 +6,7 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_planning::{
     Path,
+    airspace::KeepOut,
     local::{
         apf::{self, ApfConfig},
         braking::{self, BrakingConfig},
@@ -25,6 +26,8 @@ const TICK_S: f64 = 0.02;
 const SENSED_AHEAD_M: f64 = 9.0;
 /// Change of velocity that is asked for in openings, m/s^2: a pitch of 3.5 degrees, which leaves the autopilot something of 5.
 const GENTLE_M_S2: f64 = 0.6;
+/// Openings are looked for among what is within this distance, m.
+const OPENINGS_M: f64 = 8.0;
 /// Openings keep this much more from obstacles than the safety filter does, m, so that it need not act.
 const BESIDE_FILTER_M: f64 = 0.05;
 /// What is this much further aside than openings keep does not stand in the way, m.
@@ -70,11 +73,23 @@ impl Local {
         }
     }
 
-    /// Takes in the obstacle points of a scan of `rays` rays that was taken at `stamp` and `origin`; metres ENU.
-    pub fn look(&mut self, stamp: Duration, origin: &Vector3<f64>, returns: &[Vector3<f64>], rays: usize) {
+    /// Takes in the obstacle points of a scan of `rays` rays that was taken at `stamp` and `origin`; metres ENU. Nor do
+    /// openings lead into what is closed.
+    pub fn look(
+        &mut self,
+        stamp: Duration,
+        origin: &Vector3<f64>,
+        returns: &[Vector3<f64>],
+        rays: usize,
+        closed: Option<&KeepOut>,
+    ) {
         self.moving.look(stamp, returns);
-        if let Some(follower) = &mut self.openings {
+        let Some(follower) = &mut self.openings else { return };
+        let unseen = closed.map(|closed| closed.seen_from(origin, rays, OPENINGS_M)).unwrap_or_default();
+        if unseen.is_empty() {
             follower.look(origin, returns, rays);
+        } else {
+            follower.look(origin, &[returns, &unseen].concat(), rays);
         }
     }
 

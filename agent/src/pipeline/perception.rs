@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::{UnitQuaternion, Vector3};
+use skein_planning::airspace::KeepOut;
 use skein_planning::map::{ClearanceMap, MapError, RayEnd, Sectors, VoxelMapConfig};
 
 use crate::config::Fence;
@@ -106,6 +107,12 @@ impl Perception {
             rolls,
             far_ray: 0,
         })
+    }
+
+    /// The same of a world in which some places are known to be closed.
+    #[must_use]
+    pub fn with_keep_out(self, keep_out: KeepOut) -> Self {
+        Self { map: self.map.with_keep_out(keep_out), ..self }
     }
 
     /// The map.

@@ -179,10 +179,15 @@ impl Bid {
         bid
     }
 
+    /// Whether one is a clone of the other.
+    pub(crate) fn is_the_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
     /// Whether the two bids ask for and block the same events, so that the same questions concern them.
     pub(crate) fn concerns_as(&self, other: &Self) -> bool {
         let (a, b) = (&*self.0, &*other.0);
-        Arc::ptr_eq(&self.0, &other.0)
+        self.is_the_same(other)
             || (a.requests == b.requests
                 && a.waits == b.waits
                 && a.blocks == b.blocks

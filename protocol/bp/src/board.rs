@@ -210,7 +210,8 @@ impl Board {
     pub(crate) fn listeners(&self, event: &Event, places: &mut Vec<Place>) {
         places.clear();
         self.indexes.wakes.candidates(event).iter().for_each(|list| places.extend_from_slice(list));
-        if places.len() > 1 {
+        // One list alone is in order.
+        if !places.is_sorted_by(|a, b| a < b) {
             places.sort_unstable();
             places.dedup();
         }
@@ -280,20 +281,20 @@ impl Indexes {
     }
 
     fn replace(&mut self, place: Place, old: &Bid, new: &Bid) {
-        if !old.concerns_as(new) {
-            let filed = self.left_filed.iter_mut().find(|(of, bid)| *of == place && bid.concerns_as(new));
-            match filed {
-                Some((_, bid)) => *bid = old.clone(),
-                None => {
-                    self.file(place, new);
-                    self.left_filed.push_back((place, old.clone()));
-                    if self.left_filed.len() > BIDS_LEFT_FILED {
-                        self.unfile_left(0);
-                    }
-                }
-            }
-            self.restate_requests(place, !old.requests().is_empty(), !new.requests().is_empty());
+        if old.is_the_same(new) {
+            return;
         }
+        let filed = self.left_filed.iter_mut().find(|(of, bid)| *of == place && bid.concerns_as(new));
+        if let Some((_, bid)) = filed {
+            *bid = old.clone();
+        } else if !old.concerns_as(new) {
+            self.file(place, new);
+            self.left_filed.push_back((place, old.clone()));
+            if self.left_filed.len() > BIDS_LEFT_FILED {
+                self.unfile_left(0);
+            }
+        }
+        self.restate_requests(place, !old.requests().is_empty(), !new.requests().is_empty());
         self.restate_deadline(place, old.given_deadline(), new.given_deadline());
     }
 

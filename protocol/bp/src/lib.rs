@@ -56,6 +56,6 @@ pub use event_set::EventSet;
 pub use explain::Explanation;
 pub use pattern::Pattern;
 pub use program::{PASSED_OVER_LIMIT, Program, ProgramConfig, ProgramError};
-pub use selection::{Origin, Rival, Selection};
+pub use selection::{Names, Origin, Rival, Selection};
 pub use strategy::Strategy;
 pub use value::{Real, Value};

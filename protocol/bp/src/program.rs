@@ -14,7 +14,7 @@ use crate::event::Event;
 use crate::event_set::EventSet;
 use crate::explain::Explanation;
 use crate::index::Place;
-use crate::selection::{Origin, Rival, Selection};
+use crate::selection::{Names, Origin, Rival, Selection};
 use crate::strategy::Strategy;
 use crate::tie::TieBreak;
 
@@ -350,8 +350,9 @@ impl Program {
     fn deliver(&mut self, event: Event, origin: Origin, tied_with: usize, now: Duration) -> Selection {
         let mut resuming = std::mem::take(&mut self.listeners);
         self.board.listeners(&event, &mut resuming);
-        let rivals = if origin == Origin::Internal { self.rivals(&event) } else { Vec::new() };
-        let mut requested_by = Vec::with_capacity(resuming.len());
+        let has_rivals = origin == Origin::Internal && self.config.rivals > 0;
+        let rivals = if has_rivals { self.rivals(&event) } else { Vec::new() };
+        let mut requested_by = Names::new();
         let (mut ending, mut priority) = (Vec::new(), None);
         resuming.retain(|place| {
             let Some(Entry { name, bid, .. }) = self.board.get(*place) else { return false };
@@ -367,13 +368,15 @@ impl Program {
             !interrupted && (requested || bid.waits().contains(&event))
         });
 
-        let mut interrupted = Vec::with_capacity(ending.len());
+        let mut interrupted = Names::new();
         for place in ending {
             interrupted.extend(self.interrupt(place, &event, now));
         }
-        let mut resumed = Vec::with_capacity(resuming.len());
-        for place in resuming.drain(..) {
-            resumed.extend(self.resume(place, &event, now));
+        let mut resumed = Names::with_capacity(resuming.len());
+        for place in &resuming {
+            if let Some(name) = self.resume(*place, &event, now) {
+                resumed.push(name);
+            }
         }
         self.listeners = resuming;
         self.start_added(now);
@@ -418,8 +421,14 @@ impl Program {
         Some(name)
     }
 
-    /// Runs new b-threads to their first synchronisation point, and those that they spawn.
+    /// Runs new b-threads, if there are any, to their first synchronisation point, and those that they spawn.
     fn start_added(&mut self, now: Duration) {
+        if !(self.unstarted.is_empty() && self.spawned.is_empty()) {
+            self.start_all(now);
+        }
+    }
+
+    fn start_all(&mut self, now: Duration) {
         let mut spawners = 0;
         while let Some(place) = self.next_unstarted() {
             let Some(entry) = self.board.get_mut(place) else { continue };
@@ -474,7 +483,9 @@ impl Program {
                 self.end(place);
             }
         }
-        self.absorb(cx, Some(name));
+        if cx.effects.is_some() {
+            self.absorb(cx, Some(name));
+        }
     }
 
     fn restate(&mut self, place: Place, bid: Bid) {

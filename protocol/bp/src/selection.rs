@@ -4,8 +4,12 @@ use std::fmt;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
 
 use crate::event::Event;
+
+/// Names of b-threads. Most events move one or two, which need no allocation.
+pub type Names = SmallVec<[Arc<str>; 2]>;
 
 /// Where a selected event came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -37,11 +41,11 @@ pub struct Selection {
     /// Where it came from.
     pub origin: Origin,
     /// B-threads and proxies that requested it. The proxies among them are served: their bids are now empty.
-    pub requested_by: Vec<Arc<str>>,
+    pub requested_by: Names,
     /// B-threads that resumed.
-    pub resumed: Vec<Arc<str>>,
+    pub resumed: Names,
     /// B-threads that it ended.
-    pub interrupted: Vec<Arc<str>>,
+    pub interrupted: Names,
     /// How many other events could have been selected in its place.
     pub tied_with: usize,
     /// The highest priority at which it was requested.

@@ -21,6 +21,9 @@ impl TieBreak {
 
     /// The position of the winner among `tied` distinct events.
     pub(crate) fn choose(&mut self, tied: &[Event]) -> usize {
+        if tied.len() < 2 && self.passed_over.is_empty() {
+            return 0;
+        }
         let winner = match tied.len() {
             0 | 1 => 0,
             count => self.overdue(tied).unwrap_or_else(|| self.draw(count)),

@@ -73,7 +73,7 @@ fn what_has_happened_elsewhere_comes_before_a_deadline() {
     program.add("pinger", Pinger::default());
     program.superstep(ms(0)).unwrap();
     program.occurred("pong");
-    assert_eq!(program.step(ms(150)).unwrap().unwrap().resumed, ["pinger".into()]);
+    assert_eq!(program.step(ms(150)).unwrap().unwrap().resumed[..], ["pinger".into()]);
     assert!(!program.has_bthreads());
 }
 

@@ -18,8 +18,8 @@ fn an_interrupted_bthread_ends_even_if_it_waits_for_the_event_too() {
     ]);
     let selections = program.superstep(START).unwrap();
     assert_eq!(selections.len(), 1);
-    assert_eq!(selections[0].interrupted, ["victim".into()]);
-    assert_eq!(selections[0].resumed, ["asks".into()]);
+    assert_eq!(selections[0].interrupted[..], ["victim".into()]);
+    assert_eq!(selections[0].resumed[..], ["asks".into()]);
     assert!(!program.has_bthreads());
 }
 

@@ -37,9 +37,9 @@ fn an_occurrence_happens_first_and_cannot_be_blocked() {
     assert_eq!(selections.len(), 1);
     let first = &selections[0];
     assert_eq!((first.origin, first.event.name()), (Origin::Occurred, "uav/2/go"));
-    assert_eq!(first.requested_by, ["remote".into()]);
-    assert_eq!(first.resumed, ["remote".into(), "waits".into()]);
-    assert_eq!(first.interrupted, ["victim".into()]);
+    assert_eq!(first.requested_by[..], ["remote".into()]);
+    assert_eq!(first.resumed[..], ["remote".into(), "waits".into()]);
+    assert_eq!(first.interrupted[..], ["victim".into()]);
 }
 
 #[test]
@@ -72,8 +72,8 @@ fn a_proxy_requests_until_it_is_served() {
     program.put_proxy("uav/2#t", &Bid::new().request("a").block("b"));
     let selections = program.superstep(START).unwrap();
     assert_eq!(selections.len(), 1);
-    assert_eq!(selections[0].requested_by, ["uav/2#t".into()]);
-    assert_eq!(selections[0].resumed, ["waits".into()], "a proxy does not run here");
+    assert_eq!(selections[0].requested_by[..], ["uav/2#t".into()]);
+    assert_eq!(selections[0].resumed[..], ["waits".into()], "a proxy does not run here");
     assert_eq!(program.proxies().collect::<Vec<_>>(), [("uav/2#t", &Bid::new())]);
     program.put_proxy("uav/2#t", &Bid::new().request("a"));
     assert_eq!(superstep(&mut program), ["a"]);

@@ -218,7 +218,7 @@ fn spawning_without_end_over_time_frees_what_has_ended() {
     program
         .add("parent", Script::new(&[Op::forever([child, Op::Sync(Bid::new().wait_for("child"))])]).unwrap());
     for step in 0..5000 {
-        assert_eq!(program.step(START).unwrap().unwrap().requested_by, ["child".into()], "step {step}");
+        assert_eq!(program.step(START).unwrap().unwrap().requested_by[..], ["child".into()], "step {step}");
     }
     assert_eq!(
         program.bids().map(|(name, _, sync)| (name, sync)).collect::<Vec<_>>(),

@@ -30,8 +30,8 @@ fn a_requested_event_resumes_all_who_requested_or_wait_for_it() {
     ]);
     let selections = program.superstep(START).unwrap();
     assert_eq!(names(&selections), ["go"]);
-    assert_eq!(selections[0].requested_by, ["asks".into(), "asks too".into()]);
-    assert_eq!(selections[0].resumed, ["asks".into(), "asks too".into(), "waits".into()]);
+    assert_eq!(selections[0].requested_by[..], ["asks".into(), "asks too".into()]);
+    assert_eq!(selections[0].resumed[..], ["asks".into(), "asks too".into(), "waits".into()]);
     assert_eq!(program.bids().map(|(name, ..)| name).collect::<Vec<_>>(), ["elsewhere"]);
 }
 
@@ -231,7 +231,7 @@ fn choose_takes_what_is_selectable_and_nothing_else() {
     let mut program = plain([("asks", json!([{"sync": {"request": ["a", "b"], "block": "b"}}]))]);
     let error = program.choose(&"b".into(), START).unwrap_err().to_string();
     assert_eq!(error, "`b` is not selectable now; selectable are [a]");
-    assert_eq!(program.choose(&"a".into(), START).unwrap().resumed, ["asks".into()]);
+    assert_eq!(program.choose(&"a".into(), START).unwrap().resumed[..], ["asks".into()]);
 }
 
 #[test]

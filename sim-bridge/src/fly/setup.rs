@@ -89,6 +89,7 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
                 .min(bounds.max.z - 1.0),
             lidar: true,
             fence,
+            airspace: scenario.airspace.clone(),
             envelope: Envelope {
                 cruise_m_s: plan.pace * scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
                 climb_m_s: plan.model.max_climb_m_s.min(1.5),

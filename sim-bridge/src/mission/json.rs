@@ -116,6 +116,14 @@ impl<'a> Node<'a> {
         self.value.as_u64().ok_or_else(|| self.mismatch("a whole number"))
     }
 
+    /// True or false.
+    ///
+    /// # Errors
+    /// It is something else.
+    pub fn truth(&self) -> Result<bool, MissionError> {
+        self.value.as_bool().ok_or_else(|| self.mismatch("true or false"))
+    }
+
     /// A string.
     ///
     /// # Errors

@@ -91,7 +91,7 @@ pub fn read(root: &Node<'_>) -> Result<MissionSet, MissionError> {
     let obstacles = root.optional("obstacles").filter(|o| !o.is_empty());
     let warnings =
         obstacles.iter().map(|o| o.warning("moving obstacles are not read; they are left out")).collect();
-    Ok(MissionSet { missions, warnings, datum: None })
+    Ok(MissionSet { missions, warnings, ..MissionSet::default() })
 }
 
 fn agent(agent: &Node<'_>) -> Result<Mission, MissionError> {

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use skein_mav::Datum;
+use skein_planning::airspace::Airspace;
 
 pub use apply::apply_missions;
 pub use error::{MissionError, Warning};
@@ -61,6 +62,8 @@ pub struct MissionSet {
     pub missions: Vec<Mission>,
     /// What was read over.
     pub warnings: Vec<Warning>,
+    /// No-fly zones of the files' geofences.
+    pub airspace: Airspace,
     /// Where the world's origin is on the earth, where a file spoke of latitudes.
     pub datum: Option<Datum>,
 }
@@ -96,6 +99,7 @@ pub fn read_files(paths: &[PathBuf], datum: Option<Datum>) -> Result<MissionSet,
         let set = MissionSet::read(&read_text(path)?, &path.display().to_string(), all.datum.or(datum))?;
         all.missions.extend(set.missions);
         all.warnings.extend(set.warnings);
+        all.airspace.include(set.airspace);
         all.datum = all.datum.or(set.datum);
     }
     Ok(all)

@@ -1,7 +1,8 @@
 //! QGroundControl's `.plan`: the MAVLink mission items that move a multirotor.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use skein_mav::{Datum, Geodetic};
+use skein_planning::airspace::{Airspace, KeepOut, NoFlyPrism, NoFlyZone};
 
 use super::json::Node;
 use super::{Ends, Mission, MissionError, MissionSet, Warning, Waypoint};
@@ -31,17 +32,29 @@ mod command {
 pub fn read(root: &Node<'_>, datum: Option<Datum>) -> Result<MissionSet, MissionError> {
     let mission = root.member("mission")?;
     let mut reader = Reader::new(&mission.member("plannedHomePosition")?, datum)?;
+    if let Some(fence) = root.optional("geoFence") {
+        reader.geofence(&fence)?;
+    }
     let items = mission.member("items")?;
     for item in items.elements()? {
+        let before = reader.mission.waypoints.len();
         reader.item(&item)?;
+        reader.check_zones(&item, before)?;
     }
     if reader.mission.waypoints.is_empty() {
         return Err(items.error("at least one waypoint (command 16)", "none"));
     }
-    for part in ["geoFence", "rallyPoints"] {
-        reader.warn_unless_empty(root, part)?;
+    if let Some(points) = root.optional("rallyPoints").and_then(|rally| rally.optional("points"))
+        && !points.is_empty()
+    {
+        reader.warn(&points, "is not read");
     }
-    Ok(MissionSet { missions: vec![reader.mission], warnings: reader.warnings, datum: Some(reader.datum) })
+    Ok(MissionSet {
+        missions: vec![reader.mission],
+        warnings: reader.warnings,
+        airspace: reader.airspace,
+        datum: Some(reader.datum),
+    })
 }
 
 struct Reader {
@@ -51,6 +64,8 @@ struct Reader {
     speed_m_s: Option<f64>,
     /// Whether a landing or a return has been read: nothing flies after it.
     ended: bool,
+    /// The zones of the geofence.
+    airspace: Airspace,
     warnings: Vec<Warning>,
 }
 
@@ -73,7 +88,60 @@ impl Reader {
             model: None,
             exact: false,
         };
-        Ok(Self { datum, home, mission, speed_m_s: None, ended: false, warnings: Vec::new() })
+        let (airspace, warnings) = (Airspace::default(), Vec::new());
+        Ok(Self { datum, home, mission, speed_m_s: None, ended: false, airspace, warnings })
+    }
+
+    /// The circles and polygons that exclude; they have no heights. Those that include are not read: the scenario's bounds
+    /// are the fence.
+    fn geofence(&mut self, fence: &Node<'_>) -> Result<(), MissionError> {
+        let (floor_m, ceiling_m) = (f64::NEG_INFINITY, f64::INFINITY);
+        for list in ["circles", "polygons"] {
+            let Some(list) = fence.optional(list) else { continue };
+            for zone in list.elements()? {
+                if zone.member("inclusion")?.truth()? {
+                    self.warn(&zone, "a zone to stay inside of is not read");
+                } else if let Some(circle) = zone.optional("circle") {
+                    let centre = self.corner(&circle.member("center")?)?;
+                    let radius = circle.member("radius")?;
+                    let radius_m = radius.number_in(f64::MIN_POSITIVE, 1e6, "metres")?;
+                    self.airspace.no_fly.push(NoFlyZone { centre, radius_m, floor_m, ceiling_m });
+                } else {
+                    let polygon = zone.member("polygon")?;
+                    let corners = polygon.elements()?;
+                    if corners.len() < 3 {
+                        return Err(polygon.mismatch("three corners or more"));
+                    }
+                    let corners =
+                        corners.iter().map(|corner| self.corner(corner)).collect::<Result<_, _>>()?;
+                    self.airspace.prisms.push(NoFlyPrism { corners, floor_m, ceiling_m });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Where a latitude and a longitude are.
+    fn corner(&self, node: &Node<'_>) -> Result<Vector2<f64>, MissionError> {
+        let [latitude, longitude] = node.numbers::<2>()?;
+        if latitude.abs() > 90.0 || longitude.abs() > 180.0 {
+            return Err(node.mismatch("[latitude, longitude] within 90 and 180 degrees"));
+        }
+        let place = Datum::from_degrees(latitude, longitude, self.home.height_m).place();
+        Ok(self.datum.to_enu(&place).xy())
+    }
+
+    /// Refuses an item that leads into a zone; `before` is how many waypoints there were before it.
+    fn check_zones(&self, item: &Node<'_>, before: usize) -> Result<(), MissionError> {
+        let zones = KeepOut::new(self.airspace.clone(), 0.0, 0.0);
+        let added = self.mission.waypoints.get(before..).unwrap_or_default();
+        match added.iter().find(|waypoint| zones.room_m(&waypoint.position) < 0.0) {
+            None => Ok(()),
+            Some(Waypoint { position: at, .. }) => Err(item.error(
+                "a place outside the zones that `geoFence` excludes",
+                format!("one inside, {:.1} m east and {:.1} m north of the origin", at.x, at.y),
+            )),
+        }
     }
 
     fn item(&mut self, item: &Node<'_>) -> Result<(), MissionError> {
@@ -222,16 +290,6 @@ impl Reader {
 
     fn warn(&mut self, node: &Node<'_>, message: impl std::fmt::Display) {
         self.warnings.push(node.warning(message));
-    }
-
-    fn warn_unless_empty(&mut self, root: &Node<'_>, part: &'static str) -> Result<(), MissionError> {
-        let Some(part) = root.optional(part) else { return Ok(()) };
-        for list in ["circles", "polygons", "points"] {
-            if let Some(list) = part.optional(list).filter(|list| !list.is_empty()) {
-                self.warn(&list, "is not read");
-            }
-        }
-        Ok(())
     }
 }
 

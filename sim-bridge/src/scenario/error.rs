@@ -135,6 +135,16 @@ pub enum ScenarioError {
         /// Where: ENU, metres.
         position: Vector3<f64>,
     },
+    /// A goal or waypoint where nobody may fly.
+    #[error("vehicle {vehicle}: {what} {} is in a no-fly zone, in a threat or in terrain: no path leads there", place(.position))]
+    Closed {
+        /// Number of the vehicle, from 1.
+        vehicle: usize,
+        /// `goal` or `waypoint 2`.
+        what: String,
+        /// Where: ENU, metres.
+        position: Vector3<f64>,
+    },
     /// Two vehicles that would stand in one another.
     #[error(
         "{what}s of vehicles {first} and {second} are {distance_m:.2} m apart: expected at least {least_m:.2} m"

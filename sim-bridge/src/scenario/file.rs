@@ -7,8 +7,9 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
-use skein_agent::LocalPlanner;
+use skein_agent::{AirspaceTable, LocalPlanner};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
+use skein_planning::airspace::Airspace;
 use skein_world::{Aabb, Obstacle, Scene, Shape, VehicleModel, WindConfig};
 
 use super::antipodal::Antipodal;
@@ -64,6 +65,8 @@ struct FileTable {
     coverage: Option<Coverage>,
     formation: Option<Formation>,
     targets: Option<Targets>,
+    #[serde(default)]
+    airspace: AirspaceTable,
     bounds: Option<BoundsTable>,
     wind: Option<WindTable>,
     #[serde(default)]
@@ -228,6 +231,7 @@ impl ScenarioFile {
         let (scene, notes) = self.scene(&name, layout, world)?;
         let orders = self.orders(count)?;
         let scripts = self.scripts(count)?;
+        let airspace = self.airspace()?;
         let fixed_bounds = self.fixed_bounds();
         let (cruise_speed_m_s, takeoff_height_m) = (self.cruise_speed_m_s(), self.takeoff_height_m());
         let table = self.table;
@@ -236,6 +240,7 @@ impl ScenarioFile {
             about: table.about.unwrap_or_default(),
             seed,
             scene,
+            airspace,
             fixed_bounds,
             vehicles: plans,
             muster: table.formation.is_some() || table.targets.is_some(),
@@ -467,6 +472,17 @@ impl ScenarioFile {
             Some(bounds) => Ok((scene.with_bounds(Aabb { min: bounds.min_m, max: bounds.max_m }), notes)),
             None => Ok((scene, notes)),
         }
+    }
+
+    /// What is known of the airspace: the table's, and what targets are reached through.
+    fn airspace(&self) -> Result<Airspace, ScenarioError> {
+        let checked = self.table.airspace.check();
+        let mut airspace = checked
+            .map_err(|error| self.contradiction(format!("airspace.{}", error.field), error.problem))?;
+        if let Some(targets) = &self.table.targets {
+            airspace.include(targets.airspace());
+        }
+        Ok(airspace)
     }
 
     /// Stated bounds are part of the scenario, and so are those of a generated world; but an empty field has no edge.

@@ -25,6 +25,7 @@ use serde::Deserialize;
 use skein_agent::LocalPlanner;
 use skein_bp::script::Assignment;
 use skein_mav::Datum;
+use skein_planning::airspace::{Airspace, KeepOut};
 use skein_world::{Aabb, Scene, VehicleModel, WindConfig};
 
 pub use error::ScenarioError;
@@ -66,6 +67,8 @@ pub struct Scenario {
     pub seed: u64,
     /// Obstacles and bounds.
     pub scene: Scene,
+    /// Terrain, threats and no-fly zones that every vehicle knows; its box counts for nothing.
+    pub airspace: Airspace,
     /// Whether the bounds are part of the scenario; otherwise they grow to hold a mission.
     pub fixed_bounds: bool,
     /// The vehicles; vehicle `i` is `uav/{i + 1}`.
@@ -271,6 +274,7 @@ impl Scenario {
         if let Some(datum) = set.datum {
             self.scene = self.scene.clone().with_datum(datum);
         }
+        self.airspace.include(set.airspace);
         if set.missions.is_empty() { Ok(()) } else { mission::apply_missions(self, set.missions) }
     }
 
@@ -324,7 +328,7 @@ impl Scenario {
     ///
     /// # Errors
     /// No vehicles or too many; a start inside an obstacle; a start or waypoint outside of the bounds or under the
-    /// ground; starts or goals so close that vehicles would touch.
+    /// ground; a waypoint in a no-fly zone, in a threat or in known terrain; starts or goals so close that vehicles would touch.
     pub fn validate(&self) -> Result<(), ScenarioError> {
         check_count(&self.name, self.vehicles.len())?;
         for (i, vehicle) in self.vehicles.iter().enumerate() {
@@ -360,6 +364,9 @@ impl Scenario {
             self.check_bounds(number, &what, waypoint)?;
             if waypoint.z <= 0.0 {
                 return Err(ScenarioError::BelowGround { vehicle: number, what, position: waypoint });
+            }
+            if KeepOut::new(self.airspace.clone(), 0.0, 0.0).room_m(&waypoint) < 0.0 {
+                return Err(ScenarioError::Closed { vehicle: number, what, position: waypoint });
             }
         }
         Ok(())

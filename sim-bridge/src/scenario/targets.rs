@@ -116,7 +116,7 @@ impl Targets {
         cruise_m_s: f64,
         seed: u64,
     ) -> Result<Vec<PacedRoute>, TargetsError> {
-        let airspace = self.airspace(bounds);
+        let airspace = self.within(bounds);
         let ends = self.ends(vehicles, height_m, &airspace)?;
         let cost = cost(cruise_m_s);
         let plans = plan_in_turn(&airspace, cost, &ends, WAYPOINTS, |vehicle, problem| {
@@ -133,8 +133,18 @@ impl Targets {
         Ok(paced.map(|(plan, slowed)| PacedRoute { route: plan.route, pace: 1.0 / slowed }).collect())
     }
 
-    /// What routes keep clear of, grown by the margin.
-    fn airspace(&self, bounds: &Aabb) -> Airspace {
+    /// What is known of the airspace, without a box.
+    pub fn airspace(&self) -> Airspace {
+        self.grown(0.0)
+    }
+
+    /// What routes keep clear of, grown by the margin, in the bounds without it.
+    fn within(&self, bounds: &Aabb) -> Airspace {
+        let inset = Vector3::repeat(MARGIN_M);
+        Airspace { lower: bounds.min + inset, upper: bounds.max - inset, ..self.grown(MARGIN_M) }
+    }
+
+    fn grown(&self, margin_m: f64) -> Airspace {
         let mountain = |table: &MountainTable| Mountain {
             centre: table.centre_m.xy(),
             height_m: table.height_m,
@@ -142,21 +152,19 @@ impl Targets {
         };
         let threat = |table: &ThreatTable| ThreatZone {
             centre: table.centre_m.xy(),
-            radius_m: table.radius_m + MARGIN_M,
+            radius_m: table.radius_m + margin_m,
         };
         let no_fly = |table: &NoFlyTable| NoFlyZone {
             centre: table.centre_m.xy(),
-            radius_m: table.radius_m + MARGIN_M,
-            floor_m: table.floor_m - MARGIN_M,
-            ceiling_m: table.ceiling_m + MARGIN_M,
+            radius_m: table.radius_m + margin_m,
+            floor_m: table.floor_m - margin_m,
+            ceiling_m: table.ceiling_m + margin_m,
         };
-        let inset = Vector3::repeat(MARGIN_M);
         Airspace {
-            lower: bounds.min + inset,
-            upper: bounds.max - inset,
             mountains: self.mountain.iter().map(mountain).collect(),
             threats: self.threat.iter().map(threat).collect(),
             no_fly: self.no_fly.iter().map(no_fly).collect(),
+            ..Airspace::default()
         }
     }
 

@@ -102,6 +102,14 @@ pub enum PlanError {
         /// Clearance required, metres.
         required_m: f64,
     },
+    /// The goal is in a place that is closed.
+    #[error("goal ({:.2}, {:.2}, {:.2}) is in or next to a no-fly zone or a threat, or too low above the terrain, by {inside_m:.2} m", .goal.x, .goal.y, .goal.z)]
+    GoalClosed {
+        /// The goal.
+        goal: Vector3<f64>,
+        /// How deep it is inside, metres.
+        inside_m: f64,
+    },
     /// No path exists in what is known.
     #[error("no path: everything reachable from the start was searched ({expanded} voxels)")]
     Unreachable {
@@ -120,6 +128,8 @@ pub enum PlanError {
 
 /// Room in a voxel that is occupied or outside.
 const BLOCKED: i32 = i32::MIN;
+/// What a metre costs more on the way out of a place that is closed: the way out is about the shortest.
+const CLOSED_WEIGHT: f64 = 20.0;
 /// How finely depth in a disc is told apart.
 const DISC_STEPS: f64 = 64.0;
 /// Beginning to track a layer takes as long as so many expansions in one layer.
@@ -139,6 +149,9 @@ const SPACE_EXPANSIONS: usize = 4;
 ///
 /// A diagonal step needs every voxel of the box it sweeps to be passable: no corners are cut. Unknown space
 /// is passable. A start closer to obstacles than required may be left by steps of growing clearance.
+///
+/// What is closed ([`ClearanceMap::keep_out`]) is not entered. A start inside may be left, no deeper than it is, by the way
+/// out that is about the shortest, for a metre inside costs 20 metres more.
 ///
 /// The layers searched are tracked in `map` from then on.
 ///
@@ -246,7 +259,7 @@ impl Astar {
             }
         }
         let [nx, ny, _] = map.voxels().counts();
-        let rooms = Rooms {
+        let mut rooms = Rooms {
             map,
             request,
             config,
@@ -254,7 +267,10 @@ impl Astar {
             low,
             size: [nx, ny, layers],
             start,
+            planar,
+            start_depth_m: 0.0,
         };
+        rooms.start_depth_m = -rooms.open_m(start).min(0.0);
         if !self.is_begun {
             self.is_begun = true;
             if let Err(error) = rooms.check_goal(goal) {
@@ -294,6 +310,10 @@ struct Rooms<'a> {
     low: usize,
     size: [usize; 3],
     start: VoxelIndex,
+    /// Whether height changes evenly along the path.
+    planar: bool,
+    /// How deep the start is in what is closed, metres; 0 outside.
+    start_depth_m: f64,
 }
 
 impl Lattice for Rooms<'_> {
@@ -308,12 +328,18 @@ impl Lattice for Rooms<'_> {
     fn steps_from(&self, cell: VoxelIndex, mut visit: impl FnMut(usize, f64)) {
         let here = self.voxel(cell);
         let room = self.room(here);
+        // Next to nothing that is closed no neighbour is.
+        let open_m = self.open_m(here);
+        let is_near = open_m < SQRT_3 * self.resolution_m();
         let (mut rooms, mut passable) = ([BLOCKED; MOVES.len()], 0);
         for (there_room, step) in rooms.iter_mut().zip(&MOVES) {
             let there = moved(cell, step.by);
             if self.contains(there) {
-                *there_room = self.room(self.voxel(there));
-                passable |= if self.may_enter(here, room, *there_room) { step.end } else { 0 };
+                let there = self.voxel(there);
+                *there_room = self.room(there);
+                let is_allowed = !is_near || self.may_intrude(open_m, self.open_m(there));
+                let is_passable = is_allowed && self.may_enter(here, room, *there_room);
+                passable |= if is_passable { step.end } else { 0 };
             }
         }
         let cost = self.cost(here, room);
@@ -341,8 +367,15 @@ impl Lattice for Rooms<'_> {
 
 impl Rooms<'_> {
     fn check_goal(&self, goal: VoxelIndex) -> Result<(), PlanError> {
+        if self.start == goal {
+            return Ok(());
+        }
+        let open_m = self.open_m(goal);
+        if open_m < 0.0 {
+            return Err(PlanError::GoalClosed { goal: self.request.goal, inside_m: -open_m });
+        }
         let room = self.room(goal);
-        if room >= self.required || self.start == goal {
+        if room >= self.required {
             return Ok(());
         }
         Err(PlanError::GoalBlocked {
@@ -381,9 +414,26 @@ impl Rooms<'_> {
         there_room >= self.required || (here_room < self.required && better)
     }
 
+    /// Distance to what is closed, metres; negative inside. Where height changes along the path, that at the worse of the
+    /// heights at its ends: what is closed with its margin is taller than the ends are apart.
+    fn open_m(&self, voxel: VoxelIndex) -> f64 {
+        let Some(keep_out) = self.map.keep_out() else { return f64::INFINITY };
+        let centre = self.map.voxels().centre_of(voxel);
+        let at = |z: f64| keep_out.room_m(&Vector3::new(centre.x, centre.y, z));
+        if self.planar { at(self.request.start.z).min(at(self.request.goal.z)) } else { at(centre.z) }
+    }
+
+    /// What is closed is entered from inside alone, and no deeper than the start is.
+    fn may_intrude(&self, here_m: f64, there_m: f64) -> bool {
+        there_m >= 0.0 || (here_m < 0.0 && -there_m <= self.start_depth_m)
+    }
+
     /// Cost per metre.
     fn cost(&self, voxel: VoxelIndex, room: i32) -> f64 {
         let mut cost = 1.0;
+        if self.start_depth_m > 0.0 && self.open_m(voxel) < 0.0 {
+            cost += CLOSED_WEIGHT;
+        }
         let clearance_m = self.map.clearance_of(room.max(0));
         let span_m = self.config.comfort_m - self.config.clearance_m;
         if span_m > 0.0 && clearance_m < self.config.comfort_m {

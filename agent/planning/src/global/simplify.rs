@@ -29,7 +29,8 @@ pub fn elide_collinear(path: &Path) -> Path {
 /// Straightens a path: from each waypoint kept, goes straight to the furthest one in sight.
 ///
 /// In sight means that all voxels of the straight line have `clearance_m`, or as much as the part of the path
-/// that it replaces has, if that is less: the way out of a tight place is not made tighter.
+/// that it replaces has, if that is less: the way out of a tight place is not made tighter. Nor does a straight line lead
+/// further through places that are closed ([`ClearanceMap::keep_out`]) than what it replaces.
 #[must_use]
 pub fn simplify(map: &ClearanceMap, path: &Path, clearance_m: f64) -> Path {
     simplify_around(map, path, clearance_m, &[])
@@ -47,15 +48,20 @@ pub fn simplify_around(map: &ClearanceMap, path: &Path, clearance_m: f64, discs:
         let from = points[anchor];
         let mut reached = anchor + 1;
         let mut floor = wanted.min(map.segment_clearance(&from, &points[reached]));
+        let mut inside_m = map.inside_m(&from, &points[reached]);
         let mut depths: Vec<f64> = discs.iter().map(|disc| depth_m(disc, &from, &points[reached])).collect();
         for candidate in anchor + 2..points.len() {
             let (before, to) = (&points[candidate - 1], &points[candidate]);
             floor = floor.min(map.segment_clearance(before, to));
+            inside_m += map.inside_m(before, to);
             for (depth, disc) in depths.iter_mut().zip(discs) {
                 *depth = depth.max(depth_m(disc, before, to));
             }
             let is_no_deeper = |(depth, disc): (&f64, &Disc)| depth_m(disc, &from, to) <= *depth;
-            if depths.iter().zip(discs).all(is_no_deeper) && map.segment_clearance(&from, to) >= floor {
+            if depths.iter().zip(discs).all(is_no_deeper)
+                && map.segment_clearance(&from, to) >= floor
+                && map.inside_m(&from, to) <= inside_m
+            {
                 reached = candidate;
             }
         }

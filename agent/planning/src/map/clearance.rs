@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::voxel::{Change, MapError, RayEnd, VoxelIndex, VoxelMap, VoxelMapConfig};
 use super::{Sectors, traverse};
+use crate::airspace::KeepOut;
 use crate::path::Path;
 
 /// No obstacle within the truncation distance.
@@ -30,6 +31,8 @@ pub struct Nearest {
 ///
 /// Layers that are *tracked* hold a distance field (the offset of each voxel to the nearest occupied one)
 /// which changes repair locally; the others are searched when asked. The answers are the same.
+///
+/// What must not be flown in though nothing stands there is no obstacle: see [`ClearanceMap::keep_out`].
 #[derive(Clone, Debug)]
 pub struct ClearanceMap {
     voxels: VoxelMap,
@@ -38,6 +41,7 @@ pub struct ClearanceMap {
     /// Offsets within the truncation distance.
     brush: Vec<[i8; 2]>,
     layers: Vec<Option<Layer>>,
+    keep_out: Option<KeepOut>,
 }
 
 /// Of each voxel of a layer, the offset to the nearest occupied one, or [`FAR`].
@@ -73,7 +77,30 @@ impl ClearanceMap {
             }
         }
         let layers = vec![None; voxels.counts()[2]];
-        Ok(ClearanceMap { voxels, reach, brush, layers })
+        Ok(ClearanceMap { voxels, reach, brush, layers, keep_out: None })
+    }
+
+    /// The same map of a world in which some places are known to be closed: searches keep out of them.
+    #[must_use]
+    pub fn with_keep_out(self, keep_out: KeepOut) -> ClearanceMap {
+        ClearanceMap { keep_out: Some(keep_out), ..self }
+    }
+
+    /// The places that are closed, if any are known.
+    #[must_use]
+    pub fn keep_out(&self) -> Option<&KeepOut> {
+        self.keep_out.as_ref()
+    }
+
+    /// Whether the straight way between two points is open all along.
+    #[must_use]
+    pub fn is_open(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
+        self.inside_m(from, to) == 0.0
+    }
+
+    /// How much of the straight way between two points is closed, metres.
+    pub(crate) fn inside_m(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
+        self.keep_out.as_ref().map_or(0.0, |keep_out| keep_out.inside_m(from, to))
     }
 
     /// The evidence.

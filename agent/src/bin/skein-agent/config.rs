@@ -7,10 +7,13 @@ use std::time::Duration;
 use anyhow::{Context as _, ensure};
 use serde::Deserialize;
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AgentConfig, Controller, Envelope, Fence, LocalPlanner, PassageRule, Planners};
+use skein_agent::{
+    AgentConfig, AirspaceTable, Controller, Envelope, Fence, LocalPlanner, PassageRule, Planners,
+};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
+use skein_planning::airspace::{Airspace, KeepOut};
 use skein_wire::{NodeName, standard_authority};
 use skein_zenoh::NetworkSettings;
 
@@ -54,6 +57,8 @@ struct File {
     #[serde(default)]
     script: Vec<ScriptTable>,
     fence: FenceTable,
+    #[serde(default)]
+    airspace: AirspaceTable,
     #[serde(default)]
     envelope: EnvelopeTable,
     #[serde(default)]
@@ -203,6 +208,8 @@ impl File {
         let lidar = self.lidar.map(|lidar| lidar.check(folder)).transpose()?;
         let fence = Fence { min: self.fence.min, max: self.fence.max };
         self.mission.check(&fence)?;
+        let airspace = self.airspace.check()?;
+        self.mission.check_zones(&airspace)?;
         let agent = AgentConfig {
             fleet: self.fleet,
             node: self.node,
@@ -217,6 +224,7 @@ impl File {
             return_altitude_m: self.mission.return_altitude_m,
             lidar: lidar.is_some(),
             fence,
+            airspace,
             envelope: self.envelope.check()?,
             planners: Planners { local: self.planners.local, without: None },
             link_loss: match self.mission.without_ground {
@@ -286,6 +294,18 @@ impl Mission {
             ensure!(
                 inside([x, y, height_m]),
                 "`mission.{field}` leads to {height_m} m above the origin, outside the fence"
+            );
+        }
+        Ok(())
+    }
+
+    /// No path leads into a zone. Home may be in one: the vehicle leaves, and lands beside it in the end.
+    fn check_zones(&self, airspace: &Airspace) -> anyhow::Result<()> {
+        let zones = KeepOut::new(airspace.clone(), 0.0, 0.0);
+        for (number, point) in (1..).zip(&self.waypoints) {
+            ensure!(
+                zones.room_m(&(*point).into()) >= 0.0,
+                "`mission.waypoints`: number {number}, {point:?}, is in a zone or in the ground of `airspace`"
             );
         }
         Ok(())
@@ -363,6 +383,12 @@ mod tests {
             ("[15.0, 20.0, 3.0]", "[15.0, 20.0, 300.0]", "number 2"),
             ("[15.0, 20.0, 3.0]", "[nan, 20.0, 3.0]", "number 2"),
             ("max = [30.0", "max = [-30.0", "`fence`"),
+            ("[envelope]", "[[airspace.no_fly]]\ncentre_m = [1.0, 2.0]\n[envelope]", "`airspace.no_fly[0]`"),
+            (
+                "[envelope]",
+                "[[airspace.no_fly]]\ncorners_m = [[9.0, 9.0], [20.0, 9.0], [20.0, 25.0]]\n[envelope]",
+                "`mission.waypoints`: number 2",
+            ),
             ("#return_altitude_m = 4.0", "return_altitude_m = 40.0", "`mission.return_altitude_m`"),
             ("47.397742", "147.0", "`datum.latitude_deg`"),
             ("#cruise_m_s = 3.0", "cruise_m_s = -1.0", "`envelope.cruise_m_s`"),

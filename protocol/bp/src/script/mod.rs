@@ -212,6 +212,9 @@ impl Script {
     /// The outermost block around the present sync that `event` ends.
     fn ended_by(&self, event: &Event, now: Duration) -> Option<usize> {
         let Some(Step::Sync { scopes, .. }) = self.code.steps.get(self.at) else { return None };
+        if scopes.is_empty() {
+            return None;
+        }
         let deadline = |scope: &usize| self.deadlines.get(*scope).copied().flatten();
         if *event == Event::timeout() {
             let due = scopes.iter().find(|scope| deadline(scope).is_some_and(|at| at <= now));

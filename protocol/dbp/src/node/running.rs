@@ -186,6 +186,7 @@ impl Node {
     fn publish(&mut self, selection: Selection) {
         let choice = choice(&selection);
         let Selection { event, origin, requested_by, .. } = selection;
+        let requested_by = requested_by.into_vec();
         let (served, proxies) = self.table.serve(&requested_by);
         self.stalls_due = true;
         self.stats.occurred += 1;

@@ -45,7 +45,7 @@ pub fn airspace() -> Airspace {
         upper: Vector3::new(2000.0, 2000.0, 1000.0),
         mountains: MOUNTAINS.map(mountain).to_vec(),
         threats: THREATS.map(threat).to_vec(),
-        no_fly: vec![],
+        ..Airspace::default()
     }
 }
 
