@@ -405,7 +405,8 @@ impl Node {
         let guard = self.guarding.then(|| self.guard_ends());
         let decisions = self.joint.as_ref().filter(|joint| !joint.leads());
         let decisions = decisions.and_then(|joint| joint.stream.next_deadline());
-        [self.program.next_deadline(), self.peers.next_deadline(), self.table.next_deadline(), guard]
+        let program = self.program.next_deadline().filter(|_| self.held_clock.is_none());
+        [program, self.peers.next_deadline(), self.table.next_deadline(), guard]
             .into_iter()
             .chain(self.outboxes.values().map(|outbox| outbox.next_deadline(lease)))
             .chain(self.streams.values().map(Stream::next_deadline))

@@ -186,6 +186,7 @@ impl NetworkVerifier {
         let mut left_out = vec![format!(
             "more than {lapses} lapses, {restarts} restarts, {repeats} repetitions and {partitions} partitions"
         )];
+        left_out.push("several messages that a node takes in before it goes on".to_owned());
         if !delay {
             left_out.push("bids and acknowledgements that arrive after a newer one was sent".to_owned());
         }
