@@ -594,11 +594,11 @@ impl Program {
         self.deliver(event, origin, 0, Duration::ZERO);
     }
 
-    /// Resumes a b-thread as if its deadline had passed.
-    pub(crate) fn fire_deadline(&mut self, bthread: &str) {
+    /// Resumes a b-thread as if its deadline had passed: what one does who explores all runs, for whom time has no length.
+    pub fn fire_deadline(&mut self, bthread: &str, now: Duration) {
         let Some(place) = self.board.bthread(bthread) else { return };
-        self.resume(place, &Event::timeout(), Duration::ZERO);
-        self.start_added(Duration::ZERO);
+        self.resume(place, &Event::timeout(), now);
+        self.start_added(now);
         self.compact();
     }
 }

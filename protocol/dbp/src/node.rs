@@ -146,6 +146,8 @@ pub struct Node {
     /// The events that are selected here and told to others.
     home: EventSet,
     now: Duration,
+    /// What the clock of its b-threads shows, where a verifier holds that; else it is this node's own.
+    held_clock: Option<Duration>,
     started: Option<Duration>,
     peers: Peers,
     /// As a home: the others' bids, and the own occurrences.
@@ -261,6 +263,7 @@ impl Node {
             program,
             home,
             now: Duration::ZERO,
+            held_clock: None,
             started: None,
             held: HeldBlocks::default(),
             stalls: Stalls::default(),
@@ -402,7 +405,8 @@ impl Node {
         let guard = self.guarding.then(|| self.guard_ends());
         let decisions = self.joint.as_ref().filter(|joint| !joint.leads());
         let decisions = decisions.and_then(|joint| joint.stream.next_deadline());
-        [self.program.next_deadline(), self.peers.next_deadline(), self.table.next_deadline(), guard]
+        let program = self.program.next_deadline().filter(|_| self.held_clock.is_none());
+        [program, self.peers.next_deadline(), self.table.next_deadline(), guard]
             .into_iter()
             .chain(self.outboxes.values().map(|outbox| outbox.next_deadline(lease)))
             .chain(self.streams.values().map(Stream::next_deadline))
@@ -509,7 +513,7 @@ impl Node {
     }
 
     /// The synchronisation point at which a b-thread of this node is.
-    fn sync_of(&self, bthread: &str) -> Option<u64> {
+    pub(crate) fn sync_of(&self, bthread: &str) -> Option<u64> {
         self.program.bids().find(|(name, _, _)| *name == bthread).map(|(_, _, sync)| sync)
     }
 }
@@ -519,6 +523,11 @@ impl Node {
     fn set_clock(&mut self, now: Duration) {
         self.now = self.now.max(now);
         self.started.get_or_insert(self.now);
+    }
+
+    /// What the clock of its b-threads shows.
+    fn program_now(&self) -> Duration {
+        self.held_clock.unwrap_or(self.now)
     }
 
     /// How long this node has been up.

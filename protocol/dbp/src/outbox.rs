@@ -207,6 +207,12 @@ impl Outbox {
         })
     }
 
+    /// Whether the home has taken in any block that still stands.
+    #[cfg(test)]
+    pub(crate) fn upholds_any(&self) -> bool {
+        self.blocks.iter().any(|(bthread, statement)| self.upheld_by(*statement, bthread))
+    }
+
     /// Whether the home has taken in a block.
     fn upheld_by(&self, statement: Statement, bthread: &str) -> bool {
         (statement.durable.is_some() || self.acked_epoch >= statement.held_since)

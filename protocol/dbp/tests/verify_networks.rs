@@ -3,9 +3,10 @@
 #![allow(clippy::unwrap_used)] // A test fails by panicking.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use skein_bp::script::{Op, Script};
-use skein_bp::verify::{Omission, Report, ViolationKind};
+use skein_bp::verify::{Inspection, Omission, Report, ViolationKind};
 use skein_bp::{Bid, EventSet, Program, ProgramConfig};
 use skein_dbp::verify::programs::{self, Network};
 use skein_dbp::verify::{Faults, Member, NetworkView};
@@ -200,4 +201,112 @@ fn what_is_asked_again_may_be_done_twice() {
     let violation = report.verdict.as_ref().unwrap();
     assert_eq!(violation.kind, ViolationKind::FailedAssertion { message: "dropped twice".into() });
     assert_eq!(*violation.violators[0], *"ground/log#at most one");
+}
+
+#[test]
+fn one_at_most_is_inside_where_whoever_has_waited_long_enough_gives_way() {
+    let network = programs::patient_resource().unwrap();
+    let report = holds(&network, NONE);
+    assert!(report.not_covered.iter().any(|what| what.to_string().contains("deadlines")), "{report}");
+}
+
+/// Deadlines of equal length pass one after the other, and before what was sent at the start arrives.
+#[test]
+fn two_are_inside_where_whoever_has_waited_long_enough_enters() {
+    let network = programs::impatient_resource().unwrap();
+    let (report, moves) = network.verifier(network.faults).run_and_count();
+    let violation = report.verdict.as_ref().unwrap();
+    assert!(
+        matches!(&violation.kind, ViolationKind::Invariant { message, .. } if message == "uav/1 and uav/2 are inside")
+    );
+    let trace = trace(&report);
+    assert_eq!(trace.len(), 4, "{report}");
+    assert!(trace[3].starts_with("the deadline of uav/"), "{report}");
+    assert!(moves["deadline"] > 0, "{moves:?}");
+}
+
+/// The first looks up again and again while the answer is on its way, but that does arrive.
+#[test]
+fn two_that_meet_pass_where_one_of_them_keeps_to_its_side() {
+    let network = programs::corridor().unwrap();
+    holds(&network, network.faults);
+}
+
+#[test]
+fn two_that_meet_may_dodge_for_ever_where_both_do() {
+    let network = programs::courteous_corridor().unwrap();
+    let report = network.verifier(network.faults).run();
+    let violation = report.verdict.as_ref().unwrap();
+    assert_eq!(violation.kind, ViolationKind::HotBThread);
+    let round: Vec<String> = violation.cycle().unwrap().iter().map(ToString::to_string).collect();
+    assert_eq!(round.len(), 4, "{report}");
+    for (one, other) in [("uav/1", "uav/2"), ("uav/2", "uav/1")] {
+        let hears = format!("{one} hears what occurred at {other}");
+        let says = |side: &str| round.iter().any(|step| step.starts_with(&hears) && step.contains(side));
+        assert!(says("left") && says("right"), "{report}");
+    }
+}
+
+fn script(node: &str, body: Vec<Op>) -> Member {
+    let mut program = Program::new(ProgramConfig::default());
+    program.add("script", Script::new(&body).unwrap());
+    let config = NodeConfig::new(NodeName::new(node).unwrap(), 1, Vec::new());
+    Member { config, program, may_restart: false }
+}
+
+fn within_a_second(body: Op) -> Op {
+    Op::Until { set: EventSet::None, within: Some(Duration::from_secs(1)), body: vec![body] }
+}
+
+fn of(members: Vec<Member>) -> Network {
+    let about = "made for a test";
+    Network { name: "test", about, is_sound: true, faults: NONE, members, requirement: None }
+}
+
+#[test]
+fn whoever_looks_up_for_ever_for_what_never_comes_is_hot_for_ever() {
+    let hears = |event: &str| Op::Sync(Bid::new().wait_for(event).hot());
+    let looks_up = |event: &str| vec![Op::forever([within_a_second(hears(event))])];
+    let says = vec![Op::Sync(Bid::new().request("uav/2/hello"))];
+    let report =
+        of(vec![script("uav/1", looks_up("uav/2/answer")), script("uav/2", says)]).verifier(NONE).run();
+    let violation = report.verdict.as_ref().unwrap();
+    assert_eq!(violation.kind, ViolationKind::HotBThread);
+    assert_eq!(violation.violators, ["uav/1#script".into()]);
+    assert_eq!(violation.cycle_length, Some(1), "{report}");
+}
+
+#[test]
+fn whoever_is_hot_where_nothing_is_due_any_more_stays_so_for_ever() {
+    let waits = vec![Op::Sync(Bid::new().wait_for("uav/2/answer").hot())];
+    let says = |what: &str| vec![Op::Sync(Bid::new().request(what))];
+    let network = of(vec![script("uav/1", waits.clone()), script("uav/2", says("uav/2/hello"))]);
+    let report = network.verifier(Faults { lapses: 1, partitions: 1, ..NONE }).run();
+    let violation = report.verdict.as_ref().unwrap();
+    assert_eq!(violation.kind, ViolationKind::HotTermination, "{report}");
+    assert_eq!(violation.violators, ["uav/1#script".into()]);
+    let network = of(vec![script("uav/1", waits), script("uav/2", says("uav/2/answer"))]);
+    holds(&network, Faults { lapses: 1, partitions: 1, ..NONE });
+}
+
+/// Two throw a ball to and fro. Whoever does not have it is hot, so nobody is for ever, and always somebody is.
+#[test]
+fn a_group_and_the_system_may_be_hot_for_ever_while_nobody_is() {
+    let holds_it = || within_a_second(Op::Sync(Bid::new()));
+    let throws = |node: &str| Op::Sync(Bid::new().request(format!("{node}/ball")));
+    let catches = |other: &str| Op::Sync(Bid::new().wait_for(format!("{other}/ball")).hot());
+    let first = script("uav/1", vec![Op::forever([holds_it(), throws("uav/1"), catches("uav/2")])]);
+    let second = script("uav/2", vec![Op::forever([catches("uav/1"), holds_it(), throws("uav/2")])]);
+    let network = of(vec![first, second]);
+    let find = |inspection: Inspection| {
+        let report = network.verifier(NONE).inspect([inspection]).run();
+        report.verdict.map(|violation| (violation.kind, violation.trace.len(), violation.cycle_length))
+    };
+    let group = |names: &[&str]| Inspection::HotRun(names.iter().map(|name| (*name).into()).collect());
+    assert_eq!(find(Inspection::HotBThread), None);
+    assert_eq!(find(group(&["uav/1#script"])), None);
+    let (kind, _, round) = find(group(&["uav/1#script", "uav/2#script"])).unwrap();
+    assert_eq!((kind, round), (ViolationKind::HotRun, Some(4)));
+    let (kind, _, round) = find(Inspection::HotSystem).unwrap();
+    assert_eq!((kind, round), (ViolationKind::HotSystem, Some(4)));
 }

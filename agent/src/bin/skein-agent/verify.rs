@@ -25,6 +25,14 @@ const STATES_OF_NETWORK: usize = 20_000;
 /// States that are drawn unless told otherwise.
 const STATES_DRAWN: usize = 1_000;
 
+/// What is looked for in every network.
+const LOOKED_FOR: [&str; 4] = [
+    "failed assertions",
+    "nodes that do not settle",
+    "b-threads that are hot where nothing is due any more",
+    "cycles along which a b-thread is always hot, though all that stays on its way arrives and time passes",
+];
+
 /// The arguments of `skein-agent verify`.
 #[derive(clap::Args)]
 pub struct Verify {
@@ -277,6 +285,7 @@ fn print_network(network: &Network, report: &Report, moves: &MoveCounts, seconds
     if let Some((requirement, _)) = &network.requirement {
         println!("  must hold: {requirement}");
     }
+    println!("  looked for besides: {}", LOOKED_FOR.join(", "));
     let made: Vec<String> = moves.iter().map(|(kind, count)| format!("{count} x {kind}")).collect();
     println!("  moves: {}", made.join(", "));
     print_report(report, seconds);
@@ -354,6 +363,7 @@ fn network_json(network: &Network, report: &Report, moves: &MoveCounts, as_expec
         fields.insert("network".to_owned(), network.name.into());
         fields.insert("about".to_owned(), network.about.into());
         fields.insert("requirement".to_owned(), requirement.into());
+        fields.insert("looked_for".to_owned(), json!(LOOKED_FOR));
         fields.insert("must_hold".to_owned(), network.is_sound.into());
         fields.insert("as_expected".to_owned(), as_expected.into());
         fields.insert("may_go_wrong".to_owned(), faults(&network.faults).into());

@@ -3,6 +3,8 @@
 
 use std::collections::VecDeque;
 
+use rustc_hash::FxHashMap;
+
 use super::model::{Model, Moves};
 use super::report::{Inspection, Violation, ViolationKind};
 use super::search::names;
@@ -17,6 +19,10 @@ pub(super) struct HotGraph {
     hot: Rows<u32>,
     /// Labels and targets.
     moves: Rows<(u32, u32)>,
+    /// What is due in each, and may not be so for ever along a cycle.
+    due: Rows<u32>,
+    /// What moves of a label bring about of it, for labels of those that bring about anything.
+    brought_about: FxHashMap<u32, Vec<u32>>,
 }
 
 /// How many moves may be looked at to find a shorter cycle than the first.
@@ -59,7 +65,13 @@ impl HotGraph {
     }
 
     fn of<M: Model>(model: &mut M, store: &Store, is_hot: impl Fn(&mut M, &[u32], &mut Vec<u32>)) -> Self {
-        let mut graph = Self { states: Vec::new(), hot: Rows::new(), moves: Rows::new() };
+        let mut graph = Self {
+            states: Vec::new(),
+            hot: Rows::new(),
+            moves: Rows::new(),
+            due: Rows::new(),
+            brought_about: FxHashMap::default(),
+        };
         let mut place = vec![UNSEEN; store.len()];
         let mut hot = Vec::new();
         for (number, place) in (0_u32..).zip(&mut place) {
@@ -71,6 +83,8 @@ impl HotGraph {
                 graph.states.push(number);
                 graph.hot.items.append(&mut hot);
                 graph.hot.close();
+                model.due(store.state(number), &mut graph.due.items);
+                graph.due.close();
             }
         }
         let mut moves = Moves::default();
@@ -80,7 +94,12 @@ impl HotGraph {
             for (label, target) in moves.iter() {
                 // States beyond a bound are not in the store.
                 let target = store.find(target).and_then(|number| place.get(number as usize)).copied();
-                graph.moves.items.extend(target.filter(|place| *place != UNSEEN).map(|place| (label, place)));
+                let Some(place) = target.filter(|place| *place != UNSEEN) else { continue };
+                graph.moves.items.push((label, place));
+                let brings_about = model.brings_about(label);
+                if !brings_about.is_empty() {
+                    graph.brought_about.entry(label).or_insert_with(|| brings_about.to_vec());
+                }
             }
             graph.moves.close();
         }
@@ -157,7 +176,8 @@ impl HotGraph {
     fn lasso(&self, store: &Store, is_hot: impl Fn(&[u32]) -> bool) -> Option<Lasso> {
         let count = self.states.len() as u32;
         let within: Vec<bool> = (0..count).map(|state| is_hot(self.hot.get(state))).collect();
-        let component = self.components(&within);
+        let mut component = self.components(&within);
+        self.leave_out_unjust(&mut component);
         let mut best: Option<Lasso> = None;
         let mut effort = 0;
         for entry in 0..count {
@@ -242,7 +262,40 @@ impl HotGraph {
         component
     }
 
-    /// The shortest way of less than `room` moves from `entry` back to it, within its component.
+    /// Leaves out the components in which something is due everywhere and never comes about: so it is along each of their
+    /// cycles too. Of any other component all states and moves together make a cycle in which nothing is due for ever.
+    fn leave_out_unjust(&self, component: &mut [u32]) {
+        if self.due.items.is_empty() {
+            return;
+        }
+        let mut sizes: FxHashMap<u32, usize> = FxHashMap::default();
+        let mut due: FxHashMap<(u32, u32), usize> = FxHashMap::default();
+        let states = || (0_u32..).zip(component.iter().copied()).filter(|(_, own)| *own != UNSEEN);
+        for (state, own) in states() {
+            *sizes.entry(own).or_default() += 1;
+            self.due.get(state).iter().for_each(|one| *due.entry((own, *one)).or_default() += 1);
+        }
+        due.retain(|(own, _), count| sizes.get(own) == Some(count));
+        for (state, own) in states() {
+            let inside = self.moves.get(state).iter().filter(|(_, to)| get(component, *to as usize) == own);
+            let brought_about = inside.filter_map(|(label, _)| self.brought_about.get(label)).flatten();
+            for one in brought_about {
+                due.remove(&(own, *one));
+            }
+        }
+        let unjust: rustc_hash::FxHashSet<u32> = due.into_keys().map(|(own, _)| own).collect();
+        component.iter_mut().filter(|own| unjust.contains(own)).for_each(|own| *own = UNSEEN);
+    }
+
+    /// What is still due of `pending` after a move of this label to `target`.
+    fn still_due(&self, pending: &[u32], label: u32, target: u32) -> Vec<u32> {
+        let brought_about = self.brought_about.get(&label).map_or(&[][..], Vec::as_slice);
+        let there = self.due.get(target);
+        pending.iter().copied().filter(|one| there.contains(one) && !brought_about.contains(one)).collect()
+    }
+
+    /// The shortest way of less than `room` moves from `entry` back to it, within its component, along which all that is
+    /// due at `entry` comes about, is forestalled or is at some state not due.
     fn round(
         &self,
         entry: u32,
@@ -252,35 +305,35 @@ impl HotGraph {
         effort: &mut usize,
     ) -> Option<Lasso> {
         let own = get(component, entry as usize);
-        let mut came_by = rustc_hash::FxHashMap::default();
-        let mut queue = VecDeque::from([(entry, 0_usize)]);
-        while let Some((state, length)) = queue.pop_front() {
+        let mut came_by: FxHashMap<Place, (Place, u32)> = FxHashMap::default();
+        let start = (entry, self.due.get(entry).to_vec());
+        let mut queue = VecDeque::from([(start.clone(), 0_usize)]);
+        while let Some((place, length)) = queue.pop_front() {
             if length + 1 >= room {
                 return None;
             }
-            for (label, target) in self.moves.get(state) {
+            let (state, pending) = &place;
+            for (label, target) in self.moves.get(*state) {
                 *effort += 1;
-                if *target == entry {
-                    let mut lasso = Lasso { stem, labels: vec![*label], states: vec![state] };
-                    let mut at = state;
-                    while let Some((from, label)) = came_by.get(&at) {
-                        lasso.labels.push(*label);
-                        lasso.states.push(*from);
-                        at = *from;
-                    }
-                    lasso.labels.reverse();
-                    lasso.states.reverse();
-                    return Some(lasso);
+                if get(component, *target as usize) != own {
+                    continue;
                 }
-                if get(component, *target as usize) == own && !came_by.contains_key(target) {
-                    came_by.insert(*target, (state, *label));
-                    queue.push_back((*target, length + 1));
+                let next = (*target, self.still_due(pending, *label, *target));
+                if *target == entry && next.1.is_empty() {
+                    return Some(Lasso::back(stem, &came_by, place, *label));
+                }
+                if next != start && !came_by.contains_key(&next) {
+                    came_by.insert(next.clone(), (place.clone(), *label));
+                    queue.push_back((next, length + 1));
                 }
             }
         }
         None
     }
 }
+
+/// A state on the way round a cycle, and what is still due there of what was at its start.
+type Place = (u32, Vec<u32>);
 
 /// A way into a cycle and round it.
 #[derive(Debug)]
@@ -293,6 +346,20 @@ struct Lasso {
 }
 
 impl Lasso {
+    /// The cycle that a move of this label closes from `last`, which was come to as `came_by` tells.
+    fn back(stem: usize, came_by: &FxHashMap<Place, (Place, u32)>, last: Place, label: u32) -> Self {
+        let mut lasso = Self { stem, labels: vec![label], states: vec![last.0] };
+        let mut at = &last;
+        while let Some((from, label)) = came_by.get(at) {
+            lasso.labels.push(*label);
+            lasso.states.push(from.0);
+            at = from;
+        }
+        lasso.labels.reverse();
+        lasso.states.reverse();
+        lasso
+    }
+
     fn violation<M: Model>(
         &self,
         model: &M,

@@ -29,6 +29,19 @@ pub trait Model {
         let _ = (state, bthreads);
     }
 
+    /// Adds the numbers of what is due in `state`, each once: it comes about sooner or later unless a move forestalls it. A
+    /// run in which something is due from some state on and never comes about is none (justice in the sense of Manna and
+    /// Pnueli 1992).
+    fn due(&mut self, state: &[u32], due: &mut Vec<u32>) {
+        let _ = (state, due);
+    }
+
+    /// What comes about, or is forestalled, with a move of this label, by the numbers that [`Model::due`] gives.
+    fn brings_about(&self, label: u32) -> &[u32] {
+        let _ = label;
+        &[]
+    }
+
     /// The names of the goals that must stay within reach.
     fn goals(&self) -> Vec<String> {
         Vec::new()

@@ -368,7 +368,7 @@ impl Product {
                     row.enumerate().filter(|(place, id)| *place == 0 || *id != ENDED).map(|(_, id)| id),
                 );
             } else {
-                let row = self.run_program(state, |program| program.fire_deadline(&name));
+                let row = self.run_program(state, |program| program.fire_deadline(&name, Duration::ZERO));
                 moves.push(label, row);
             }
         }

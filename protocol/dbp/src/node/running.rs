@@ -78,7 +78,7 @@ impl Node {
     fn run_program(&mut self, before: usize, select: &mut Select<'_>) -> Result<(), NodeError> {
         #[cfg(feature = "mutants")]
         if self.config.mutant == Some(crate::Mutant::G9)
-            && let Some(selection) = self.program.step(self.now)?
+            && let Some(selection) = self.program.step(self.program_now())?
         {
             self.publish(selection);
         }
@@ -94,7 +94,8 @@ impl Node {
                 Delivery::Recalled(decision) => self.learn(decision)?,
             }
         }
-        while let Some(selection) = select(&mut self.program, self.now)? {
+        let now = self.program_now();
+        while let Some(selection) = select(&mut self.program, now)? {
             self.publish(selection);
             let limit = self.config.settle_limit;
             if self.selections.len() - before > limit {
@@ -114,7 +115,7 @@ impl Node {
     /// Tells the program a fact, which counts as an event of this node.
     fn tell_fact(&mut self, event: Event) -> Result<(), NodeError> {
         self.program.occurred(event);
-        if let Some(selection) = self.program.step(self.now)? {
+        if let Some(selection) = self.program.step(self.program_now())? {
             self.publish(selection);
         }
         Ok(())
@@ -166,7 +167,7 @@ impl Node {
     fn learn(&mut self, occurrence: Occurrence) -> Result<(), NodeError> {
         let Occurrence { home, seq, term, event, requested_by, choice, .. } = occurrence;
         self.program.occurred(event.clone());
-        self.program.step(self.now)?;
+        self.program.step(self.program_now())?;
         self.stalls_due = true;
         self.selections.push(Happened {
             event,

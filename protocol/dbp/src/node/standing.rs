@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use crate::NodeName;
 use crate::node::Node;
 use crate::verify::row::{Family, Part, Row};
+use crate::{BidRecord, NodeName};
 
 impl Node {
     /// Writes where the node stands. Numbers that only grow are written as such, so that they can be counted anew.
@@ -113,6 +113,14 @@ impl Node {
         self.peers.iter().any(|(name, peer)| name == node && peer.alive)
     }
 
+    /// Whether this copy of a record, or a newer record, has been taken in.
+    pub(crate) fn has_taken_in(&self, record: &BidRecord) -> bool {
+        self.table.bidders.get(&record.node).is_some_and(|bidder| {
+            let taken = (bidder.incarnation, bidder.epoch, bidder.sent_at);
+            taken >= (record.incarnation, record.epoch, record.sent_at)
+        })
+    }
+
     /// Whether `guarded` events are kept back since the start.
     pub(crate) fn is_guarding(&self) -> bool {
         self.guarding
@@ -129,6 +137,14 @@ impl Node {
         self.history.latest_seq()
     }
 
+    /// Lets so much time pass that `home` is to be sent another copy, while it surely keeps what it has acknowledged.
+    pub(crate) fn let_renewal_fall_due(&mut self, home: &NodeName) {
+        if let Some(outbox) = self.outboxes.get_mut(home) {
+            outbox.acked_sent_at = outbox.acked_sent_at.min(self.now - self.config.lease / 2);
+            outbox.sent_at = None;
+        }
+    }
+
     /// Lets the time pass in which `home` surely keeps what this node has stated there; a fresh copy is due.
     pub(crate) fn let_hold_lapse(&mut self, home: &NodeName) {
         if let Some(outbox) = self.outboxes.get_mut(home) {
@@ -137,16 +153,76 @@ impl Node {
         }
     }
 
-    /// Lets the lease pass of what `node` has stated here, and of its last sign of life.
-    pub(crate) fn let_lease_lapse(&mut self, node: &NodeName) {
+    /// Whether bids of `node` stand here that its lease keeps.
+    pub(crate) fn holds_bids_of(&self, node: &NodeName) -> bool {
+        self.table.bidders.get(node).is_some_and(|bidder| bidder.live && !bidder.bids.is_empty())
+    }
+
+    /// Lets the lease pass of what `node` has stated here.
+    pub(crate) fn let_bids_lapse(&mut self, node: &NodeName) {
         if let Some(bidder) = self.table.bidders.get_mut(node) {
             bidder.heard_at = Duration::ZERO;
         }
+    }
+
+    /// Lets the lease pass of what `node` has stated here, and of its last sign of life.
+    pub(crate) fn let_lease_lapse(&mut self, node: &NodeName) {
+        self.let_bids_lapse(node);
         self.peers.silence(node);
+    }
+
+    /// Holds the clock of its b-threads at the start of the run, so that deadlines pass only where they are let.
+    pub(crate) fn hold_clock(&mut self) {
+        self.held_clock = Some(Duration::ZERO);
+    }
+
+    /// The b-threads with an open deadline.
+    pub(crate) fn deadlines(&self) -> impl Iterator<Item = &str> {
+        self.program.bids().filter(|(_, bid, _)| bid.given_deadline().is_some()).map(|(name, ..)| name)
+    }
+
+    /// Lets the deadline of a b-thread pass.
+    pub(crate) fn let_deadline_pass(&mut self, bthread: &str) {
+        let now = self.program_now();
+        self.program.fire_deadline(bthread, now);
     }
 
     /// Lets the longest lease pass since the start.
     pub(crate) fn let_guard_end(&mut self) {
         self.started = Some(Duration::ZERO);
+    }
+}
+
+/// What runs that are held against the verifier's model ask.
+#[cfg(test)]
+impl Node {
+    /// Takes leases by which nothing is held to run on: nobody renews them, and nothing ends with them.
+    pub(crate) fn overlook_idle_leases(&mut self) {
+        for outbox in self.outboxes.values_mut().filter(|outbox| !outbox.upholds_any()) {
+            outbox.acked_sent_at = self.now;
+        }
+        let idle = |bidder: &&mut crate::table::Bidder| bidder.bids.is_empty() && bidder.released.is_empty();
+        self.table.bidders.values_mut().filter(idle).for_each(|bidder| bidder.live = true);
+    }
+
+    /// Whether a block holds at `home` as long as this node is sure of it.
+    pub(crate) fn relies_on(&self, home: &NodeName) -> bool {
+        self.outboxes.get(home).is_some_and(|outbox| outbox.upholds_any())
+    }
+
+    /// Whether the lease of what `node` bids here runs.
+    pub(crate) fn keeps_lease_of(&self, node: &NodeName) -> bool {
+        self.table.bidders.get(node).is_some_and(|bidder| bidder.live)
+    }
+
+    /// The epoch of the bids of which this node sends copies to `home`.
+    pub(crate) fn states(&self, home: &NodeName) -> Option<u64> {
+        let outbox = self.outboxes.get(home)?;
+        outbox.next_deadline(self.config.lease).map(|_| outbox.epoch)
+    }
+
+    /// The number of the last occurrence of `home` that this node was told of.
+    pub(crate) fn applied(&self, home: &NodeName) -> u64 {
+        self.streams.get(home).map_or(0, crate::stream::Stream::applied)
     }
 }

@@ -1,10 +1,16 @@
 //! The verifier for a small network: every run of up to three nodes, with what may go wrong between them.
 //!
-//! What is explored are [`Node`](crate::Node)s themselves. A move lets one message arrive, or one lease lapse, or a node
-//! restart, and then the node goes on until it has settled, in every way in which its ties may fall. Messages take any
-//! time; records of bids are lost and, if so set, overtaken; so many messages as are set arrive again; occurrences come in
-//! order, since holes are repaired. While a partition lasts nothing arrives across it, and leases lapse. Time has no length: a lease lapses at a move, at its holder
-//! before its home, as the protocol sees to it (G3); deadlines of b-threads do not fire.
+//! What is explored are [`Node`](crate::Node)s themselves. A move lets one message arrive, or one lease lapse, or the
+//! deadline of a b-thread pass, or a node restart, and then the node goes on until it has settled, in every way in which its
+//! ties may fall. Messages take any time; records of bids are lost and, if so set, overtaken; so many messages as are set
+//! arrive again; occurrences come in order, since holes are repaired. While a partition lasts nothing arrives across it, and
+//! leases lapse. Time has no length: a lease lapses at a move, at its holder before its home, as the protocol sees to it
+//! (G3). An open deadline may pass at any move, before or after any other, however long it is: that is more than can happen.
+//! Of the deadlines that one b-thread has open at once, the shortest is the one that passes.
+//!
+//! Cycles along which somebody is hot are looked for by the rules of one program's verifier, but only those that a network
+//! and a clock that work can go round for ever: what is on its way all along arrives, a partition ends, a deadline that is
+//! open all along passes, and the guard after a restart ends. Leases need not lapse, and ties may fall the same way for ever.
 //!
 //! ```
 //! use skein_dbp::verify::{Faults, programs};
@@ -22,7 +28,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use network::NetworkModel;
+use network::{NetworkModel, Step};
 use skein_bp::Program;
 use skein_bp::verify::{Inspection, Limits, Omission, Progress, Report, check};
 
@@ -42,7 +48,7 @@ pub struct Member {
 /// What may go wrong, and how often.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Faults {
-    /// Whether an older record of bids may still arrive once a newer one was sent.
+    /// Whether an older record of bids, or an older acknowledgement, may still arrive once a newer one was sent.
     pub delay: bool,
     /// How many leases may lapse.
     pub lapses: u32,
@@ -107,6 +113,10 @@ struct Invariant {
 }
 
 type InvariantFn = dyn Fn(&NetworkView<'_>) -> Result<(), String> + Send + Sync;
+/// What is looked for unless told otherwise.
+const USUAL: [Inspection; 3] =
+    [Inspection::FailedAssertion, Inspection::HotTermination, Inspection::HotBThread];
+
 type OnProgress = Box<dyn FnMut(&Progress)>;
 
 /// A verification of one network, to be set up and run.
@@ -114,6 +124,7 @@ pub struct NetworkVerifier {
     members: Vec<Member>,
     faults: Faults,
     limits: Limits,
+    inspections: Vec<Inspection>,
     invariants: Vec<Invariant>,
     on_progress: OnProgress,
 }
@@ -123,7 +134,17 @@ impl NetworkVerifier {
     /// 200 000 unless told otherwise.
     pub fn new(members: Vec<Member>, faults: Faults) -> Self {
         let limits = Limits { most_states: 200_000, ..Limits::default() };
-        Self { members, faults, limits, invariants: Vec::new(), on_progress: Box::new(|_| {}) }
+        let inspections = USUAL.to_vec();
+        Self { members, faults, limits, inspections, invariants: Vec::new(), on_progress: Box::new(|_| {}) }
+    }
+
+    /// Looks for these instead of failed assertions, networks at rest where somebody is hot, and b-threads that are hot for
+    /// ever. Deadlocks are not looked for, and a node that does not settle counts as a failed assertion. B-threads are named
+    /// `node#bthread`.
+    #[must_use]
+    pub fn inspect(mut self, inspections: impl IntoIterator<Item = Inspection>) -> Self {
+        self.inspections = inspections.into_iter().collect();
+        self
     }
 
     /// Looks besides for a state in which `holds` gives an error, which says what is wrong with it.
@@ -151,7 +172,8 @@ impl NetworkVerifier {
         self
     }
 
-    /// Looks at every state, until a b-thread fails, an invariant is broken, a node cannot go on, or a bound is reached.
+    /// Looks at every state, until a b-thread fails, an invariant is broken, a node cannot go on, or a bound is reached; then
+    /// at the cycles.
     pub fn run(self) -> Report {
         self.run_and_count().0
     }
@@ -159,17 +181,22 @@ impl NetworkVerifier {
     /// The same, and tells how many moves of each kind were made.
     pub fn run_and_count(mut self) -> (Report, MoveCounts) {
         let mut model = NetworkModel::new(self.members, self.faults, self.invariants);
-        let inspections = [Inspection::FailedAssertion];
-        let mut report = check(&mut model, &self.limits, &inspections, &mut self.on_progress);
+        let mut report = check(&mut model, &self.limits, &self.inspections, &mut self.on_progress);
         let Faults { delay, lapses, restarts, repeats, partitions, late_facts, most_under_way } = self.faults;
         let mut left_out = vec![format!(
             "more than {lapses} lapses, {restarts} restarts, {repeats} repetitions and {partitions} partitions"
         )];
+        left_out.push("several messages that a node takes in before it goes on".to_owned());
         if !delay {
-            left_out.push("records of bids that arrive after a newer one was sent".to_owned());
+            left_out.push("bids and acknowledgements that arrive after a newer one was sent".to_owned());
         }
         if !late_facts {
             left_out.push("facts of one node that take time to arrive at another".to_owned());
+        }
+        if model.moves.contains_key(Step::DEADLINE) {
+            left_out.push(
+                "of the deadlines that a b-thread has open at once, others than the shortest".to_owned(),
+            );
         }
         if model.queue_cut {
             left_out.push(format!("more than {most_under_way} occurrences on their way between two nodes"));
@@ -184,11 +211,12 @@ impl NetworkVerifier {
 
 impl fmt::Debug for NetworkVerifier {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { members, faults, limits, invariants, .. } = self;
+        let Self { members, faults, limits, inspections, invariants, .. } = self;
         f.debug_struct("NetworkVerifier")
             .field("members", members)
             .field("faults", faults)
             .field("limits", limits)
+            .field("inspections", inspections)
             .field("invariants", invariants)
             .finish_non_exhaustive()
     }

@@ -13,7 +13,7 @@ use super::row::{Family, Part, Row};
 use super::wire::Wire;
 use super::{Faults, Invariant, Member, MoveCounts, NetworkView};
 use crate::node::Node;
-use crate::{BidRecord, Kept, Message, NodeConfig, NodeError, NodeName, Presence, Recipient, facts};
+use crate::{BidAck, BidRecord, Kept, Message, NodeConfig, NodeError, NodeName, Presence, Recipient, facts};
 
 /// When the network starts: later than any lease, so that what was last heard at time zero has lapsed.
 const START: Duration = Duration::from_secs(1 << 20);
@@ -28,6 +28,8 @@ struct Network {
     nodes: BTreeMap<NodeName, Rc<Node>>,
     wires: BTreeMap<(NodeName, NodeName), Rc<Wire>>,
     lapses: u32,
+    /// Holders that are no longer sure of a home, which has yet to let go of what they bid there.
+    lapsing: BTreeSet<(NodeName, NodeName)>,
     restarts: u32,
     repeats: u32,
     partitions: u32,
@@ -36,22 +38,26 @@ struct Network {
     now: Duration,
     /// Why a node could not go on.
     broken: Option<(NodeName, NodeError)>,
+    /// Whether more was sent than may be on its way.
+    overflows: bool,
 }
 
 /// Something that happens to a node.
 #[derive(Clone, Debug)]
-enum Step {
+pub(super) enum Step {
     /// Its b-threads begin.
     Begin(NodeName),
-    /// The record at this place of the wire from a bidder arrives, and those before it never will.
+    /// The record at this place of the wire from a bidder arrives, and those before it count no more.
     Record {
         from: NodeName,
         to: NodeName,
         at: usize,
     },
+    /// So does an acknowledgement.
     Ack {
         from: NodeName,
         to: NodeName,
+        at: usize,
     },
     Occurrence {
         from: NodeName,
@@ -73,13 +79,56 @@ enum Step {
         holder: NodeName,
         home: NodeName,
     },
-    /// The home lets go.
+    /// The home lets go of its bids, while it still counts it as alive: a sign of life has come since.
+    BidsLapse {
+        holder: NodeName,
+        home: NodeName,
+    },
+    /// The home lets go, and counts the holder as lost.
     LeaseLapses {
         holder: NodeName,
         home: NodeName,
     },
     GuardEnds(NodeName),
+    /// The deadline of a b-thread passes.
+    Deadline {
+        node: NodeName,
+        bthread: String,
+    },
     Restart(NodeName),
+}
+
+/// What comes about sooner or later, unless something forestalls it: whatever stays on its way arrives, partitions end, and
+/// time passes.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+enum Due {
+    Record(NodeName, NodeName),
+    Ack(NodeName, NodeName),
+    Occurrence(NodeName, NodeName),
+    Presence(NodeName, NodeName),
+    Heal(NodeName, NodeName),
+    GuardEnds(NodeName),
+    Deadline(NodeName, String),
+}
+
+/// What is known of a state that was reached.
+#[derive(Debug)]
+enum Seen {
+    /// It was not gone on from.
+    Waiting(Box<Network>),
+    /// It was. Of one in which somebody is hot that is kept of which cycles are made.
+    Left(Option<Box<HotState>>),
+}
+
+/// A state in which somebody is hot.
+#[derive(Debug)]
+struct HotState {
+    /// Who, by number.
+    hot: Vec<u32>,
+    /// What is due, by number.
+    due: Vec<u32>,
+    /// Labels and targets.
+    moves: Vec<(u32, Rc<[u32]>)>,
 }
 
 /// The model of a network.
@@ -90,11 +139,15 @@ pub(super) struct NetworkModel {
     invariants: Vec<Invariant>,
     parts: Interner<Part>,
     families: Interner<Family>,
-    labels: Interner<Event>,
-    /// States that were reached and not gone on from; a state that was has none.
-    waiting: FxHashMap<Vec<u32>, Option<Network>>,
-    /// The state that is gone on from.
+    /// What a move is called, and what it brings about of what is due.
+    labels: Interner<(Event, Vec<u32>)>,
+    dues: Interner<Due>,
+    /// The names of b-threads that were hot, with their nodes.
+    bthreads: Interner<Arc<str>>,
+    seen: FxHashMap<Rc<[u32]>, Seen>,
+    /// The state that is gone on from, and whether nothing is due there.
     present: Option<Network>,
+    rests: bool,
     /// Whether a bound of the model, not of the search, was reached.
     pub(super) ways_cut: bool,
     pub(super) queue_cut: bool,
@@ -111,8 +164,11 @@ impl NetworkModel {
             parts: Interner::default(),
             families: Interner::default(),
             labels: Interner::default(),
-            waiting: FxHashMap::default(),
+            dues: Interner::default(),
+            bthreads: Interner::default(),
+            seen: FxHashMap::default(),
             present: None,
+            rests: false,
             ways_cut: false,
             queue_cut: false,
             moves: MoveCounts::new(),
@@ -133,12 +189,14 @@ impl NetworkModel {
             nodes: nodes.collect(),
             wires: BTreeMap::new(),
             lapses: self.faults.lapses,
+            lapsing: BTreeSet::new(),
             restarts: self.faults.restarts,
             repeats: self.faults.repeats,
             partitions: self.faults.partitions,
             cut: BTreeSet::new(),
             now: START,
             broken: None,
+            overflows: false,
         }
     }
 
@@ -162,10 +220,12 @@ impl NetworkModel {
         row.plain(network.restarts.into());
         row.plain(network.repeats.into());
         row.plain(network.partitions.into());
-        row.list(&network.cut, |row, (one, other)| {
-            row.text(one.as_str());
-            row.text(other.as_str());
-        });
+        for pairs in [&network.cut, &network.lapsing] {
+            row.list(pairs, |row, (one, other)| {
+                row.text(one.as_str());
+                row.text(other.as_str());
+            });
+        }
         if let Some((node, error)) = &network.broken {
             row.text(&format!("{node}: {error}"));
         }
@@ -198,8 +258,16 @@ impl NetworkModel {
                 if network.lapses > 0 || is_cut {
                     steps.push(Step::HoldLapses { holder: from, home: to });
                 }
-            } else if home.hears(&from) && (network.lapses < self.faults.lapses || is_cut) {
-                steps.push(Step::LeaseLapses { holder: from, home: to });
+            } else if home.hears(&from) {
+                let (holder, home_holds) = (from.clone(), home.holds_bids_of(&from));
+                let pair = (from, to);
+                if network.lapses > 0 || is_cut || network.lapsing.contains(&pair) {
+                    let home = pair.1;
+                    if home_holds {
+                        steps.push(Step::BidsLapse { holder: holder.clone(), home: home.clone() });
+                    }
+                    steps.push(Step::LeaseLapses { holder, home });
+                }
             }
         }
         for (name, node) in &network.nodes {
@@ -207,6 +275,8 @@ impl NetworkModel {
             if node.is_guarding() && !sure {
                 steps.push(Step::GuardEnds(name.clone()));
             }
+            let deadline = |bthread: &str| Step::Deadline { node: name.clone(), bthread: bthread.into() };
+            steps.extend(node.deadlines().map(deadline));
             let may_restart = |member: &Member| member.config.name == *name && member.may_restart;
             if network.restarts > 0 && self.members.iter().any(may_restart) {
                 steps.push(Step::Restart(name.clone()));
@@ -236,7 +306,11 @@ impl NetworkModel {
             let mut choices = Choices { script: std::mem::take(&mut script), at: 0 };
             let mut selected = self.take(&mut next, step, &mut choices);
             self.hear_facts(&mut next, &mut choices, &mut selected);
-            outcomes.push((selected, next));
+            next.forget_renewed();
+            self.queue_cut |= next.overflows;
+            if !next.overflows {
+                outcomes.push((selected, next));
+            }
             script = choices.script;
             while script.last().is_some_and(|choice| choice.taken + 1 >= choice.of) {
                 script.pop();
@@ -268,8 +342,8 @@ impl NetworkModel {
                 network.hand_over(to, now, record.map(Message::Bid));
                 self.go_on(network, to, choices)
             }
-            Step::Ack { from, to } => {
-                let ack = network.wire(from, to).ack.take();
+            Step::Ack { from, to, at } => {
+                let ack = network.wire(from, to).acks.drain(..=*at).next_back();
                 network.hand_over(to, now, ack.map(Message::Ack));
                 self.go_on(network, to, choices)
             }
@@ -302,19 +376,42 @@ impl NetworkModel {
             Step::HoldLapses { holder, home } => {
                 if !network.are_cut_off(holder, home) {
                     network.lapses -= 1;
+                    network.lapsing.insert((holder.clone(), home.clone()));
                 }
+                // The copies that were sent before may arrive yet.
+                network.with(holder, |node| node.let_renewal_fall_due(home));
+                let mut selected = self.go_on(network, holder, choices);
                 network.with(holder, |node| node.let_hold_lapse(home));
                 // An acknowledgement on its way is of a copy sent before.
-                network.wire(home, holder).ack = None;
-                self.go_on(network, holder, choices)
-            }
-            Step::LeaseLapses { holder, home } => {
-                network.wire(home, holder).ack = None;
-                network.with(home, |node| node.let_lease_lapse(holder));
-                let mut selected = self.go_on(network, home, choices);
-                network.with(holder, |node| node.let_hold_lapse(home));
+                network.wire(home, holder).acks.clear();
                 selected.extend(self.go_on(network, holder, choices));
                 selected
+            }
+            Step::BidsLapse { holder, home } => {
+                network.pay_for_lapse(holder, home);
+                if !network.are_cut_off(holder, home) {
+                    network.lapsing.insert((holder.clone(), home.clone()));
+                }
+                network.with(home, |node| node.let_bids_lapse(holder));
+                self.let_go(network, holder, home, choices)
+            }
+            Step::LeaseLapses { holder, home } => {
+                network.pay_for_lapse(holder, home);
+                network.with(home, |node| node.let_lease_lapse(holder));
+                let selected = self.let_go(network, holder, home, choices);
+                // Its signs of life come again.
+                let life = network.nodes.get(holder).map(|node| (node.incarnation(), node.latest_seq()));
+                let member = self.members.iter().find(|member| member.config.name == *holder);
+                if let (Some((life, seq)), Some(member)) = (life, member)
+                    && let Message::Presence(presence) = presence(member, life, START, seq)
+                {
+                    network.wire(holder, home).presence = Some(presence);
+                }
+                selected
+            }
+            Step::Deadline { node, bthread } => {
+                network.with(node, |node| node.let_deadline_pass(bthread));
+                self.go_on(network, node, choices)
             }
             Step::Restart(node) => {
                 network.restarts -= 1;
@@ -322,6 +419,21 @@ impl NetworkModel {
                 self.go_on(network, node, choices)
             }
         }
+    }
+
+    /// A home and then the holder go on after a lapse. What the holder states again is a fresh copy.
+    fn let_go(
+        &mut self,
+        network: &mut Network,
+        holder: &NodeName,
+        home: &NodeName,
+        choices: &mut Choices,
+    ) -> Vec<String> {
+        network.wire(home, holder).acks.clear();
+        let mut selected = self.go_on(network, home, choices);
+        network.with(holder, |node| node.let_hold_lapse(home));
+        selected.extend(self.go_on(network, holder, choices));
+        selected
     }
 
     /// Begins a new life of a node, which finds the others alive. What was on its way to the old one is lost.
@@ -360,7 +472,7 @@ impl NetworkModel {
                 if matches!(&recipient, Recipient::Node(node) if node != to) {
                     continue;
                 }
-                self.queue_cut |= network.put(name, to, message.clone(), self.faults);
+                network.put(name, to, message.clone(), self.faults);
             }
         }
         let own = selected.iter().filter(|happened| happened.home == *name);
@@ -380,20 +492,62 @@ impl NetworkModel {
         }
     }
 
-    fn label(&mut self, step: &Step, selected: &[String]) -> u32 {
+    fn label(&mut self, step: &Step, selected: &[String], from: &Network, to: &Network) -> u32 {
         let what = step.what();
         let what = if selected.is_empty() { what } else { what.with("then", selected.join(", ")) };
-        self.labels.number(what)
+        let forestalled = from.nodes.iter().flat_map(|(name, node)| {
+            let gone_on = |bthread: &&str| {
+                let sync = |network: &Network| network.nodes.get(name).and_then(|node| node.sync_of(bthread));
+                sync(from) != sync(to)
+            };
+            // Whether the deadline of a b-thread that has gone on is still the same nobody can tell.
+            node.deadlines().filter(gone_on).map(|bthread| Due::Deadline(name.clone(), bthread.into()))
+        });
+        let dues = &mut self.dues;
+        let brings_about = step.due().into_iter().chain(forestalled).map(|due| dues.number(due));
+        let brings_about = sorted(brings_about.collect());
+        self.labels.number((what, brings_about))
+    }
+
+    /// The b-threads that are hot, by number.
+    fn hot_bthreads(&mut self, network: &Network) -> Vec<u32> {
+        sorted(network.hot_bthreads().map(|bthread| self.bthreads.number(bthread)).collect())
+    }
+
+    fn hot_state(&self, state: &[u32]) -> Option<&HotState> {
+        match self.seen.get(state)? {
+            Seen::Left(hot) => hot.as_deref(),
+            Seen::Waiting(_) => None,
+        }
+    }
+
+    fn assertion_failed(node: &NodeName, error: &NodeError) -> Fault {
+        let (violator, message) = match error {
+            NodeError::Program(ProgramError::Failed { bthread, message }) => {
+                (format!("{node}#{bthread}"), message.clone())
+            }
+            error => (node.to_string(), error.to_string()),
+        };
+        Fault { kind: ViolationKind::FailedAssertion { message }, violators: vec![violator.into()] }
+    }
+
+    /// Who is hot where nothing is due any more.
+    fn hot_at_rest(&self, network: &Network) -> Option<Fault> {
+        let violators: Vec<Arc<str>> = if self.rests { network.hot_bthreads().collect() } else { Vec::new() };
+        (!violators.is_empty()).then_some(Fault { kind: ViolationKind::HotTermination, violators })
     }
 }
 
 impl Step {
+    /// The kind of move by which a deadline passes.
+    pub(super) const DEADLINE: &str = "deadline";
+
     /// What happens, for people.
     fn what(&self) -> Event {
         match self {
             Step::Begin(node) => Event::new(format!("{node} begins")),
             Step::Record { from, to, .. } => Event::new(format!("{to} takes in what {from} bids")),
-            Step::Ack { from, to } => Event::new(format!("{to} hears that {from} has taken in its bids")),
+            Step::Ack { from, to, .. } => Event::new(format!("{to} hears that {from} has taken in its bids")),
             Step::Occurrence { from, to } => Event::new(format!("{to} hears what occurred at {from}")),
             Step::Presence { from, to } => Event::new(format!("{to} hears that {from} lives")),
             Step::Twice(step) => {
@@ -403,8 +557,14 @@ impl Step {
             Step::Cut(one, other) => Event::new(format!("{one} and {other} are cut off from one another")),
             Step::Heal(one, other) => Event::new(format!("{one} and {other} are joined again")),
             Step::HoldLapses { holder, home } => Event::new(format!("{holder} is no longer sure of {home}")),
-            Step::LeaseLapses { holder, home } => Event::new(format!("{home} lets go of what {holder} bids")),
+            Step::BidsLapse { holder, home } => Event::new(format!("{home} lets go of what {holder} bids")),
+            Step::LeaseLapses { holder, home } => {
+                Event::new(format!("{home} lets go of what {holder} bids, and counts it as lost"))
+            }
             Step::GuardEnds(node) => Event::new(format!("{node} has waited for the longest lease")),
+            Step::Deadline { node, bthread } => {
+                Event::new(format!("the deadline of {node}#{bthread} passes"))
+            }
             Step::Restart(node) => Event::new(format!("{node} restarts")),
         }
     }
@@ -414,16 +574,35 @@ impl Step {
         match self {
             Step::Begin(_) => "beginning",
             Step::Record { at: 1.., .. } => "loss of older bids",
+            Step::Ack { at: 1.., .. } => "loss of older acknowledgements",
             Step::Record { .. } | Step::Ack { .. } | Step::Occurrence { .. } | Step::Presence { .. } => {
                 "arrival"
             }
             Step::Twice(_) => "repetition",
             Step::Cut(..) => "partition",
             Step::Heal(..) => "end of a partition",
-            Step::HoldLapses { .. } | Step::LeaseLapses { .. } => "lapse",
+            Step::HoldLapses { .. } | Step::BidsLapse { .. } | Step::LeaseLapses { .. } => "lapse",
             Step::GuardEnds(_) => "end of a guard",
+            Step::Deadline { .. } => Self::DEADLINE,
             Step::Restart(_) => "restart",
         }
+    }
+
+    /// What that was due comes about with it.
+    fn due(&self) -> Option<Due> {
+        Some(match self {
+            Step::Record { from, to, .. } => Due::Record(from.clone(), to.clone()),
+            Step::Ack { from, to, .. } => Due::Ack(from.clone(), to.clone()),
+            Step::Occurrence { from, to } => Due::Occurrence(from.clone(), to.clone()),
+            Step::Presence { from, to } => Due::Presence(from.clone(), to.clone()),
+            Step::Twice(step) => return step.due(),
+            Step::Heal(one, other) => Due::Heal(one.clone(), other.clone()),
+            Step::GuardEnds(node) => Due::GuardEnds(node.clone()),
+            Step::Deadline { node, bthread } => Due::Deadline(node.clone(), bthread.clone()),
+            Step::Begin(_) | Step::Cut(..) | Step::Restart(_) => return None,
+            // A lease need not lapse: its holder renews it.
+            Step::HoldLapses { .. } | Step::BidsLapse { .. } | Step::LeaseLapses { .. } => return None,
+        })
     }
 }
 
@@ -431,70 +610,115 @@ impl Model for NetworkModel {
     fn start(&mut self) -> Vec<u32> {
         let network = self.formed();
         let row = self.row(&network);
-        self.waiting.insert(row.clone(), Some(network));
+        self.seen.insert(row.as_slice().into(), Seen::Waiting(Box::new(network)));
         row
     }
 
     fn expand(&mut self, state: &[u32], moves: &mut Moves) {
-        self.present = self.waiting.get_mut(state).and_then(Option::take);
-        let Some(network) = self.present.clone() else { return };
+        self.present = None;
+        let Some(seen) = self.seen.get_mut(state) else { return };
+        let network = match std::mem::replace(seen, Seen::Left(None)) {
+            Seen::Waiting(network) => *network,
+            known @ Seen::Left(_) => {
+                *seen = known;
+                let kept = self.hot_state(state).into_iter().flat_map(|hot| &hot.moves);
+                return kept.for_each(|(label, target)| moves.push(*label, target.iter().copied()));
+            }
+        };
         if network.broken.is_some() {
+            self.present = Some(network);
             return;
         }
-        for step in self.steps(&network) {
+        let steps = self.steps(&network);
+        let due: Vec<u32> = steps.iter().filter_map(Step::due).map(|due| self.dues.number(due)).collect();
+        self.rests = due.is_empty() && network.nodes.values().all(|node| has_begun(node));
+        let hot = self.hot_bthreads(&network);
+        let mut hot_state =
+            (!hot.is_empty()).then(|| Box::new(HotState { hot, due: sorted(due), moves: Vec::new() }));
+        for step in steps {
             for (selected, next) in self.outcomes(&network, &step) {
                 *self.moves.entry(step.kind()).or_default() += 1;
-                let row = self.row(&next);
-                let label = self.label(&step, &selected);
+                let row: Rc<[u32]> = self.row(&next).into();
+                let label = self.label(&step, &selected, &network, &next);
                 moves.push(label, row.iter().copied());
-                self.waiting.entry(row).or_insert(Some(next));
+                if let Some(hot) = &mut hot_state {
+                    hot.moves.push((label, row.clone()));
+                }
+                self.seen.entry(row).or_insert_with(|| Seen::Waiting(Box::new(next)));
             }
         }
+        self.seen.insert(state.into(), Seen::Left(hot_state));
+        self.present = Some(network);
     }
 
     fn fault(&self, _: &[u32], _: bool, inspections: &[Inspection]) -> Option<Fault> {
         let network = self.present.as_ref()?;
         if let Some((node, error)) = &network.broken {
-            let (violator, message) = match error {
-                NodeError::Program(ProgramError::Failed { bthread, message }) => {
-                    (format!("{node}#{bthread}"), message.clone())
-                }
-                error => (node.to_string(), error.to_string()),
-            };
-            let kind = ViolationKind::FailedAssertion { message };
             let wanted = inspections.contains(&Inspection::FailedAssertion);
-            return wanted.then(|| Fault { kind, violators: vec![violator.into()] });
+            return wanted.then(|| Self::assertion_failed(node, error));
         }
         let programs = network.nodes.iter().map(|(name, node)| (name.as_str(), node.program())).collect();
         let view = NetworkView::new(programs);
-        self.invariants.iter().find_map(|invariant| {
+        let broken = self.invariants.iter().find_map(|invariant| {
             let message = (invariant.holds)(&view).err()?;
             let kind = ViolationKind::Invariant { invariant: invariant.name.clone(), message };
             Some(Fault { kind, violators: Vec::new() })
-        })
+        });
+        let at_rest = || {
+            let wanted = inspections.contains(&Inspection::HotTermination);
+            wanted.then(|| self.hot_at_rest(network)).flatten()
+        };
+        broken.or_else(at_rest)
     }
 
-    fn hot(&self, _: &[u32], _: &mut Vec<u32>) {}
+    fn hot(&self, state: &[u32], bthreads: &mut Vec<u32>) {
+        bthreads.extend(self.hot_state(state).into_iter().flat_map(|hot| &hot.hot));
+    }
 
-    fn bthread(&self, _: u32) -> Arc<str> {
-        "".into()
+    fn due(&mut self, state: &[u32], due: &mut Vec<u32>) {
+        due.extend(self.hot_state(state).into_iter().flat_map(|hot| &hot.due));
+    }
+
+    fn brings_about(&self, label: u32) -> &[u32] {
+        self.labels.get(label).map_or(&[], |(_, brings_about)| brings_about)
+    }
+
+    fn bthread(&self, number: u32) -> Arc<str> {
+        self.bthreads.get(number).cloned().unwrap_or_else(|| "".into())
     }
 
     fn event(&self, label: u32) -> Event {
-        self.labels.get(label).cloned().unwrap_or_else(|| Event::new(""))
+        self.labels.get(label).map_or_else(|| Event::new(""), |(event, _)| event.clone())
     }
+}
+
+/// Numbers in order, each once.
+fn sorted(mut numbers: Vec<u32>) -> Vec<u32> {
+    numbers.sort_unstable();
+    numbers.dedup();
+    numbers
 }
 
 impl Member {
     fn node(&self, roster: &[NodeName], incarnation: u64, kept: Kept) -> Node {
         let config = NodeConfig { incarnation, roster: roster.to_vec(), kept, ..self.config.clone() };
-        Node::new(config, self.program.clone())
+        let mut node = Node::new(config, self.program.clone());
+        node.hold_clock();
+        node
     }
 }
 
 impl Network {
     fn wire(&mut self, from: &NodeName, to: &NodeName) -> &mut Wire {
         Rc::make_mut(self.wires.entry((from.clone(), to.clone())).or_default())
+    }
+
+    /// Who must not stay where it is for ever: `node#bthread`.
+    fn hot_bthreads(&self) -> impl Iterator<Item = Arc<str>> {
+        self.nodes.iter().flat_map(|(name, node)| {
+            let hot = node.program().bids().filter(|(_, bid, _)| bid.is_hot());
+            hot.map(move |(bthread, ..)| format!("{name}#{bthread}").into())
+        })
     }
 
     fn with(&mut self, name: &NodeName, change: impl FnOnce(&mut Node)) {
@@ -522,7 +746,8 @@ impl Network {
         let records =
             (0..wire.records.len()).map(|at| Step::Record { from: from.clone(), to: to.clone(), at });
         let mut arrivals: Vec<Step> = records.collect();
-        arrivals.extend(wire.ack.as_ref().map(|_| Step::Ack { from: from.clone(), to: to.clone() }));
+        let ack = |at| Step::Ack { from: from.clone(), to: to.clone(), at };
+        arrivals.extend((0..wire.acks.len()).map(ack));
         let next = wire.occurrences.front();
         arrivals.extend(next.map(|_| Step::Occurrence { from: from.clone(), to: to.clone() }));
         let presence = wire.presence.as_ref();
@@ -533,7 +758,8 @@ impl Network {
     /// Puts what a step has delivered back on its way, as it was `before`: with what it had overtaken, and behind it what
     /// was sent since.
     fn put_again(&mut self, step: &Step, before: BTreeMap<(NodeName, NodeName), Rc<Wire>>) {
-        let (Step::Record { from, to, .. } | Step::Ack { from, to } | Step::Occurrence { from, to }) = step
+        let (Step::Record { from, to, .. } | Step::Ack { from, to, .. } | Step::Occurrence { from, to }) =
+            step
         else {
             return;
         };
@@ -551,7 +777,10 @@ impl Network {
                 };
                 wire.records.extend(since.into_iter().filter(is_new));
             }
-            Step::Ack { .. } => wire.ack = wire.ack.take().or_else(|| before.ack.clone()),
+            Step::Ack { .. } => {
+                let since = std::mem::replace(&mut wire.acks, before.acks.clone());
+                wire.acks.extend(since.into_iter().filter(|ack| !before.acks.contains(ack)));
+            }
             _ => {
                 if let Some(again) = before.occurrences.front() {
                     wire.occurrences.push_front(again.clone());
@@ -573,8 +802,8 @@ impl Network {
         next.map(|(pair, _)| pair.clone())
     }
 
-    /// Puts a message on its way; true if there was no room for it.
-    fn put(&mut self, from: &NodeName, to: &NodeName, message: Message, faults: Faults) -> bool {
+    /// Puts a message on its way.
+    fn put(&mut self, from: &NodeName, to: &NodeName, message: Message, faults: Faults) {
         let wire = self.wire(from, to);
         match message {
             Message::Bid(record) => {
@@ -585,18 +814,38 @@ impl Network {
                     .retain(|older| older.epoch != record.epoch || older.incarnation != record.incarnation);
                 wire.records.push(record);
             }
-            Message::Ack(ack) => wire.ack = Some(ack),
-            Message::Occurrence(occurrence) => {
-                if wire.occurrences.len() >= faults.most_under_way {
-                    return true;
+            Message::Ack(ack) => {
+                if !faults.delay {
+                    wire.acks.clear();
                 }
+                let content = |ack: &BidAck| (ack.home_incarnation, ack.incarnation, ack.epoch);
+                wire.acks.retain(|older| content(older) != content(&ack));
+                wire.acks.push(ack);
+            }
+            Message::Occurrence(occurrence) => {
                 wire.occurrences.push_back(occurrence);
+                self.overflows |= wire.occurrences.len() > faults.most_under_way;
             }
             // Nothing that a wire holds is lost for good, so no wish to hear it again is needed, and a sign of life says
             // nothing new but where it is put by hand.
             Message::Presence(_) | Message::Repair(_) => {}
         }
-        false
+    }
+
+    /// One lapse more of those that there may be, unless this pair's has begun or a partition brings it about.
+    fn pay_for_lapse(&mut self, holder: &NodeName, home: &NodeName) {
+        let has_begun = self.lapsing.remove(&(holder.clone(), home.clone()));
+        if !has_begun && !self.are_cut_off(holder, home) {
+            self.lapses -= 1;
+        }
+    }
+
+    /// What a holder is sure of again does not lapse.
+    fn forget_renewed(&mut self) {
+        let is_sure = |holder: &NodeName, home: &NodeName| {
+            self.nodes.get(holder).is_some_and(|holder| holder.is_sure_of(home))
+        };
+        self.lapsing.retain(|(holder, home)| !is_sure(holder, home));
     }
 }
 
@@ -653,6 +902,9 @@ impl Choices {
         selectable.get(taken).map(|event| program.choose(event, now)).transpose()
     }
 }
+
+#[cfg(test)]
+mod runs;
 
 #[cfg(test)]
 mod tests {

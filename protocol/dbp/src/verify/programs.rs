@@ -2,6 +2,7 @@
 //! them how it is not to be written.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::script::{Op, Script, ScriptError};
@@ -65,6 +66,10 @@ pub fn all() -> Result<Vec<Network>, NetworkError> {
         guarded_resource(2)?,
         guarded_resource(3)?,
         naive_resource(2)?,
+        patient_resource()?,
+        impatient_resource()?,
+        corridor()?,
+        courteous_corridor()?,
         asked_once()?,
         asked_again()?,
     ])
@@ -174,6 +179,105 @@ pub fn naive_resource(count: usize) -> Result<Network, NetworkError> {
         faults: CALM,
         members: members.collect::<Result<_, NetworkError>>()?,
         requirement: Some(("at most one is inside", Arc::new(at_most_one_inside))),
+    })
+}
+
+/// The same place, where each waits only so long for its block to be confirmed: then it withdraws the block, and tries
+/// again later.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn patient_resource() -> Result<Network, NetworkError> {
+    let about =
+        "each blocks the others and awaits confirmation only so long: then it gives way and tries again";
+    claimed("patient right of way", about, true)
+}
+
+/// The same place, where each enters once it has waited long enough, confirmed or not. It is not safe.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn impatient_resource() -> Result<Network, NetworkError> {
+    let about = "each blocks the others and awaits confirmation only so long: then it enters all the same";
+    claimed("impatient right of way", about, false)
+}
+
+fn claimed(name: &'static str, about: &'static str, gives_way: bool) -> Result<Network, NetworkError> {
+    let members = (1..=2).map(|number| {
+        let (node, mut program) = vehicle(number)?;
+        program.add("claim", Claim { node: node.clone(), stage: Stage::Claiming, until: None, gives_way });
+        Ok(Member { config: NodeConfig::new(node, 1, Vec::new()), program, may_restart: false })
+    });
+    Ok(Network {
+        name,
+        about,
+        is_sound: gives_way,
+        // Who states its block again and again may have any number of older records on their way.
+        faults: Faults { delay: false, lapses: 1, ..CALM },
+        members: members.collect::<Result<_, NetworkError>>()?,
+        requirement: Some(("at most one is inside", Arc::new(at_most_one_inside))),
+    })
+}
+
+/// Two vehicles meet in a corridor and say on which side they pass. They do pass, since the first keeps to its side.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn corridor() -> Result<Network, NetworkError> {
+    let heard = || Op::Sync(Bid::new().wait_for("uav/2/right").hot());
+    // It looks up every second; that it may do so for ever, with the answer on its way, is no fault.
+    let looks = Op::Until { set: EventSet::None, within: Some(Duration::from_secs(1)), body: vec![heard()] };
+    let awaits = Op::Until { set: "uav/2/right".into(), within: None, body: vec![Op::forever([looks])] };
+    let keeps = vec![Op::Sync(Bid::new().request("uav/1/left")), awaits];
+    let dodges = vec![
+        Op::Sync(Bid::new().request("uav/2/left")),
+        Op::Sync(Bid::new().wait_for("uav/1/left").hot()),
+        Op::Sync(Bid::new().request("uav/2/right")),
+    ];
+    let about = "two vehicles meet in a corridor; the second dodges, and so they pass";
+    meeting("corridor", about, true, [keeps, dodges])
+}
+
+/// The same meeting, where each dodges when it hears that the other is on the same side. They may dodge for ever.
+///
+/// # Errors
+/// None but for a mistake in this file.
+pub fn courteous_corridor() -> Result<Network, NetworkError> {
+    let dodges = |one: &str, other: &str| {
+        let takes = |side: &str, free: &str| {
+            [
+                Op::Sync(Bid::new().request(format!("{one}/{side}"))),
+                Op::Sync(
+                    Bid::new().wait_for(format!("{other}/left")).wait_for(format!("{other}/right")).hot(),
+                ),
+                Op::On([(format!("{other}/{free}"), vec![Op::Stop])].into()),
+            ]
+        };
+        vec![Op::forever(
+            takes("left", "right").into_iter().chain(takes("right", "left")).collect::<Vec<_>>(),
+        )]
+    };
+    let about = "two vehicles meet in a corridor; each dodges when the other is on its side";
+    meeting("courteous corridor", about, false, [dodges("uav/1", "uav/2"), dodges("uav/2", "uav/1")])
+}
+
+fn meeting(
+    name: &'static str,
+    about: &'static str,
+    is_sound: bool,
+    passing: [Vec<Op>; 2],
+) -> Result<Network, NetworkError> {
+    let members = ["uav/1", "uav/2"].into_iter().zip(passing);
+    let members =
+        members.map(|(node, body)| Ok(Member { may_restart: false, ..scripts(node, &[("passing", body)])? }));
+    Ok(Network {
+        name,
+        about,
+        is_sound,
+        // Who restarts there does not know what was said before.
+        faults: Faults { lapses: 1, partitions: 1, ..CALM },
+        members: members.collect::<Result<_, NetworkError>>()?,
+        requirement: None,
     })
 }
 
@@ -365,9 +469,64 @@ impl BThread for Entrance {
     }
 }
 
+/// Blocks the others' entry, and takes one vehicle in and out again.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+struct Claim {
+    node: NodeName,
+    stage: Stage,
+    /// When its patience is at an end.
+    until: Option<Duration>,
+    /// What it does then.
+    gives_way: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+enum Stage {
+    /// Waits until its block is confirmed.
+    Claiming,
+    Entering,
+    Inside,
+    /// Has withdrawn its block for a while.
+    Yielding,
+}
+
+/// How long it waits for confirmation, and before it tries again.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+impl BThread for Claim {
+    fn bid(&self) -> Option<Bid> {
+        let enter = self.node.event_name("enter");
+        let block = Bid::new().block(EventSet::from("uav/*/enter").and(EventSet::named(&*enter).not()));
+        let bid = match self.stage {
+            Stage::Yielding => Bid::new(),
+            Stage::Claiming => block.wait_for(facts::confirmed(&self.node, "claim")),
+            Stage::Entering => block.request(enter).wait_for(facts::block_lapsed(&self.node, "claim")),
+            Stage::Inside => block.wait_for(facts::block_lapsed(&self.node, "claim")),
+        };
+        Some(self.until.into_iter().fold(bid, Bid::deadline))
+    }
+
+    fn start(&mut self, cx: &mut Context) {
+        self.until = Some(cx.now() + PATIENCE);
+    }
+
+    fn resume(&mut self, event: &Event, cx: &mut Context) {
+        self.stage = match (self.stage, event.kind()) {
+            (Stage::Yielding, _) => Stage::Claiming,
+            (Stage::Claiming, facts::CONFIRMED) => Stage::Entering,
+            (Stage::Claiming, _) if !self.gives_way => Stage::Entering,
+            (Stage::Entering, kind) if kind != facts::BLOCK_LAPSED => Stage::Inside,
+            _ => Stage::Yielding,
+        };
+        let waits = matches!(self.stage, Stage::Yielding | Stage::Claiming);
+        self.until = waits.then(|| cx.now() + PATIENCE);
+    }
+}
+
 fn at_most_one_inside(view: &NetworkView<'_>) -> Result<(), String> {
     let inside = view.programs().filter(|(_, program)| {
         program.state_of::<Entrance>("entrance").is_some_and(|entrance| entrance.place == Place::Inside)
+            || program.state_of::<Claim>("claim").is_some_and(|claim| claim.stage == Stage::Inside)
     });
     let names: Vec<&str> = inside.map(|(name, _)| name).collect();
     if names.len() > 1 { Err(format!("{} are inside", names.join(" and "))) } else { Ok(()) }

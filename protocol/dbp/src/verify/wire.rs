@@ -6,12 +6,12 @@ use super::row::{Family, Part, Row};
 use crate::node::Node;
 use crate::{BidAck, BidRecord, NodeName, Occurrence, Presence};
 
-/// Messages from one node to another that have not arrived. Of records any may arrive next, and then older ones count no
-/// more; of acknowledgements and presences only the newest counts; occurrences arrive in order, since holes are repaired.
+/// Messages from one node to another that have not arrived. Of records and of acknowledgements any may arrive next, and then
+/// older ones count no more; of presences only the newest counts; occurrences arrive in order, since holes are repaired.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Wire {
     pub(super) records: Vec<BidRecord>,
-    pub(super) ack: Option<BidAck>,
+    pub(super) acks: Vec<BidAck>,
     pub(super) occurrences: VecDeque<Occurrence>,
     pub(super) presence: Option<Presence>,
 }
@@ -22,6 +22,8 @@ impl Wire {
             row.plain(record.incarnation);
             row.optional(record.home_incarnation);
             row.number(Family::Epoch(from.clone(), record.incarnation, to.name().clone()), record.epoch);
+            // A copy that has been taken in does not count again, but a newer one of the same content does.
+            row.flag(to.has_taken_in(record));
             let since = to.occurred_since(record.applied);
             row.list(&record.bids, |row, bid| {
                 row.bid(from, record.incarnation, bid);
@@ -29,7 +31,7 @@ impl Wire {
                 row.flag(since.iter().any(|event| bid.requests.contains(event)));
             });
         });
-        row.list(&self.ack, |row, ack| {
+        row.list(&self.acks, |row, ack| {
             row.plain(ack.incarnation);
             row.plain(ack.home_incarnation);
             row.number(Family::Epoch(to.name().clone(), ack.incarnation, from.clone()), ack.epoch);
