@@ -79,6 +79,12 @@ fn wrong_input_ends_with_2_and_names_what_was_expected() {
 }
 
 #[test]
+fn as_many_states_as_are_looked_at_unless_given_find_what_is_deepest() {
+    let network = json(&verify(&["--network", "asked again", "--json"]))["networks"][0].clone();
+    assert!(network["must_hold"] == false && network["as_expected"] == true, "{network}");
+}
+
+#[test]
 fn a_network_tells_its_moves() {
     let output = verify(&["--network", "naive right of way", "--json"]);
     assert_eq!(output.status.code(), Some(0), "{output:?}");

@@ -386,7 +386,7 @@ mod tests {
             ("[envelope]", "[[airspace.no_fly]]\ncentre_m = [1.0, 2.0]\n[envelope]", "`airspace.no_fly[0]`"),
             (
                 "[envelope]",
-                "[[airspace.no_fly]]\ncorners_m = [[9.0, 9.0], [20.0, 9.0], [20.0, 25.0]]\n[envelope]",
+                "[[airspace.no_fly]]\ncorners_m = [[9.0, 9.0], [20.0, 9.0], [20.0, 25.0], [9.0, 25.0]]\n[envelope]",
                 "`mission.waypoints`: number 2",
             ),
             ("#return_altitude_m = 4.0", "return_altitude_m = 40.0", "`mission.return_altitude_m`"),

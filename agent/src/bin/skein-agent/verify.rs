@@ -21,7 +21,7 @@ use crate::config::Config;
 /// States of a scene that are looked at unless told otherwise.
 const STATES_OF_SCENE: usize = 1_000_000;
 /// States of a network that are looked at unless told otherwise.
-const STATES_OF_NETWORK: usize = 20_000;
+const STATES_OF_NETWORK: usize = 50_000;
 /// States that are drawn unless told otherwise.
 const STATES_DRAWN: usize = 1_000;
 
