@@ -320,9 +320,12 @@ fn a_task_that_cannot_be_done_is_refused_with_why() {
     let targets = "[targets]\nfrom_m = [[0, 0], [0, 20]]\nplaces_m = [[40, 10, 5]]\nspacing_m = 4\n";
     assert!(refusal(targets).contains("[bounds]"));
     let bounds = "[bounds]\nmin_m = [-5, -5, -1]\nmax_m = [45, 25, 15]\n";
-    let mountain = "[[targets.mountain]]\ncentre_m = [40, 10]\nheight_m = 10\nslope_m = 5\n";
+    let mountain = "[[airspace.mountain]]\ncentre_m = [40, 10]\nheight_m = 10\nslope_m = [5, 5]\n";
     let error = refusal(&format!("{bounds}{targets}{mountain}"));
     assert!(error.contains("no route was found for vehicle"), "the target is in the mountain: {error}");
+    let triangle = "[[airspace.no_fly]]\ncorners_m = [[10, 5], [20, 5], [20, 15]]\n";
+    let error = refusal(&format!("{bounds}{targets}{triangle}"));
+    assert!(error.contains("`airspace.no_fly`"), "{error}");
 }
 
 #[test]

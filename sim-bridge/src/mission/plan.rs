@@ -35,11 +35,12 @@ pub fn read(root: &Node<'_>, datum: Option<Datum>) -> Result<MissionSet, Mission
     if let Some(fence) = root.optional("geoFence") {
         reader.geofence(&fence)?;
     }
+    let zones = KeepOut::new(reader.airspace.clone(), 0.0, 0.0);
     let items = mission.member("items")?;
     for item in items.elements()? {
         let before = reader.mission.waypoints.len();
         reader.item(&item)?;
-        reader.check_zones(&item, before)?;
+        reader.check_zones(&item, before, &zones)?;
     }
     if reader.mission.waypoints.is_empty() {
         return Err(items.error("at least one waypoint (command 16)", "none"));
@@ -132,8 +133,7 @@ impl Reader {
     }
 
     /// Refuses an item that leads into a zone; `before` is how many waypoints there were before it.
-    fn check_zones(&self, item: &Node<'_>, before: usize) -> Result<(), MissionError> {
-        let zones = KeepOut::new(self.airspace.clone(), 0.0, 0.0);
+    fn check_zones(&self, item: &Node<'_>, before: usize, zones: &KeepOut) -> Result<(), MissionError> {
         let added = self.mission.waypoints.get(before..).unwrap_or_default();
         match added.iter().find(|waypoint| zones.room_m(&waypoint.position) < 0.0) {
             None => Ok(()),

@@ -18,6 +18,7 @@ use super::field;
 use super::forest::Forest;
 use super::formation::Formation;
 use super::layout::Layout;
+use super::mountain;
 use super::open::Open;
 use super::targets::{PacedRoute, Targets};
 use super::window::Window;
@@ -407,7 +408,7 @@ impl ScenarioFile {
         let (Some(targets), Some(bounds)) = (&table.targets, &table.bounds) else { return Ok(None) };
         let bounds = Aabb { min: bounds.min_m, max: bounds.max_m };
         let (height_m, cruise_m_s) = (self.takeoff_height_m(), self.cruise_speed_m_s());
-        let routes = targets.routes(vehicles, &bounds, height_m, cruise_m_s, seed);
+        let routes = targets.routes(vehicles, &bounds, &self.airspace()?, height_m, cruise_m_s, seed);
         routes.map(Some).map_err(|error| self.contradiction("targets", error.to_string()))
     }
 
@@ -474,15 +475,10 @@ impl ScenarioFile {
         }
     }
 
-    /// What is known of the airspace: the table's, and what targets are reached through.
+    /// What is known of the airspace.
     fn airspace(&self) -> Result<Airspace, ScenarioError> {
         let checked = self.table.airspace.check();
-        let mut airspace = checked
-            .map_err(|error| self.contradiction(format!("airspace.{}", error.field), error.problem))?;
-        if let Some(targets) = &self.table.targets {
-            airspace.include(targets.airspace());
-        }
-        Ok(airspace)
+        checked.map_err(|error| self.contradiction(format!("airspace.{}", error.field), error.problem))
     }
 
     /// Stated bounds are part of the scenario, and so are those of a generated world; but an empty field has no edge.
@@ -493,7 +489,10 @@ impl ScenarioFile {
 
     fn obstacles(&self) -> Result<Vec<Obstacle>, ScenarioError> {
         let own = self.table.obstacle.iter().enumerate().map(|(i, table)| self.obstacle(i, table));
-        own.chain(self.table.targets.iter().flat_map(Targets::obstacles).map(Ok)).collect()
+        let airspace = self.airspace()?;
+        let mountains = (1..).zip(&airspace.mountains);
+        own.chain(mountains.flat_map(|(number, mountain)| mountain::steps(number, mountain)).map(Ok))
+            .collect()
     }
 
     fn obstacle(&self, index: usize, table: &ObstacleTable) -> Result<Obstacle, ScenarioError> {

@@ -12,6 +12,7 @@ mod file;
 mod forest;
 mod formation;
 mod layout;
+mod mountain;
 mod open;
 pub(crate) mod placement;
 mod targets;
@@ -331,9 +332,10 @@ impl Scenario {
     /// ground; a waypoint in a no-fly zone, in a threat or in known terrain; starts or goals so close that vehicles would touch.
     pub fn validate(&self) -> Result<(), ScenarioError> {
         check_count(&self.name, self.vehicles.len())?;
+        let zones = KeepOut::new(self.airspace.clone(), 0.0, 0.0);
         for (i, vehicle) in self.vehicles.iter().enumerate() {
             self.check_start(i + 1, vehicle)?;
-            self.check_waypoints(i + 1, vehicle)?;
+            self.check_waypoints(i + 1, vehicle, &zones)?;
         }
         self.check_spacing("start", |v| v.start)?;
         self.check_spacing("goal", VehiclePlan::goal)
@@ -354,7 +356,12 @@ impl Scenario {
         }
     }
 
-    fn check_waypoints(&self, number: usize, vehicle: &VehiclePlan) -> Result<(), ScenarioError> {
+    fn check_waypoints(
+        &self,
+        number: usize,
+        vehicle: &VehiclePlan,
+        zones: &KeepOut,
+    ) -> Result<(), ScenarioError> {
         if vehicle.waypoints.is_empty() {
             return Err(ScenarioError::NoWaypoints { vehicle: number });
         }
@@ -365,7 +372,7 @@ impl Scenario {
             if waypoint.z <= 0.0 {
                 return Err(ScenarioError::BelowGround { vehicle: number, what, position: waypoint });
             }
-            if KeepOut::new(self.airspace.clone(), 0.0, 0.0).room_m(&waypoint) < 0.0 {
+            if zones.room_m(&waypoint) < 0.0 {
                 return Err(ScenarioError::Closed { vehicle: number, what, position: waypoint });
             }
         }

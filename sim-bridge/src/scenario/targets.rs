@@ -1,23 +1,21 @@
-//! `[targets]`: the vehicles fly through terrain, threats and no-fly zones that are known beforehand, and arrive at their
-//! targets together (P3). Their routes are planned before take-off, as the ground plans: each among those before it.
+//! `[targets]`: the vehicles fly through the terrain, threats and no-fly zones of `[airspace]`, and arrive at their targets
+//! together (P3). Their routes are planned before take-off, as the ground plans: each among those before it.
 
-use nalgebra::{Isometry3, Vector2, Vector3};
+use nalgebra::Vector3;
 use serde::Deserialize;
-use skein_planning::airspace::{Airspace, Mountain, NoFlyZone, ThreatZone};
+use skein_planning::airspace::{Airspace, NoFlyZone, ThreatZone};
 use skein_planning::assignment::assign;
 use skein_planning::route::{
     Effort, Planner, RouteCost, RouteError, arrival_slots, arrive_together, plan_in_turn,
 };
-use skein_world::{Aabb, Obstacle, Shape};
+use skein_world::Aabb;
 
-use super::field::{ground_point, ground_points, non_negative, points, positive};
+use super::field::{ground_points, points, positive};
 
 /// Inner waypoints of a route.
 const WAYPOINTS: usize = 6;
 /// How far routes stay out of threat and no-fly zones: what a vehicle strays from its route, and its hull, in metres.
 const MARGIN_M: f64 = 1.5;
-/// Height of the steps that a mountain is built of, in metres.
-const STEP_M: f64 = 1.0;
 /// How many times slower than at cruise a vehicle may fly so that all arrive together.
 const SLOWEST: f64 = 2.0;
 
@@ -34,45 +32,6 @@ pub struct Targets {
     /// Distance between vehicles at one target, in metres.
     #[serde(deserialize_with = "positive")]
     spacing_m: f64,
-    #[serde(default)]
-    mountain: Vec<MountainTable>,
-    #[serde(default)]
-    threat: Vec<ThreatTable>,
-    #[serde(default)]
-    no_fly: Vec<NoFlyTable>,
-}
-
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct MountainTable {
-    #[serde(deserialize_with = "ground_point")]
-    centre_m: Vector3<f64>,
-    #[serde(deserialize_with = "positive")]
-    height_m: f64,
-    #[serde(deserialize_with = "positive")]
-    slope_m: f64,
-}
-
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ThreatTable {
-    #[serde(deserialize_with = "ground_point")]
-    centre_m: Vector3<f64>,
-    #[serde(deserialize_with = "positive")]
-    radius_m: f64,
-}
-
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct NoFlyTable {
-    #[serde(deserialize_with = "ground_point")]
-    centre_m: Vector3<f64>,
-    #[serde(deserialize_with = "positive")]
-    radius_m: f64,
-    #[serde(default, deserialize_with = "non_negative")]
-    floor_m: f64,
-    #[serde(deserialize_with = "positive")]
-    ceiling_m: f64,
 }
 
 /// Why there are no routes.
@@ -84,6 +43,11 @@ pub enum TargetsError {
     /// There is nowhere to fly.
     #[error("expected at least one target")]
     NoTarget,
+    /// A zone that routes cannot be planned around.
+    #[error(
+        "routes are planned around circles: expected `centre_m` and `radius_m` for each of `airspace.no_fly`"
+    )]
+    Polygon,
     /// A start or a target is no place to plan from or to.
     #[error(transparent)]
     Route(#[from] RouteError),
@@ -112,11 +76,15 @@ impl Targets {
         &self,
         vehicles: usize,
         bounds: &Aabb,
+        airspace: &Airspace,
         height_m: f64,
         cruise_m_s: f64,
         seed: u64,
     ) -> Result<Vec<PacedRoute>, TargetsError> {
-        let airspace = self.within(bounds);
+        if !airspace.prisms.is_empty() {
+            return Err(TargetsError::Polygon);
+        }
+        let airspace = keeping_off(airspace, bounds);
         let ends = self.ends(vehicles, height_m, &airspace)?;
         let cost = cost(cruise_m_s);
         let plans = plan_in_turn(&airspace, cost, &ends, WAYPOINTS, |vehicle, problem| {
@@ -131,41 +99,6 @@ impl Targets {
         let slowed = arrive_together(&times_s, SLOWEST).slowed;
         let paced = plans.into_iter().zip(slowed);
         Ok(paced.map(|(plan, slowed)| PacedRoute { route: plan.route, pace: 1.0 / slowed }).collect())
-    }
-
-    /// What is known of the airspace, without a box.
-    pub fn airspace(&self) -> Airspace {
-        self.grown(0.0)
-    }
-
-    /// What routes keep clear of, grown by the margin, in the bounds without it.
-    fn within(&self, bounds: &Aabb) -> Airspace {
-        let inset = Vector3::repeat(MARGIN_M);
-        Airspace { lower: bounds.min + inset, upper: bounds.max - inset, ..self.grown(MARGIN_M) }
-    }
-
-    fn grown(&self, margin_m: f64) -> Airspace {
-        let mountain = |table: &MountainTable| Mountain {
-            centre: table.centre_m.xy(),
-            height_m: table.height_m,
-            slope_m: Vector2::repeat(table.slope_m),
-        };
-        let threat = |table: &ThreatTable| ThreatZone {
-            centre: table.centre_m.xy(),
-            radius_m: table.radius_m + margin_m,
-        };
-        let no_fly = |table: &NoFlyTable| NoFlyZone {
-            centre: table.centre_m.xy(),
-            radius_m: table.radius_m + margin_m,
-            floor_m: table.floor_m - margin_m,
-            ceiling_m: table.ceiling_m + margin_m,
-        };
-        Airspace {
-            mountains: self.mountain.iter().map(mountain).collect(),
-            threats: self.threat.iter().map(threat).collect(),
-            no_fly: self.no_fly.iter().map(no_fly).collect(),
-            ..Airspace::default()
-        }
     }
 
     /// From where to where each vehicle flies, so assigned that the straight ways are shortest together.
@@ -185,27 +118,24 @@ impl Targets {
         let taken = assign(&distances).ok_or(TargetsError::NoTarget)?;
         Ok(starts.into_iter().zip(taken.into_iter().filter_map(|slot| slots.get(slot).copied())).collect())
     }
+}
 
-    /// The mountains as one can hit them: round steps inside of them.
-    pub fn obstacles(&self) -> Vec<Obstacle> {
-        let steps = |(number, table): (usize, &MountainTable)| {
-            let count = (table.height_m / STEP_M).ceil().max(1.0);
-            let rise_m = table.height_m / count;
-            let step = move |k: usize, centre: Vector3<f64>, slope_m: f64| {
-                // z = h exp(-(r / s)^2), at the step's upper edge.
-                let radius = slope_m * (count / (k as f64 + 1.0)).ln().sqrt();
-                let middle = centre + Vector3::z() * ((k as f64 + 0.5) * rise_m);
-                Obstacle {
-                    name: format!("mountain {} step {}", number + 1, k + 1),
-                    shape: Shape::Cylinder { radius, half_height: 0.5 * rise_m },
-                    pose: Isometry3::translation(middle.x, middle.y, middle.z),
-                }
-            };
-            let (centre, slope_m) = (table.centre_m, table.slope_m);
-            // The last would be the peak, a point.
-            (0..(count as usize).saturating_sub(1)).map(move |k| step(k, centre, slope_m))
-        };
-        self.mountain.iter().enumerate().flat_map(steps).collect()
+/// What routes keep clear of: the round zones grown by the margin, in the bounds without it.
+fn keeping_off(airspace: &Airspace, bounds: &Aabb) -> Airspace {
+    let inset = Vector3::repeat(MARGIN_M);
+    let threat = |zone: &ThreatZone| ThreatZone { radius_m: zone.radius_m + MARGIN_M, ..*zone };
+    let no_fly = |zone: &NoFlyZone| NoFlyZone {
+        radius_m: zone.radius_m + MARGIN_M,
+        floor_m: zone.floor_m - MARGIN_M,
+        ceiling_m: zone.ceiling_m + MARGIN_M,
+        ..*zone
+    };
+    Airspace {
+        lower: bounds.min + inset,
+        upper: bounds.max - inset,
+        threats: airspace.threats.iter().map(threat).collect(),
+        no_fly: airspace.no_fly.iter().map(no_fly).collect(),
+        ..airspace.clone()
     }
 }
 
