@@ -329,6 +329,14 @@ fn a_task_that_cannot_be_done_is_refused_with_why() {
 }
 
 #[test]
+fn more_vehicles_than_a_scenario_counts_with_have_time_to_take_off() -> Result<(), ScenarioError> {
+    let limit_s = |vehicles| Scenario::built_in("forest", vehicles, 1).map(|forest| forest.time_limit_s);
+    assert_eq!([limit_s(Some(2))?, limit_s(Some(8))?], [limit_s(None)?; 2]);
+    assert_eq!(limit_s(Some(108))?, limit_s(None)? + 300.0);
+    Ok(())
+}
+
+#[test]
 fn targets_are_shared_and_reached_at_one_time() -> Result<(), ScenarioError> {
     let valley = Scenario::built_in("valley", None, 7)?;
     assert!(valley.muster);

@@ -30,6 +30,8 @@ use crate::mission;
 
 const DEFAULT_VEHICLES: usize = 4;
 const DEFAULT_MODEL: &str = "x500";
+/// How much later the next vehicle takes off, with a little to spare, in seconds.
+const LAUNCH_S: f64 = 3.0;
 const DEFAULT_CRUISE_SPEED_M_S: f64 = 3.0;
 const DEFAULT_TAKEOFF_HEIGHT_M: f64 = 3.0;
 
@@ -234,6 +236,7 @@ impl ScenarioFile {
         let scripts = self.scripts(count)?;
         let airspace = self.airspace()?;
         let fixed_bounds = self.fixed_bounds();
+        let time_limit_s = self.time_limit_s(count.saturating_sub(self.count(None, set.missions.len())));
         let (cruise_speed_m_s, takeoff_height_m) = (self.cruise_speed_m_s(), self.takeoff_height_m());
         let table = self.table;
         let mut scenario = Scenario {
@@ -248,7 +251,7 @@ impl ScenarioFile {
             cruise_speed_m_s,
             local: table.local,
             takeoff_height_m,
-            time_limit_s: table.time_limit_s.unwrap_or(DEFAULT_TIME_LIMIT_S),
+            time_limit_s,
             wind: table.wind.map(WindConfig::from).unwrap_or_default(),
             orders,
             scripts,
@@ -310,6 +313,11 @@ impl ScenarioFile {
     fn has_task(&self) -> bool {
         let table = &self.table;
         table.coverage.is_some() || table.formation.is_some() || table.targets.is_some()
+    }
+
+    /// The limit for so many vehicles more than the file counts with, which take off one after another.
+    fn time_limit_s(&self, more: usize) -> f64 {
+        self.table.time_limit_s.unwrap_or(DEFAULT_TIME_LIMIT_S) + LAUNCH_S * more as f64
     }
 
     fn cruise_speed_m_s(&self) -> f64 {
