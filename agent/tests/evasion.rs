@@ -9,6 +9,7 @@ use skein_agent::pipeline::guidance::{Guidance, Motion, Surroundings};
 use skein_agent::pipeline::perception::Perception;
 use skein_agent::{Envelope, Fence, Planners};
 use skein_mav::SetPoint;
+use skein_planning::airspace::{Airspace, KeepOut, NoFlyPrism};
 use skein_planning::separation::Neighbour;
 
 const FENCE: Fence = Fence { min: [-20.0, -20.0, 0.0], max: [20.0, 20.0, 12.0] };
@@ -29,9 +30,22 @@ fn around(place: Vector3<f64>, count: u32, distance_m: f64) -> Vec<Neighbour> {
     (0..count).map(neighbour).collect()
 }
 
+fn perception() -> Perception {
+    Perception::new(&FENCE, Vector3::zeros(), [0.6, 8.0]).unwrap()
+}
+
 /// The set-points of the first second at `place`, among neighbours that stand around it.
 fn second_among(place: Vector3<f64>, neighbours: &[Neighbour], rank: u32) -> Vec<SetPoint> {
-    let perception = Perception::new(&FENCE, Vector3::zeros(), [0.6, 8.0]).unwrap();
+    second_in(&perception(), place, neighbours, rank)
+}
+
+/// The same in a world of which something is known.
+fn second_in(
+    perception: &Perception,
+    place: Vector3<f64>,
+    neighbours: &[Neighbour],
+    rank: u32,
+) -> Vec<SetPoint> {
     let mut guidance = Guidance::new(Envelope::default(), FENCE, Planners::default());
     let motion = Motion { position: place, velocity: Vector3::zeros() };
     let surroundings = Surroundings { map: perception.map(), obstacles: &[], neighbours, rank };
@@ -67,4 +81,25 @@ fn near_the_ground_it_does_not_sink_and_under_the_ceiling_it_does_not_climb() {
 fn with_room_between_the_others_it_keeps_its_height() {
     let place = Vector3::new(0.0, 0.0, 4.0);
     assert!(second_among(place, &around(place, 3, 2.5), 0).iter().all(|set_point| climb(set_point) == 0.0));
+}
+
+#[test]
+fn it_enters_a_zone_rather_than_touch_somebody() {
+    // A narrow bay, open to the west.
+    let bay = [[-9, -9], [9, -9], [9, 9], [-9, 9]].map(|corner| corner.map(f64::from));
+    let shore = [[-9.0, 0.3], [0.3, 0.3], [0.3, -0.3], [-9.0, -0.3]];
+    let zone = NoFlyPrism {
+        corners: bay.into_iter().chain(shore).map(Into::into).collect(),
+        floor_m: f64::NEG_INFINITY,
+        ceiling_m: f64::INFINITY,
+    };
+    let airspace = Airspace { prisms: vec![zone], ..Airspace::default() };
+    let knowing = perception().with_keep_out(KeepOut::new(airspace, 0.0, 1.0));
+    let place = Vector3::new(0.0, 0.0, 4.0);
+    // Somebody who does not give way comes into the bay.
+    let mut intruder = around(place, 2, 2.0)[1];
+    (intruder.velocity, intruder.cooperative) = (Vector3::new(1.0, 0.0, 0.0), false);
+    let first = second_in(&knowing, place, &[intruder], 0)[0];
+    assert!(matches!(first, SetPoint::Planar { vx, .. } if vx > 0.2), "{first:?}");
+    assert_eq!(first, second_among(place, &[intruder], 0)[0], "the zone does not count then");
 }

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use skein_planning::Path;
+use skein_planning::airspace::{Airspace, KeepOut, NoFlyZone};
 use skein_planning::global::astar::{Astar, AstarConfig, Disc, Plan, PlanError, Request, plan};
 use skein_planning::global::{Potential, PotentialObstacle, elide_collinear, simplify};
 use skein_planning::map::{ClearanceMap, VoxelMapConfig};
@@ -305,4 +306,44 @@ fn a_search_does_not_remember_the_last_one() {
 fn where_start_is_goal_the_path_is_a_point() {
     let found = run(&mut grid([5, 5, 1], &[]), [2, 2, 0], [2, 2, 0], &shortest()).unwrap();
     assert_eq!(found.path, Path::new(vec![centre([2, 2, 0])]).unwrap());
+}
+
+/// A grid of 24 x 24 x 3 cells whose middle is closed: a circle of 5 m and a margin of 1 m.
+fn with_closed_middle() -> ClearanceMap {
+    let zone = NoFlyZone {
+        centre: nalgebra::Vector2::new(12.0, 12.0),
+        radius_m: 5.0,
+        floor_m: f64::NEG_INFINITY,
+        ceiling_m: f64::INFINITY,
+    };
+    let airspace = Airspace { no_fly: vec![zone], ..Airspace::default() };
+    grid([24, 24, 3], &[]).with_keep_out(KeepOut::new(airspace, 1.0, 0.0))
+}
+
+/// How far the cells of a path are from what is closed, metres.
+fn rooms_m(map: &ClearanceMap, plan: &Plan) -> Vec<f64> {
+    plan.path.points().iter().map(|point| map.keep_out().unwrap().room_m(point)).collect()
+}
+
+#[test]
+fn what_is_closed_is_gone_around() {
+    let mut map = with_closed_middle();
+    let plan = run(&mut map, [1, 12, 1], [22, 12, 1], &shortest()).unwrap();
+    assert!(rooms_m(&map, &plan).iter().all(|room_m| *room_m >= 0.0), "{:?}", plan.path);
+    let mut open = grid([24, 24, 3], &[]);
+    assert!(
+        run(&mut open, [1, 12, 1], [22, 12, 1], &shortest()).unwrap().path.length_m() < plan.path.length_m()
+    );
+}
+
+#[test]
+fn what_is_closed_is_left_by_about_the_shortest_way_and_is_no_goal() {
+    let mut map = with_closed_middle();
+    let plan = run(&mut map, [9, 12, 1], [22, 12, 1], &shortest()).unwrap();
+    let rooms = rooms_m(&map, &plan);
+    let out = rooms.iter().position(|room_m| *room_m >= 0.0).unwrap();
+    assert!(rooms[..out].is_sorted() && out <= 5, "straight out: {rooms:?}");
+    assert!(rooms[out..].iter().all(|room_m| *room_m >= 0.0), "and not back in: {rooms:?}");
+    let refused = run(&mut map, [1, 12, 1], [12, 12, 1], &shortest());
+    assert!(matches!(refused, Err(PlanError::GoalClosed { .. })), "{refused:?}");
 }
