@@ -488,12 +488,11 @@ impl Guidance {
         let mut desired = apf::limited(wish.velocity + push, self.envelope.cruise_m_s);
         desired.z =
             if is_level { 0.0 } else { desired.z.clamp(-self.envelope.climb_m_s, self.envelope.climb_m_s) };
-        let has_leave = now <= self.leave_until;
         let request = separation::Motion {
             position: motion.position,
             velocity: motion.velocity,
             sigma_m: POSITION_SIGMA_M,
-            desired: if has_leave { self.local.ease(desired) } else { desired },
+            desired: self.local.ease(desired),
             planar: is_level,
         };
         let Kept { velocity, evades } = self.keep_apart(now, request, &others, surroundings);

@@ -24,14 +24,17 @@ use crate::config::{Envelope, Layer, LocalPlanner, Planners};
 const TICK_S: f64 = 0.02;
 /// How far ahead the way is looked at for the speed cap, m.
 const SENSED_AHEAD_M: f64 = 9.0;
-/// Change of velocity that is asked for in openings, m/s^2: a pitch of 3.5 degrees, which leaves the autopilot something of 5.
-const GENTLE_M_S2: f64 = 0.6;
+/// Change of velocity that is asked for in openings, m/s^2: a pitch of 2.6 degrees, which leaves the autopilot something of 5.
+const GENTLE_M_S2: f64 = 0.45;
+/// Deceleration that slowing down in openings is planned with, m/s^2: it leaves as much for turning.
+const GENTLE_BRAKE_M_S2: f64 = 0.7 * GENTLE_M_S2;
 /// Openings are looked for among what is within this distance, m.
 const OPENINGS_M: f64 = 8.0;
-/// Openings keep this much more from obstacles than the safety filter does, m, so that it need not act.
-const BESIDE_FILTER_M: f64 = 0.05;
-/// What is this much further aside than openings keep does not stand in the way, m.
-const BESIDE_WAY_M: f64 = 0.05;
+/// A scan may show an obstacle this much nearer than the one before did, m: who is no faster than that allows is not stopped
+/// short by the safety filter.
+const BESIDE_FILTER_M: f64 = 0.2;
+/// What is this much further aside than the safety filter keeps does not stand in the way, m.
+const BESIDE_WAY_M: f64 = 0.1;
 /// Openings that are wide enough are passed at this distance, m.
 const COMFORT_M: f64 = 0.8;
 
@@ -55,7 +58,7 @@ impl Local {
         let avoids = planners.without != Some(Layer::LocalAvoidance);
         let openings =
             (avoids && planners.local == LocalPlanner::Vfh).then(|| gentle_follower(envelope, filter_m));
-        let brake_m_s2 = if openings.is_some() { GENTLE_M_S2 } else { envelope.brake_m_s2 };
+        let brake_m_s2 = if openings.is_some() { GENTLE_BRAKE_M_S2 } else { envelope.brake_m_s2 };
         let field = ApfConfig::default();
         let repulsive_gain = if avoids { field.repulsive_gain } else { 0.0 };
         Self {
@@ -152,18 +155,18 @@ impl Local {
     /// Where a vehicle that moves like this comes to a stop, metres ENU.
     #[must_use]
     pub fn stop(&self, position: &Vector3<f64>, velocity: &Vector3<f64>) -> Vector3<f64> {
-        position + velocity * (velocity.norm() / (2.0 * self.braking.decel_m_s2)).min(1.0)
+        position + velocity * (velocity.norm() / (2.0 * self.braking.decel_m_s2))
     }
 }
 
 fn gentle_follower(envelope: &Envelope, filter_m: f64) -> Follower {
-    let clearance_m = filter_m + BESIDE_FILTER_M;
     let speed = SpeedConfig {
         hard_m_s2: envelope.brake_m_s2,
         latency_s: envelope.latency_s,
         gentle_m_s2: GENTLE_M_S2,
-        clearance_m,
-        corridor_m: clearance_m + BESIDE_WAY_M,
+        brake_m_s2: GENTLE_BRAKE_M_S2,
+        clearance_m: filter_m + BESIDE_FILTER_M,
+        corridor_m: filter_m + BESIDE_WAY_M,
         ..SpeedConfig::default().cruising_at(envelope.cruise_m_s)
     };
     let safety_radius_m = envelope.hull_m + envelope.margin_m;

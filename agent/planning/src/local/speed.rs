@@ -22,6 +22,8 @@ pub struct SpeedConfig {
     pub beside_m_s: f64,
     /// Acceleration that the set-point never exceeds, in any direction, m/s^2. 0.86 is a pitch of 5 degrees.
     pub gentle_m_s2: f64,
+    /// Deceleration that slowing down is planned with, m/s^2: what it is less than `gentle_m_s2` is left for turning meanwhile.
+    pub brake_m_s2: f64,
     /// Deceleration that the vehicle is capable of in need, m/s^2.
     pub hard_m_s2: f64,
     /// Time from a thing being there to the vehicle beginning to brake, seconds.
@@ -55,7 +57,8 @@ impl Default for SpeedConfig {
             start_share: 0.3,
             slow_down_shape: 0.8,
             beside_m_s: 0.5,
-            gentle_m_s2: 0.6,
+            gentle_m_s2: 0.5,
+            brake_m_s2: 0.35,
             hard_m_s2: 2.5,
             latency_s: 0.3,
             clearance_m: 0.35,
@@ -127,22 +130,27 @@ pub fn speed_to_stop(
         if stands { along_m - config.corridor_m } else { f64::INFINITY }
     };
     let free_m = obstacles.iter().map(free_m).fold(f64::INFINITY, f64::min);
-    stopping_speed(free_m, config.gentle_m_s2, config.latency_s)
+    stopping_speed(free_m, config.brake_m_s2, config.latency_s)
 }
 
 /// Speed, m/s, from which one slows down gently to `speed_m_s` over `way_m`.
 #[must_use]
 pub fn run_up(speed_m_s: f64, way_m: f64, config: &SpeedConfig) -> f64 {
-    let lag = config.gentle_m_s2 * config.latency_s;
+    let lag = config.brake_m_s2 * config.latency_s;
     let way_m = (way_m - speed_m_s * config.latency_s).max(0.0);
-    ((lag * lag + speed_m_s * speed_m_s + 2.0 * config.gentle_m_s2 * way_m).sqrt() - lag).max(speed_m_s)
+    ((lag * lag + speed_m_s * speed_m_s + 2.0 * config.brake_m_s2 * way_m).sqrt() - lag).max(speed_m_s)
 }
 
 /// The next velocity of a set-point that was `previous`, on its way to `wanted`, after `step_s`: it turns and changes its
-/// speed by no more than `accel_m_s2`.
+/// speed by no more than `accel_m_s2`. Slowing down comes first: who turns away from what is ahead has not yet passed it.
 #[must_use]
 pub fn step(previous: &Vector3<f64>, wanted: &Vector3<f64>, step_s: f64, accel_m_s2: f64) -> Vector3<f64> {
-    previous + limited(wanted - previous, accel_m_s2 * step_s)
+    let most = accel_m_s2 * step_s;
+    let speed = previous.norm();
+    let slower = (speed - wanted.norm()).clamp(0.0, most);
+    let slowed = if speed > 0.0 { previous * (1.0 - slower / speed) } else { *previous };
+    let turned = slowed + limited(wanted - slowed, (most * most - slower * slower).sqrt());
+    previous + limited(turned - previous, most)
 }
 
 #[cfg(test)]
@@ -190,7 +198,7 @@ mod tests {
             speed_to_stop(&Vector3::new(0.0, 0.0, 3.0), &Vector3::x(), &obstacle, &config)
         };
         assert_eq!(to_stop(0.4, 0.0), 0.0);
-        assert!((to_stop(3.45, 0.1) - stopping_speed(3.0, 0.6, 0.3)).abs() < 1e-12);
+        assert!((to_stop(3.45, 0.1) - stopping_speed(3.0, config.brake_m_s2, 0.3)).abs() < 1e-12);
         assert_eq!([to_stop(-1.0, 0.0), to_stop(2.0, 0.5)], [f64::INFINITY; 2]);
     }
 
@@ -237,9 +245,18 @@ mod tests {
         fn a_run_up_is_slowed_down_from_gently(speed in 0.2..3.0_f64, way in 0.0..20.0_f64) {
             let config = SpeedConfig::default();
             let from = run_up(speed, way, &config);
-            let needed_m = from * config.latency_s + (from * from - speed * speed) / (2.0 * config.gentle_m_s2);
+            let needed_m = from * config.latency_s + (from * from - speed * speed) / (2.0 * config.brake_m_s2);
             prop_assert!(from >= speed);
             prop_assert!(from == speed || needed_m <= way + 1e-9, "{needed_m} m from {from} m/s");
+        }
+
+        /// Half a turn to go does not keep it from slowing down as it would without.
+        #[test]
+        fn slowing_down_comes_before_turning(speed in 0.5..3.0_f64, slower in 0.0..1.0_f64, turn in -3.1..3.1_f64) {
+            let (previous, wanted) = (Vector3::x() * speed, Vector3::new(turn.cos(), turn.sin(), 0.0) * (speed * slower));
+            let next = step(&previous, &wanted, 0.02, 0.5);
+            let slowest = (speed - 0.01).max(wanted.norm());
+            prop_assert!(next.norm() <= slowest + 1e-4, "{next:?} of {previous:?}");
         }
 
         #[test]

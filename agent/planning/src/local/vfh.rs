@@ -13,6 +13,9 @@ pub use follower::{Follower, Step};
 const DETOUR: f64 = FRAC_PI_4;
 /// A bearing this near to the one chosen last is the same choice, and may turn from the target by so much more, radians.
 const SAME_CHOICE: f64 = 0.2;
+/// One that stands nearer to something than its safety radius may leave by what is so much nearer still, metres: not every way
+/// out leads straight away.
+const WAY_OUT_M: f64 = 0.1;
 
 /// How the histogram is made and read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,6 +110,12 @@ impl Histogram {
             histogram.nearest_m[sector] = histogram.nearest_m[sector].min(distance_m);
         }
         histogram
+    }
+
+    /// Distance to the nearest return, metres; infinite without one.
+    #[must_use]
+    pub fn nearest_m(&self) -> f64 {
+        self.nearest_m.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
     /// The density of each sector, metres: 0 is empty, and `dmax` is full of what is at hand.
@@ -212,8 +221,9 @@ pub fn openings(histogram: &Histogram, blocked: &[bool], radius_m: f64) -> Vec<O
 pub struct Vfh {
     config: VfhConfig,
     blocked: Option<Vec<bool>>,
-    /// Those that leave the comfort radius, then those that leave the safety radius.
+    /// Those that leave the comfort radius, then those that leave `kept_m`.
     openings: [Vec<Opening>; 2],
+    kept_m: f64,
     chosen: Option<f64>,
 }
 
@@ -222,14 +232,21 @@ impl Vfh {
     #[must_use]
     pub fn new(config: VfhConfig) -> Vfh {
         let all = vec![Opening { from: -PI, width: TAU }];
-        Vfh { config, blocked: None, openings: [all.clone(), all], chosen: None }
+        Vfh {
+            config,
+            blocked: None,
+            openings: [all.clone(), all],
+            kept_m: config.safety_radius_m,
+            chosen: None,
+        }
     }
 
     /// Takes in the returns of a scan, as [`Histogram::of`] does.
     pub fn look(&mut self, origin: &Vector3<f64>, points: &[Vector3<f64>], rays: usize) {
         let histogram = Histogram::of(origin, points, rays, &self.config);
         let blocked = decide(&histogram.states(&self.config), self.blocked.as_deref());
-        self.openings = [self.config.comfort_radius_m, self.config.safety_radius_m]
+        self.kept_m = self.config.safety_radius_m.min(histogram.nearest_m() - WAY_OUT_M).max(0.0);
+        self.openings = [self.config.comfort_radius_m, self.kept_m]
             .map(|radius_m| openings(&histogram, &blocked, radius_m));
         self.blocked = Some(blocked);
     }
@@ -263,6 +280,13 @@ impl Vfh {
         let [comfortable, safe] = &self.openings;
         self.chosen = best(comfortable, DETOUR).or_else(|| best(safe, PI));
         self.chosen
+    }
+
+    /// Distance that every opening of the newest scan leaves, metres: the safety radius, or less where the vehicle is nearer than
+    /// that to something.
+    #[must_use]
+    pub fn kept_m(&self) -> f64 {
+        self.kept_m
     }
 
     /// Forgets what it has chosen: somebody else moves the vehicle.
@@ -317,6 +341,18 @@ mod tests {
         let mut vfh = Vfh::new(config);
         vfh.look(&Vector3::zeros(), &scan(trunks), 720);
         vfh.steer(target, None)
+    }
+
+    #[test]
+    fn one_that_stands_too_near_to_something_finds_a_way_out() {
+        // Beside a trunk, at less than the safety radius, with others about.
+        let trunks = [(0.1, 0.65, 0.25), (1.6, 0.9, 0.4), (-1.4, -0.9, 0.4), (-1.2, 0.8, 0.3)];
+        let config = VfhConfig { safety_radius_m: 0.45, ..VfhConfig::default() };
+        let out = steered(&trunks, -0.6, config).expect("a way out");
+        assert!((-1.8..-0.1).contains(&out), "{out}");
+        let mut vfh = Vfh::new(config);
+        vfh.look(&Vector3::zeros(), &scan(&trunks), 720);
+        assert!(vfh.kept_m() < 0.35, "{}", vfh.kept_m());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Vfh, VfhConfig, bearing, direction};
+use super::{Vfh, VfhConfig, bearing, direction, wrapped};
 use crate::local::apf::{ApfConfig, carrot};
 use crate::local::speed::{self, SpeedConfig, run_up, speed_to_stop, trapezoid, unhindered_speed};
 use crate::map::{ClearanceMap, Sectors};
@@ -15,6 +15,10 @@ const AT_REST_M_S: f64 = 0.3;
 const PREVIEW_M: f64 = 8.0;
 /// Between two places on the path that are looked at, metres.
 const PREVIEW_STEP_M: f64 = 0.5;
+/// What a velocity leads to is looked at so far, metres.
+const STRAIGHT_M: f64 = 3.0;
+/// Between two bearings of a turn that are looked along, radians.
+const SWEEP_STEP: f64 = 0.15;
 
 /// What to fly now.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,10 +85,25 @@ impl Follower {
 
     /// The speed from which every place of the path ahead is reached, gently, as slowly as it has to be flown through.
     fn speed_ahead(&self, path: &Path, station_m: f64) -> f64 {
-        let places = (PREVIEW_M.min(path.length_m() - station_m) / PREVIEW_STEP_M).floor().max(0.0) as u32;
+        let at = |way_m: f64| (path.point_at(station_m + way_m), path.direction_at(station_m + way_m));
+        self.previewed(PREVIEW_M.min(path.length_m() - station_m), at)
+    }
+
+    /// The same straight on from `position`, where besides one stops before what stands in the way.
+    fn speed_straight(&self, position: &Vector3<f64>, bearing: f64) -> f64 {
+        let ahead = direction(bearing);
+        let passing = self.previewed(STRAIGHT_M, |way_m| (position + ahead * way_m, ahead));
+        let corridor_m = self.speed.corridor_m.min(self.vfh.kept_m());
+        let to_stop = SpeedConfig { corridor_m, ..self.speed };
+        passing.min(speed_to_stop(position, &ahead, &self.obstacles, &to_stop))
+    }
+
+    /// The speed from which each place is flown through as slowly as it has to be, over the next `way_m`.
+    fn previewed(&self, way_m: f64, at: impl Fn(f64) -> (Vector3<f64>, Vector3<f64>)) -> f64 {
+        let places = (way_m / PREVIEW_STEP_M).floor().max(0.0) as u32;
         let allowed = |step: u32| {
             let way_m = f64::from(step) * PREVIEW_STEP_M;
-            let (place, ahead) = (path.point_at(station_m + way_m), path.direction_at(station_m + way_m));
+            let (place, ahead) = at(way_m);
             run_up(unhindered_speed(&place, &ahead, &self.obstacles, &self.speed), way_m, &self.speed)
         };
         (0..=places).map(allowed).fold(f64::INFINITY, f64::min)
@@ -94,12 +113,12 @@ impl Follower {
     fn level(&mut self, offset: &Vector3<f64>, speed_m_s: f64, position: &Vector3<f64>) -> Vector3<f64> {
         let heading = (self.set_point.xy().norm() > AT_REST_M_S).then(|| bearing(&self.set_point));
         let Some(chosen) = self.vfh.steer(bearing(offset), heading) else { return Vector3::zeros() };
-        let free = |bearing| {
-            let ahead = direction(bearing);
-            let to_stop = speed_to_stop(position, &ahead, &self.obstacles, &self.speed);
-            to_stop.min(unhindered_speed(position, &ahead, &self.obstacles, &self.speed))
-        };
-        let free_m_s = free(chosen).min(heading.map_or(f64::INFINITY, free));
+        // A turn takes its way: what it sweeps over is not yet behind.
+        let turn = wrapped(chosen - heading.unwrap_or(chosen));
+        let steps = (turn.abs() / SWEEP_STEP).ceil().max(1.0);
+        let swept = (0..=steps as u32).map(|step| chosen - turn * (f64::from(step) / steps));
+        let free_m_s =
+            swept.map(|bearing| self.speed_straight(position, bearing)).fold(f64::INFINITY, f64::min);
         direction(chosen) * speed_m_s.min(free_m_s)
     }
 
@@ -125,6 +144,7 @@ impl Follower {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::local::braking::stopping_speed;
     use crate::map::VoxelMapConfig;
 
     /// A point mass that flies ten metres eastward past `trunks`, with what it sees of them.
@@ -172,6 +192,25 @@ mod tests {
             let change = (pair[1].1 - pair[0].1).norm();
             assert!(change <= SpeedConfig::default().gentle_m_s2 * 0.02 + 1e-9, "{change}");
         }
+    }
+
+    #[test]
+    fn what_a_turn_sweeps_over_is_stopped_for() {
+        let bark = (0..72).map(|k| Vector3::new(1.7, -0.6, 3.0) + direction(f64::from(k) * 0.087_266) * 0.25);
+        let mut follower = Follower::new(VfhConfig::default(), SpeedConfig::default());
+        let position = Vector3::new(0.0, 0.0, 3.0);
+        follower.look(&position, &bark.collect::<Vec<_>>(), 72);
+        // Left past the trunk, and wanted is right past it.
+        follower.flew(&(direction(0.13) * 1.5));
+        let wanted = follower.level(&(direction(-1.0) * 3.0), 1.5, &position);
+        assert!((bearing(&wanted) + 1.0).abs() < 0.3, "{wanted:?}");
+        let before_it = stopping_speed(1.8 - 0.25 - 0.45, 0.35, 0.3);
+        assert!(wanted.norm() < 1.05 * before_it, "{wanted:?}");
+        follower.rest();
+        assert!(
+            follower.level(&(direction(-1.0) * 3.0), 1.5, &position).norm() > 1.2,
+            "with nothing to turn from"
+        );
     }
 
     #[test]
