@@ -28,7 +28,9 @@ use crate::{
         set_point::{FRESH_FOR, KeepAlive, SILENT_AFTER, keep_alive, oldest_age},
     },
     precedence,
-    scripts::{Circumstances, RunningScript, ScriptFacts, Scripts},
+    scripts::{
+        Begins, CONFIGURATION, Circumstances, KeptScript, RunningScript, ScriptFacts, ScriptStore, Scripts,
+    },
     sequential::Sequential,
     verify::check_script,
     watches::Watches,
@@ -176,6 +178,21 @@ impl AgentCore {
         Self::with_store(config, Some(store))
     }
 
+    /// The same agent, which keeps the scripts that are sent to it in `store`. Of those `kept` by a former life, each runs
+    /// again from its beginning if it passes all checks anew, once the vehicle is ready on the ground or an operator lets it
+    /// go on in the air; one that does not is refused, and forgotten.
+    #[must_use]
+    pub fn keeping_scripts(mut self, store: Box<dyn ScriptStore>, kept: &[KeptScript]) -> Self {
+        for KeptScript { from, assignment } in kept {
+            let outcome = self
+                .admit(assignment, from, Begins::WhenReleased)
+                .map_err(|why| format!("it was kept from the agent's last life, and passes no more: {why}"));
+            self.node.node_mut().enqueue(self.scripts.verdict(assignment.name(), outcome));
+        }
+        self.scripts.keep_in(store);
+        self
+    }
+
     fn with_store(config: AgentConfig, store: Option<Box<dyn Store>>) -> Result<Self, AgentError> {
         let name = |field, value: &str| {
             NodeName::new(value).map_err(|source| AgentError::Name { field, value: value.to_owned(), source })
@@ -191,7 +208,7 @@ impl AgentCore {
         let mut scripts = Scripts::new(me.clone(), &config.roster);
         for assignment in &config.scripts {
             scripts
-                .load(&mut program, assignment, "configuration")
+                .load(&mut program, assignment, CONFIGURATION, Begins::AtOnce)
                 .and_then(|()| check_script(&config, assignment, STATES_TRIED))
                 .map_err(|why| AgentError::Script { name: assignment.name().to_owned(), why })?;
         }
@@ -419,6 +436,7 @@ impl AgentCore {
             }
             self.tell_scripts(&motion, neighbours);
         }
+        self.scripts.catch_up();
         if let Some(state) = self.state(now) {
             let state = State { echo: self.neighbours.echo(now), ..state };
             self.node.put_state(&state, link);
@@ -538,19 +556,36 @@ impl AgentCore {
             Ok(assignment) => assignment,
             Err(error) => return (String::new(), Err(error.to_string())),
         };
-        let sender = selection.requested_by.iter().find_map(|bthread| bthread.split_once('#'));
-        let from = sender.map_or(self.name.as_str(), |(node, _)| node).to_owned();
-        let outcome = if from.starts_with("uav/") && from != self.name.as_str() {
-            Err(format!("{from} may not send scripts: that is for the ground station and its operators"))
-        } else if !self.scripts.runs(assignment.name())
-            && let Err(why) = check_script(&self.config, &assignment, STATES_TRIED)
-        {
-            Err(why)
-        } else {
-            self.script_facts.forget();
-            self.scripts.load(self.node.node_mut().program_mut(), &assignment, &from)
-        };
+        let sender = selection.requested_by.iter().find(|bthread| bthread.contains('#'));
+        let from = sender.map_or(self.name.as_str(), |bthread| bthread).to_owned();
+        let outcome = self.admit(&assignment, &from, Begins::AtOnce);
         (assignment.name().to_owned(), outcome)
+    }
+
+    /// Runs a script that `from` has sent, now or to a former life of this agent, if it passes all checks.
+    fn admit(&mut self, assignment: &Assignment, from: &str, begins: Begins) -> Result<(), String> {
+        if !self.may_send(assignment, from)? {
+            let node = from.split_once('#').map_or(from, |(node, _)| node);
+            return Err(format!(
+                "{node} may not send scripts: that is for the ground station and its operators"
+            ));
+        }
+        if !self.scripts.runs(assignment.name()) {
+            check_script(&self.config, assignment, STATES_TRIED)?;
+        }
+        self.script_facts.forget();
+        self.scripts.load(self.node.node_mut().program_mut(), assignment, from, begins)
+    }
+
+    /// Whether `from` has the right to send this script: the vehicle itself, or a b-thread of another node that is a member
+    /// and no vehicle.
+    fn may_send(&self, assignment: &Assignment, from: &str) -> Result<bool, String> {
+        let Some((node, bthread)) = from.split_once('#') else { return Ok(from == self.name.as_str()) };
+        let text = assignment.to_json().map_err(|error| error.to_string())?;
+        let load = self.me.event(LOAD).with("script", text);
+        let is_member = self.config.roster.iter().any(|member| member == node);
+        let may_request = |node| self.config.authority.may_request(&node, bthread, &load);
+        Ok(is_member && !node.starts_with("uav/") && NodeName::new(node).is_ok_and(may_request))
     }
 
     fn end(&mut self, outcome: Outcome, task: &str) {
@@ -687,6 +722,12 @@ impl AgentCore {
     /// The scripts that run, by name.
     pub fn scripts(&self) -> impl Iterator<Item = (&str, &RunningScript)> {
         self.scripts.running()
+    }
+
+    /// Why a script that runs no more may run again in this agent's next life, if so: it could not be forgotten yet.
+    #[must_use]
+    pub fn unsaved_scripts(&self) -> Option<&str> {
+        self.scripts.unsaved()
     }
 
     /// How the mission ended, once it has.

@@ -2,13 +2,19 @@
 
 #![allow(clippy::unwrap_used)] // A test fails by panicking.
 
-use std::time::Duration;
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
 
 use serde_json::{Value, json};
 use skein_agent::{
-    AgentConfig, Controller, Envelope, Fence, Me, PassageRule, Planners,
+    AgentConfig, AgentCore, Controller, Envelope, Fence, Me, PassageRule, Planners,
     bthreads::{self, LinkLossPolicy},
-    scripts::{Runner, Scripts},
+    scripts::{Begins, KeptScript, MemoryScriptStore, Runner, ScriptStore, Scripts},
 };
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_bp::{Event, Program, ProgramConfig};
@@ -17,6 +23,7 @@ use skein_wire::vocabulary::{self, *};
 
 const ME: &str = "uav/1";
 const ROSTER: [&str; 4] = ["uav/1", "uav/2", "ground/main", "script/operator"];
+const SENDER: &str = "ground/main#scripts for uav/1";
 const SHIPPED: [(&str, &str); 4] = [
     ("patrol", include_str!("../scripts/patrol.toml")),
     ("curfew", include_str!("../scripts/curfew.toml")),
@@ -78,7 +85,7 @@ impl Vehicle {
     }
 
     fn load(&mut self, assignment: &Assignment) -> Result<(), String> {
-        self.scripts.load(&mut self.program, assignment, "ground/main")
+        self.scripts.load(&mut self.program, assignment, SENDER, Begins::AtOnce)
     }
 
     /// Everything that happens after an event from outside, itself first.
@@ -287,6 +294,96 @@ fn facts_are_told_only_to_those_who_listen() {
     assert_eq!(listened(&vehicle), [true, true, false, true]);
     vehicle.hears(order(ME, "resume"));
     assert_eq!(listened(&vehicle), [true, true, false, false], "the patrol has ended");
+}
+
+/// A script that keeps the vehicle where it is.
+fn stay() -> Assignment {
+    script(json!([{"sync": {"block": {"any_data": "uav/1/advance"}, "wait": "uav/1/landed"}}]))
+}
+
+#[test]
+fn a_script_that_was_sent_is_kept_until_it_is_withdrawn() {
+    let mut vehicle = Vehicle::in_the_air();
+    let store = MemoryScriptStore::default();
+    vehicle.scripts.keep_in(Box::new(store.clone()));
+    vehicle.load(&stay()).unwrap();
+    assert_eq!(store.kept(), [KeptScript { from: SENDER.to_owned(), assignment: stay() }]);
+    vehicle.hears(mine(UNLOAD).with("name", "test"));
+    assert_eq!(store.kept(), []);
+}
+
+/// A disk that is full until somebody makes room.
+#[derive(Clone, Debug, Default)]
+struct Disk(Arc<AtomicBool>);
+
+impl ScriptStore for Disk {
+    fn save(&mut self, _: &[KeptScript]) -> Result<(), String> {
+        if self.0.load(Ordering::Relaxed) { Ok(()) } else { Err("no space left".to_owned()) }
+    }
+}
+
+#[test]
+fn a_script_that_cannot_be_kept_is_refused_and_one_that_cannot_be_forgotten_is_tried_again() {
+    let mut vehicle = Vehicle::in_the_air();
+    let disk = Disk::default();
+    vehicle.scripts.keep_in(Box::new(disk.clone()));
+    let why = vehicle.load(&stay()).unwrap_err();
+    assert!(why.contains("next life") && why.contains("no space left"), "{why}");
+    assert!(vehicle.moves(), "nothing of it runs");
+
+    disk.0.store(true, Ordering::Relaxed);
+    vehicle.load(&stay()).unwrap();
+    disk.0.store(false, Ordering::Relaxed);
+    vehicle.hears(mine(UNLOAD).with("name", "test"));
+    assert!(vehicle.moves(), "it is withdrawn all the same");
+    assert_eq!(vehicle.scripts.unsaved(), Some("no space left"));
+    disk.0.store(true, Ordering::Relaxed);
+    vehicle.scripts.catch_up();
+    assert_eq!(vehicle.scripts.unsaved(), None);
+}
+
+#[test]
+fn a_script_of_a_former_life_begins_when_the_vehicle_is_let_go_on() {
+    let begins_with = |mut vehicle: Vehicle, release: Event| {
+        vehicle.scripts.load(&mut vehicle.program, &stay(), SENDER, Begins::WhenReleased).unwrap();
+        vehicle.happens();
+        let blocks = |vehicle: &Vehicle| {
+            let explained = vehicle.program.explain(mine(ADVANCE));
+            explained.blocked.iter().any(|(bthread, _)| &**bthread == "script/test")
+        };
+        assert!(!blocks(&vehicle));
+        vehicle.hears(release);
+        blocks(&vehicle)
+    };
+    assert!(begins_with(Vehicle::on_the_ground(), mine(READY)));
+    assert!(begins_with(Vehicle::in_the_air(), mine(ORDER).with("what", "resume")));
+    assert!(!begins_with(Vehicle::in_the_air(), mine(ORDER).with("what", "hold")));
+}
+
+#[test]
+fn the_next_life_runs_what_was_kept_and_forgets_what_passes_no_more() {
+    let from = |from: &str, called: &str| KeptScript {
+        from: from.to_owned(),
+        assignment: Assignment { called: Some(called.to_owned()), ..stay() },
+    };
+    let kept = [
+        from(SENDER, "good"),
+        from("uav/2#friend", "vehicles"),
+        from("ground/other#scripts for uav/1", "strangers"),
+        from("no node#", "nobodys"),
+        KeptScript {
+            from: SENDER.to_owned(),
+            assignment: script(json!([{"sync": {"block": "uav/1/land"}}])),
+        },
+    ];
+    let store = MemoryScriptStore::default();
+    let core = AgentCore::new(config()).unwrap().keeping_scripts(Box::new(store.clone()), &kept);
+    assert_eq!(core.scripts().map(|(name, _)| name).collect::<Vec<_>>(), ["good"]);
+    assert_eq!(store.kept(), kept[..1]);
+
+    let none = AgentConfig { authority: skein_dbp::Authority::new(Vec::new(), None), ..config() };
+    let core = AgentCore::new(none).unwrap().keeping_scripts(Box::new(store.clone()), &kept);
+    assert_eq!((core.scripts().count(), store.kept().len()), (0, 0), "its sender has no right any more");
 }
 
 #[test]

@@ -2,9 +2,11 @@
 //!
 //! A script runs in the vehicle's program under the name `script/<name>`, so that it is explained like any other b-thread. It
 //! is checked before ([`ScriptRights`]), and can do no harm while it runs ([`Runner`]). What becomes of it is an
-//! event: `uav/3/script{name, state, why}`.
+//! event: `uav/3/script{name, state, why}`. Scripts that were sent are kept ([`ScriptStore`]) for the agent's next life.
 
 mod facts;
+mod file_store;
+mod kept;
 mod rights;
 mod runner;
 
@@ -18,6 +20,8 @@ use skein_wire::vocabulary::{
 
 pub use self::{
     facts::{Circumstances, ScriptFacts},
+    file_store::{FileScriptStore, ScriptsLost},
+    kept::{KeptScript, MemoryScriptStore, ScriptStore},
     rights::ScriptRights,
     runner::Runner,
 };
@@ -26,6 +30,19 @@ use crate::me::Me;
 /// How many scripts may run at once.
 const MOST_SCRIPTS: usize = skein_wire::State::MAX_SCRIPTS;
 
+/// Who has sent the scripts that come with the vehicle's configuration.
+pub const CONFIGURATION: &str = "configuration";
+
+/// When a script that is taken in begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Begins {
+    /// At once.
+    AtOnce,
+    /// When the vehicle is ready on the ground, or an operator lets it go on or takes it back in the air. A script that a
+    /// former life had been sent cannot know what has become of the vehicle since, and must not end its hold by itself.
+    WhenReleased,
+}
+
 /// A script that runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunningScript {
@@ -33,7 +50,7 @@ pub struct RunningScript {
     pub about: String,
     /// The values of its parameters.
     pub with: BTreeMap<String, Argument>,
-    /// Who has sent it: a node, or `configuration`.
+    /// Who has sent it: [`CONFIGURATION`], or as in [`KeptScript::from`].
     pub from: String,
     assignment: Assignment,
     /// The facts that it listens to.
@@ -46,6 +63,9 @@ pub struct Scripts {
     me: Me,
     rights: ScriptRights,
     running: BTreeMap<String, RunningScript>,
+    store: Option<Box<dyn ScriptStore>>,
+    /// Why the store does not know yet which scripts run no more.
+    unsaved: Option<String>,
 }
 
 /// How many states of a script a vehicle looks at: no more than there is time for between two ticks. The ground looks at
@@ -59,14 +79,32 @@ impl Scripts {
     /// No scripts yet, on a vehicle whose fleet is `roster`.
     #[must_use]
     pub fn new(me: Me, roster: &[String]) -> Self {
-        Self { rights: ScriptRights::usual(&me, roster), me, running: BTreeMap::new() }
+        Self {
+            rights: ScriptRights::usual(&me, roster),
+            me,
+            running: BTreeMap::new(),
+            store: None,
+            unsaved: None,
+        }
     }
 
-    /// Adds a script that `from` has sent to the vehicle's program.
+    /// Keeps in `store` from now on which scripts were sent and run.
+    pub fn keep_in(&mut self, store: Box<dyn ScriptStore>) {
+        self.store = Some(store);
+        self.note_unsaved();
+    }
+
+    /// Adds a script that `from` has sent to the vehicle's program, once it is kept.
     ///
     /// # Errors
     /// Why it is not run.
-    pub fn load(&mut self, program: &mut Program, assignment: &Assignment, from: &str) -> Result<(), String> {
+    pub fn load(
+        &mut self,
+        program: &mut Program,
+        assignment: &Assignment,
+        from: &str,
+        begins: Begins,
+    ) -> Result<(), String> {
         let name = assignment.name();
         match self.running.get(name) {
             // It was sent twice, and arrived twice.
@@ -78,13 +116,21 @@ impl Scripts {
             None => {}
         }
         let script = self.examine(assignment)?;
-        let runner = self.runner(&script);
+        let runner = match begins {
+            Begins::AtOnce => self.runner(&script),
+            Begins::WhenReleased => self.runner(&script).asleep(),
+        };
         let BoundScript { name, about, with, bthread } = script;
         let listens = FACTS.into_iter().filter(|fact| self.listens(&bthread, fact)).collect();
-        program.add(Runner::bthread_name(&name), runner);
+        let bthread = Runner::bthread_name(&name);
         let from = from.to_owned();
-        self.running
-            .insert(name, RunningScript { about, with, from, assignment: assignment.clone(), listens });
+        let running = RunningScript { about, with, from, assignment: assignment.clone(), listens };
+        self.running.insert(name.clone(), running);
+        if let Err(why) = self.save() {
+            self.running.remove(&name);
+            return Err(format!("it cannot be kept for the agent's next life: {why}"));
+        }
+        program.add(bthread, runner);
         Ok(())
     }
 
@@ -124,7 +170,37 @@ impl Scripts {
             && let Some(name) = event.text("name")
         {
             self.running.remove(name);
+            self.note_unsaved();
         }
+    }
+
+    /// Tries again to keep what could not be kept.
+    pub fn catch_up(&mut self) {
+        if self.unsaved.is_some() {
+            self.note_unsaved();
+        }
+    }
+
+    /// Why a script that runs no more may run again in the agent's next life, if so: the store does not take it in.
+    #[must_use]
+    pub fn unsaved(&self) -> Option<&str> {
+        self.unsaved.as_deref()
+    }
+
+    fn note_unsaved(&mut self) {
+        self.unsaved = self.save().err();
+    }
+
+    /// Keeps the scripts that were sent and run.
+    fn save(&mut self) -> Result<(), String> {
+        let Some(store) = &mut self.store else { return Ok(()) };
+        let sent = self.running.values().filter(|script| script.from != CONFIGURATION);
+        let kept: Vec<_> = sent
+            .map(|script| KeptScript { from: script.from.clone(), assignment: script.assignment.clone() })
+            .collect();
+        store.save(&kept)?;
+        self.unsaved = None;
+        Ok(())
     }
 
     /// The event that says what has become of a script.

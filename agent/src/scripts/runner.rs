@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::Serialize;
 use skein_bp::script::Script;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_wire::vocabulary::{ENDED, UNLOAD, WITHDRAWN};
+use skein_wire::vocabulary::{ENDED, HAND_BACK, ORDER, READY, UNLOAD, WITHDRAWN};
 
 use super::report;
 use crate::{me::Me, precedence};
@@ -23,6 +23,8 @@ pub struct Runner {
     /// What it may block.
     may_block: EventSet,
     over: bool,
+    /// Whether it has yet to begin.
+    asleep: bool,
     /// When it was last resumed, and how often at that time; none where nobody counts.
     pace: Option<(Duration, u32)>,
 }
@@ -31,7 +33,14 @@ impl Runner {
     /// Runs `script` under `name` on the vehicle `me`.
     #[must_use]
     pub fn new(me: Me, name: &str, script: Script, may_block: EventSet) -> Self {
-        Self { me, name: name.to_owned(), script, may_block, over: false, pace: Some((Duration::ZERO, 0)) }
+        let pace = Some((Duration::ZERO, 0));
+        Self { me, name: name.to_owned(), script, may_block, over: false, asleep: false, pace }
+    }
+
+    /// Does not begin before the vehicle is ready on the ground, or somebody lets it go on in the air.
+    #[must_use]
+    pub fn asleep(self) -> Self {
+        Self { asleep: true, ..self }
     }
 
     /// Does not end it for going round, in a verification: there time stands still, and going round is found.
@@ -48,6 +57,19 @@ impl Runner {
 
     fn withdrawal(&self) -> EventSet {
         self.me.any(UNLOAD).and(EventSet::field_is("name", self.name.as_str()))
+    }
+
+    /// What ends the hold of a vehicle whose agent has started in the air, and what is told of one on the ground.
+    fn release(&self) -> EventSet {
+        let onward = EventSet::any_of(["resume", "return"].map(|what| EventSet::field_is("what", what)));
+        self.me.any_of(&[READY, HAND_BACK]).or(self.me.any(ORDER).and(onward))
+    }
+
+    fn begin(&mut self, cx: &mut Context) {
+        self.asleep = false;
+        // Whatever it might ask of the program beside its bids is not heard.
+        self.script.start(&mut Context::at(cx.now()));
+        self.note_end(cx);
     }
 
     fn end(&mut self, state: &str, why: &str, cx: &mut Context) {
@@ -72,6 +94,10 @@ impl Runner {
 
 impl BThread for Runner {
     fn bid(&self) -> Option<Bid> {
+        if self.asleep && !self.over {
+            let awaited = self.release().or(self.withdrawal());
+            return Some(Bid::new().wait_for(awaited).priority(precedence::MISSION));
+        }
         let script = self.script.bid().filter(|_| !self.over)?;
         let mut bid = script.requests().iter().fold(Bid::new(), |bid, event| bid.request(event.clone()));
         bid = bid
@@ -89,14 +115,17 @@ impl BThread for Runner {
     }
 
     fn start(&mut self, cx: &mut Context) {
-        // Whatever it might ask of the program beside its bids is not heard.
-        self.script.start(&mut Context::at(cx.now()));
-        self.note_end(cx);
+        if !self.asleep {
+            self.begin(cx);
+        }
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         if self.withdrawal().contains(event) {
             return self.end(WITHDRAWN, "it was taken back", cx);
+        }
+        if self.asleep {
+            return self.begin(cx);
         }
         if self.spins(cx.now()) {
             let why = format!("it did not come to rest: it was resumed {MOST_AT_ONCE} times at once");

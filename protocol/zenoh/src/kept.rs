@@ -1,11 +1,10 @@
 //! What a node must not forget, in a file.
 
-use std::fs::{self, File};
-use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use skein_dbp::Kept;
-use skein_wire::{NodeName, Store};
+use skein_wire::{NodeName, Store, replace_file};
 
 /// Why what was kept cannot be had.
 #[derive(Debug, thiserror::Error)]
@@ -49,18 +48,7 @@ impl FileStore {
     }
 
     fn write(&self, kept: &Kept) -> io::Result<()> {
-        let beside = self.0.with_extension("new");
-        if let Some(folder) = self.0.parent() {
-            fs::create_dir_all(folder)?;
-        }
-        let mut file = File::create(&beside)?;
-        file.write_all(&serde_json::to_vec_pretty(kept)?)?;
-        file.sync_all()?;
-        fs::rename(&beside, &self.0)?;
-        match self.0.parent() {
-            Some(folder) if cfg!(unix) => File::open(folder)?.sync_all(),
-            _ => Ok(()),
-        }
+        replace_file(&self.0, &serde_json::to_vec_pretty(kept)?)
     }
 }
 

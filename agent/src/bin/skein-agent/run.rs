@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::Context as _;
-use skein_agent::{AgentCore, Scan};
+use skein_agent::{AgentCore, Scan, scripts::FileScriptStore};
 use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
 use skein_wire::{Fleet, Key, Link as _, Payload, Topic};
 use skein_zenoh::{Bell, Complaints, FileStore, ZenohConfig, ZenohLink, ZenohSession, next_incarnation};
@@ -60,6 +60,8 @@ struct Driver {
     looked: Duration,
     next_tick: Duration,
     strange_scans: u64,
+    /// Whether it has been told that a script could not be forgotten.
+    told_unsaved: bool,
 }
 
 impl Driver {
@@ -67,6 +69,11 @@ impl Driver {
         config.agent.incarnation = next_incarnation(&config.state, &config.name)?;
         let (store, kept) = FileStore::open(&config.state, &config.name)?;
         config.agent.kept = kept;
+        let (script_store, scripts) = FileScriptStore::open(&config.state, &config.name);
+        let scripts = scripts.unwrap_or_else(|lost| {
+            tracing::warn!("{lost}");
+            Vec::new()
+        });
         let fleet = Fleet::new(&config.agent.fleet).context("`fleet`")?;
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
         let link = session.link(&config.name)?;
@@ -84,7 +91,8 @@ impl Driver {
             config.autopilot
         );
         Ok(Self {
-            core: AgentCore::durable(config.agent, Box::new(store))?,
+            core: AgentCore::durable(config.agent, Box::new(store))?
+                .keeping_scripts(Box::new(script_store), &scripts),
             autopilot: AutopilotLink::new(config.autopilot),
             bell: link.bell(),
             link,
@@ -94,6 +102,7 @@ impl Driver {
             looked: Duration::ZERO,
             next_tick: Duration::ZERO,
             strange_scans: 0,
+            told_unsaved: false,
         })
     }
 
@@ -113,6 +122,7 @@ impl Driver {
             if let Some(line) = self.complaints.check(now, self.core.node(), &self.link) {
                 tracing::warn!("{line}");
             }
+            self.tell_unsaved();
         } else if !self.link.is_empty() {
             self.core.respond(now, &mut self.link);
         }
@@ -158,6 +168,15 @@ impl Driver {
                 },
             );
         }
+    }
+
+    /// Warns once when a script that has been given up would run again after a restart.
+    fn tell_unsaved(&mut self) {
+        let unsaved = self.core.unsaved_scripts();
+        if let (false, Some(why)) = (self.told_unsaved, unsaved) {
+            tracing::warn!("a script that runs no more runs again if the agent starts again now: {why}");
+        }
+        self.told_unsaved = unsaved.is_some();
     }
 
     /// Writes down what the vehicle itself has decided or met.
