@@ -21,6 +21,7 @@ fn grid(size: [usize; 3], blocked: &[[usize; 3]]) -> ClearanceMap {
         max_range_m: 10.0,
         vertical_extent_m: 0.0,
         ground_m: -1.0,
+        ..VoxelMapConfig::default()
     };
     let mut map = ClearanceMap::new(config, Vector3::from(size_m) / 2.0, 5.0).unwrap();
     for cell in blocked {

@@ -96,6 +96,7 @@ impl Perception {
             max_range_m: MAP_RANGE_M,
             ground_m: home.z + GROUND_M,
             vertical_extent_m: VERTICAL_EXTENT_M,
+            ..VoxelMapConfig::default()
         };
         Ok(Self {
             map: ClearanceMap::new(config, centre, CLEARANCE_RANGE_M)?,
@@ -145,7 +146,8 @@ impl Perception {
         self.last_scan
     }
 
-    /// Takes in a scan that was taken at `pose`, while `neighbours` were at these positions.
+    /// Takes in a scan that was taken at `pose`, while `neighbours` were at these positions. What none has seen
+    /// again for long is forgotten; without scans nothing is.
     pub fn take_in(&mut self, scan: &Scan, pose: &Pose, neighbours: &[Vector3<f64>]) {
         self.last_scan = Some(scan.stamp);
         self.ends.clear();
@@ -196,6 +198,7 @@ impl Perception {
         if self.rolls {
             self.map.recentre(&pose.position);
         }
+        self.map.fade(scan.stamp);
         self.map.integrate(pose.position, &self.ends);
     }
 }
@@ -248,5 +251,30 @@ mod tests {
     fn what_is_far_away_is_not_among_the_returns() {
         assert!(seen(3.0, 0.0, 12.0).is_empty());
         assert!(seen(3.0, 0.0, 4.0).iter().all(|point| point.z > 2.0));
+    }
+
+    #[test]
+    fn an_obstacle_that_has_gone_unseen_frees_its_way() {
+        let fence = Fence { min: [-30.0, -30.0, -1.0], max: [30.0, 30.0, 10.0] };
+        let mut perception = Perception::new(&fence, Vector3::zeros(), [0.6, 8.0]).unwrap();
+        let place = Vector3::new(4.1, 0.0, 3.0);
+        let mut look = |from: Vector3<f64>, wall_m: f64, second: u64| {
+            let pose = Pose { position: from, attitude: UnitQuaternion::identity() };
+            let scan = Scan { stamp: Duration::from_secs(second), ..scan(&pose, wall_m) };
+            perception.take_in(&scan, &pose, &[]);
+            perception.map().clearance(&place)
+        };
+        let before = Vector3::new(0.0, 0.0, 3.0);
+        // Seen for ten minutes, it stays; by then its evidence is at its most.
+        for second in 0..600 {
+            assert!(look(before, 4.1, second) < 0.2, "not there at {second} s");
+        }
+        // The vehicle flies above, from where nothing of it is seen, and meanwhile it goes.
+        let above = Vector3::new(0.0, 0.0, 6.0);
+        for second in 600..890 {
+            assert!(look(above, 100.0, second) < 0.2, "forgotten at {second} s");
+        }
+        let later = (890..910).map(|second| look(above, 100.0, second)).last();
+        assert!(later > Some(2.4), "free as far as clearance is told apart: {later:?}");
     }
 }

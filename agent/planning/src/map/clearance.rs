@@ -1,6 +1,7 @@
 //! Distance to the nearest obstacle, kept up to date as the map changes.
 
 use std::ops::ControlFlow;
+use std::time::Duration;
 
 use nalgebra::Vector3;
 
@@ -118,6 +119,12 @@ impl ClearanceMap {
     /// Takes a lidar scan in; see [`VoxelMap::integrate`].
     pub fn integrate(&mut self, origin: Vector3<f64>, ends: &[RayEnd]) {
         let changes = self.voxels.integrate(origin, ends).to_vec();
+        self.repair(&changes);
+    }
+
+    /// Gives up hits that were not seen again; see [`VoxelMap::fade`].
+    pub fn fade(&mut self, now: Duration) {
+        let changes = self.voxels.fade(now).to_vec();
         self.repair(&changes);
     }
 
@@ -436,7 +443,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn map() -> ClearanceMap {
-        let config = VoxelMapConfig { size_m: [12.0, 12.0, 4.0], ..VoxelMapConfig::default() };
+        let config =
+            VoxelMapConfig { size_m: [12.0, 12.0, 4.0], fade_tau_s: 30.0, ..VoxelMapConfig::default() };
         ClearanceMap::new(config, Vector3::new(0.0, 0.0, 2.0), 2.5).unwrap()
     }
 
@@ -520,6 +528,44 @@ mod tests {
             for (y, x) in (0..ny).flat_map(|y| (0..nx).map(move |x| (y, x))) {
                 let voxel = VoxelIndex { x, y, z };
                 prop_assert_eq!(tracked.offset_at(voxel), searched.offset_at(voxel));
+            }
+        }
+
+        #[test]
+        fn a_faded_map_equals_one_of_what_is_left(
+            scans in prop::collection::vec((0_u64..60, prop::collection::vec((-5.0..5.0_f64, -5.0..5.0_f64), 1..8)), 1..30),
+            known in prop::collection::vec((-5.0..5.0_f64, -5.0..5.0_f64), 0..4),
+            roll in prop::option::of((-8.0..8.0_f64, -8.0..8.0_f64)),
+        ) {
+            let height_m = 2.1;
+            let mut faded = map();
+            faded.track(height_m);
+            for (x, y) in known {
+                faded.insert(&Vector3::new(x, y, height_m));
+            }
+            let mut now_s = 0;
+            for (pause_s, hits) in scans {
+                now_s += pause_s;
+                let ends: Vec<_> =
+                    hits.iter().map(|(x, y)| RayEnd { point: Vector3::new(*x, *y, height_m), hit: true }).collect();
+                faded.fade(Duration::from_secs(now_s));
+                faded.integrate(Vector3::new(0.1, 0.1, height_m), &ends);
+            }
+            if let Some((x, y)) = roll {
+                faded.recentre(&Vector3::new(x, y, 2.0));
+            }
+            faded.fade(Duration::from_secs(now_s + 43));
+
+            let centre = faded.voxels().centre_of(VoxelIndex { x: 30, y: 30, z: 10 }) - Vector3::repeat(0.1);
+            let mut rebuilt = ClearanceMap::new(*faded.voxels().config(), centre, 2.5).unwrap();
+            for hit in faded.voxels().hits() {
+                rebuilt.insert(&hit);
+            }
+            rebuilt.track(height_m);
+            let [nx, ny, _] = faded.voxels().counts();
+            for (y, x) in (0..ny).flat_map(|y| (0..nx).map(move |x| (y, x))) {
+                let voxel = VoxelIndex { x, y, z: 10 };
+                prop_assert_eq!(faded.offset_at(voxel), rebuilt.offset_at(voxel));
             }
         }
     }

@@ -1,6 +1,7 @@
 //! What a vehicle has seen of its surroundings: evidence in voxels, and the distance to the nearest obstacle.
 
 mod clearance;
+mod fading;
 mod ray;
 mod sectors;
 mod voxel;

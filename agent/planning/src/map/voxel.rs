@@ -1,9 +1,11 @@
 //! Evidence of obstacles in a window of voxels around the vehicle or the mission.
 
 use std::ops::ControlFlow;
+use std::time::Duration;
 
 use nalgebra::Vector3;
 
+use super::fading::{Fading, Stamp};
 use super::{sweep, traverse};
 
 /// Evidence at which a voxel counts as occupied.
@@ -33,6 +35,12 @@ pub struct VoxelMapConfig {
     /// Returns from below this height (ENU z, metres) are the ground: a tilted lidar meets it. They clear,
     /// and mark nothing.
     pub ground_m: f64,
+    /// Time constant with which hits fade that no scan sees again, seconds; infinity keeps them for ever.
+    ///
+    /// A hit of evidence `e` is given up once `e exp(-t / tau) < 1`, see [`VoxelMap::fade`]. With two minutes a single hit lasts
+    /// nearly three, and what was seen often five: by then a vehicle has left the window, or come by again. Much less is not
+    /// wise, for who forgets a dead end while it flies around it turns back into it.
+    pub fade_tau_s: f64,
 }
 
 impl Default for VoxelMapConfig {
@@ -43,6 +51,7 @@ impl Default for VoxelMapConfig {
             max_range_m: 12.0,
             vertical_extent_m: 0.6,
             ground_m: 0.5,
+            fade_tau_s: 120.0,
         }
     }
 }
@@ -61,6 +70,14 @@ pub enum MapError {
     /// The column above and below a hit is taller than evidence can count.
     #[error("map: `vertical_extent_m` is {value}, expected 0 to 100 times `resolution_m`")]
     Extent {
+        /// What it was.
+        value: f64,
+    },
+    /// The time constant with which hits fade is none.
+    #[error(
+        "map: `fade_tau_s` is {value}, expected a positive number of seconds, or infinity to keep all hits"
+    )]
+    Fading {
         /// What it was.
         value: f64,
     },
@@ -122,7 +139,7 @@ pub struct Change {
 /// Evidence is a small count per voxel: a scan that hits a voxel adds to it, a scan that sees through it
 /// subtracts, at most once per scan each, and a voxel that is hit in a scan is never cleared by the same
 /// scan. So a lasting obstacle survives grazing rays, and one that has gone is forgotten within about a
-/// second of being seen through.
+/// second of being seen through. What no scan sees again fades ([`VoxelMap::fade`]).
 ///
 /// Unknown space is for planners to judge. Skein plans through it optimistically, because nothing is known in
 /// advance of a forest, and flies no faster than it can stop within what it has sensed
@@ -152,7 +169,8 @@ pub struct VoxelMap {
     cells: Vec<Cell>,
     /// How many hit voxels of the column block a voxel.
     blocked_by: Vec<u8>,
-    scan: u32,
+    scan: u16,
+    fading: Fading,
     revision: u64,
     changes: Vec<Change>,
 }
@@ -161,7 +179,8 @@ impl VoxelMap {
     /// An unknown window around `centre` (ENU, metres).
     ///
     /// # Errors
-    /// A size that is not positive and finite, or that makes too many voxels.
+    /// A size that is not positive and finite, or that makes too many voxels; a time constant that is not
+    /// positive.
     pub fn new(config: VoxelMapConfig, centre: Vector3<f64>) -> Result<VoxelMap, MapError> {
         let [east, north, up] = config.size_m;
         let positive = [
@@ -180,6 +199,9 @@ impl VoxelMap {
         if !(0.0..=100.0).contains(&extent) {
             return Err(MapError::Extent { value: config.vertical_extent_m });
         }
+        if config.fade_tau_s.is_nan() || config.fade_tau_s <= 0.0 {
+            return Err(MapError::Fading { value: config.fade_tau_s });
+        }
         let sides = config.size_m.map(|side| (side / config.resolution_m).ceil().max(1.0));
         let voxels = sides[0] * sides[1] * sides[2];
         if voxels > MAX_VOXELS as f64 {
@@ -195,6 +217,7 @@ impl VoxelMap {
             cells: vec![[0; 4]; total],
             blocked_by: vec![0; total],
             scan: 0,
+            fading: Fading::new(config.fade_tau_s, HIT),
             revision: 0,
             changes: Vec::new(),
         };
@@ -243,6 +266,35 @@ impl VoxelMap {
         &self.changes
     }
 
+    /// Sets the map's clock, and gives up hits of evidence `e` that no scan has seen again for
+    /// [`fade_tau_s`](VoxelMapConfig::fade_tau_s) `* ln(e)`, to within a thirty-second of the time constant:
+    /// they are unknown then. Returns the changes.
+    ///
+    /// Called before [`VoxelMap::integrate`], whose hits are taken to come at this time; a map whose clock is
+    /// not set keeps everything. Evidence of free space stays: it differs from unknown space only in that one
+    /// has looked there. So does what was [inserted](VoxelMap::insert). A voxel whose evidence rays have
+    /// lowered since its last hit fades sooner, as of the next time it is looked up.
+    pub fn fade(&mut self, now: Duration) -> &[Change] {
+        self.changes.clear();
+        self.fading.advance(now);
+        while let Some(found) = self.fading.next() {
+            let offset = found.offset as usize;
+            let cell = self.cells[offset];
+            let (evidence, stamp) = (evidence(cell), stamp(cell));
+            // Inserted meanwhile: known for good.
+            if stamp == 0 {
+                continue;
+            }
+            if evidence < OCCUPIED {
+                self.cells[offset] = stamped(cell, 0);
+            } else if self.fading.has_faded(found, stamp, evidence) {
+                self.set_evidence(self.voxel_at(offset), 0);
+                self.cells[offset] = stamped(self.cells[offset], 0);
+            }
+        }
+        &self.changes
+    }
+
     /// Sets everything within `radius_m` of `centre` free: another vehicle flies there, so nothing stands
     /// there. Returns the changes.
     pub fn clear_ball(&mut self, centre: &Vector3<f64>, radius_m: f64) -> &[Change] {
@@ -268,11 +320,14 @@ impl VoxelMap {
         &self.changes
     }
 
-    /// Marks the voxel at `point` as hit with certainty, as prior knowledge does. Returns the changes.
+    /// Marks the voxel at `point` as hit with certainty, as prior knowledge does: it does not fade. Returns
+    /// the changes.
     pub fn insert(&mut self, point: &Vector3<f64>) -> &[Change] {
         self.changes.clear();
         if let Some(voxel) = self.index_of(point) {
             self.set_evidence(voxel, CERTAIN);
+            let offset = self.offset(voxel);
+            self.cells[offset] = stamped(self.cells[offset], 0);
         }
         &self.changes
     }
@@ -286,12 +341,8 @@ impl VoxelMap {
     /// Centres (ENU, metres) of the voxels in which something was hit, lowest layer first. Visits the whole
     /// window.
     pub fn hits(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
-        let [nx, ny, _] = self.counts;
-        self.cells.iter().enumerate().filter(|(_, cell)| evidence(**cell) >= OCCUPIED).map(
-            move |(index, _)| {
-                self.centre_of(VoxelIndex { x: index % nx, y: index / nx % ny, z: index / (nx * ny) })
-            },
-        )
+        let hit = self.cells.iter().enumerate().filter(|(_, cell)| evidence(**cell) >= OCCUPIED);
+        hit.map(|(offset, _)| self.centre_of(self.voxel_at(offset)))
     }
 
     /// How far one can look from `origin` along the horizontal direction `direction` before something unknown
@@ -346,6 +397,8 @@ impl VoxelMap {
         let shift = shift.map(|voxels| voxels.clamp(-1e9, 1e9) as i64);
         self.cells = shifted(&self.cells, self.counts, shift);
         self.blocked_by = shifted(&self.blocked_by, self.counts, shift);
+        let counts = self.counts;
+        self.fading.relocate(|offset| shifted_offset(offset, counts, shift));
         self.corner += Vector3::new(shift[0] as f64, shift[1] as f64, 0.0);
         self.revision += 1;
         true
@@ -430,26 +483,40 @@ impl VoxelMap {
         (voxel.z * self.counts[1] + voxel.y) * self.counts[0] + voxel.x
     }
 
+    fn voxel_at(&self, offset: usize) -> VoxelIndex {
+        let [nx, ny, _] = self.counts;
+        VoxelIndex { x: offset % nx, y: offset / nx % ny, z: offset / (nx * ny) }
+    }
+
     fn is_obstacle(&self, origin: &Vector3<f64>, end: &RayEnd) -> bool {
         let range = self.config.max_range_m;
         end.hit && end.point.z >= self.config.ground_m && (end.point - origin).norm_squared() <= range * range
     }
 
     fn begin_scan(&mut self) {
-        self.scan += 1;
-        if self.scan > MAX_SCAN {
-            self.cells.iter_mut().for_each(|cell| *cell = with(evidence(*cell), 0));
-            self.scan = 1;
+        if self.scan == u16::MAX {
+            // Memory that was never written to stays so.
+            self.cells.iter_mut().filter(|cell| scan(**cell) != 0).for_each(|cell| {
+                *cell = with(evidence(*cell), 0, *cell);
+            });
+            self.scan = 0;
         }
+        self.scan += 1;
     }
 
     fn mark(&mut self, point: &Vector3<f64>) {
         let Some(voxel) = self.index_of(point) else { return };
         let offset = self.offset(voxel);
         let cell = self.cells[offset];
-        if scan(cell) != self.scan {
-            let evidence = evidence(cell).max(0) + HIT;
-            self.set_evidence(voxel, evidence.min(CERTAIN));
+        if scan(cell) == self.scan {
+            return;
+        }
+        let was_inserted = evidence(cell) >= OCCUPIED && stamp(cell) == 0;
+        let evidence = evidence(cell).max(0) + HIT;
+        self.set_evidence(voxel, evidence.min(CERTAIN));
+        if !was_inserted {
+            let stamp = self.fading.hit(offset, stamp(cell));
+            self.cells[offset] = stamped(self.cells[offset], stamp);
         }
     }
 
@@ -473,13 +540,12 @@ impl VoxelMap {
                 if evidence(*cell) == OCCUPIED {
                     lost.push(offset);
                 } else {
-                    *cell = with(lower, now);
+                    *cell = with(lower, now, *cell);
                 }
             }
         });
         for offset in lost {
-            let voxel = VoxelIndex { x: offset % nx, y: offset / nx % ny, z: offset / (nx * ny) };
-            self.set_evidence(voxel, lowered(OCCUPIED));
+            self.set_evidence(self.voxel_at(offset), lowered(OCCUPIED));
         }
     }
 
@@ -504,7 +570,7 @@ impl VoxelMap {
         let offset = self.offset(voxel);
         let was = self::evidence(self.cells[offset]) >= OCCUPIED;
         let is = evidence >= OCCUPIED;
-        self.cells[offset] = with(evidence, self.scan);
+        self.cells[offset] = with(evidence, self.scan, self.cells[offset]);
         if was == is {
             return;
         }
@@ -522,24 +588,31 @@ impl VoxelMap {
     }
 }
 
-/// What a scan writes to: evidence (0 is never seen, [`OCCUPIED`] and more is hit) in the first byte and the
-/// last scan that touched the voxel in the others, because both are read and written together, for every
-/// voxel of every ray.
+/// What a scan writes to: evidence (0 is never seen, [`OCCUPIED`] and more is hit) in the first byte, the
+/// stamp of the last hit in the second, and in the others the last scan that touched the voxel. Scans are
+/// counted to `u16::MAX`, and from 1 again. All are read and written together, for every voxel of every ray.
 type Cell = [u8; 4];
-
-/// Scans are counted to here, and from 1 again.
-const MAX_SCAN: u32 = (1 << 24) - 1;
 
 fn evidence(cell: Cell) -> i8 {
     cell[0] as i8
 }
 
-fn scan(cell: Cell) -> u32 {
-    u32::from_le_bytes(cell) >> 8
+fn stamp(cell: Cell) -> Stamp {
+    cell[1]
 }
 
-fn with(evidence: i8, scan: u32) -> Cell {
-    (scan << 8 | u32::from(evidence as u8)).to_le_bytes()
+fn scan(cell: Cell) -> u16 {
+    (u32::from_le_bytes(cell) >> 16) as u16
+}
+
+/// The cell with other evidence, of another scan.
+fn with(evidence: i8, scan: u16, cell: Cell) -> Cell {
+    let kept = u32::from_le_bytes(cell) & 0xff00;
+    (u32::from(scan) << 16 | kept | u32::from(evidence as u8)).to_le_bytes()
+}
+
+fn stamped(cell: Cell, stamp: Stamp) -> Cell {
+    [cell[0], stamp, cell[2], cell[3]]
 }
 
 /// Evidence after a scan saw through a voxel. Zero is left out: it means never seen.
@@ -569,12 +642,21 @@ fn shifted<T: Copy + Default>(values: &[T], counts: [usize; 3], shift: [i64; 2])
     moved
 }
 
+/// Where the voxel at `offset` is in a window that has moved by `shift` voxels, if it still is in it.
+fn shifted_offset(offset: usize, counts: [usize; 3], shift: [i64; 2]) -> Option<usize> {
+    let [nx, ny, _] = counts;
+    let x = usize::try_from((offset % nx) as i64 - shift[0]).ok().filter(|x| *x < nx)?;
+    let y = usize::try_from((offset / nx % ny) as i64 - shift[1]).ok().filter(|y| *y < ny)?;
+    Some((offset / (nx * ny) * ny + y) * nx + x)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn small() -> VoxelMap {
-        let config = VoxelMapConfig { size_m: [10.0, 10.0, 6.0], ..VoxelMapConfig::default() };
+        let config =
+            VoxelMapConfig { size_m: [10.0, 10.0, 6.0], fade_tau_s: 30.0, ..VoxelMapConfig::default() };
         VoxelMap::new(config, Vector3::new(0.0, 0.0, 3.0)).unwrap()
     }
 
@@ -696,6 +778,159 @@ mod tests {
         map.integrate(EYE, &[hit(-1.9, 0.1, 3.1)]);
         assert!((map.sensed_free_m(&EYE, &east, 12.0) - 1.9).abs() < 0.11);
         assert_eq!(map.sensed_free_m(&EYE, &east, 1.0), 1.0);
+    }
+
+    const AT: Vector3<f64> = Vector3::new(2.1, 0.1, 3.1);
+
+    fn seconds(seconds: u64) -> Duration {
+        Duration::from_secs(seconds)
+    }
+
+    /// The first whole second at which `map` has given up what was hit at [`AT`].
+    fn fades_at(map: &mut VoxelMap) -> Option<u64> {
+        (0..400).find(|second| {
+            map.fade(seconds(*second));
+            map.state(&AT) != VoxelState::Occupied
+        })
+    }
+
+    #[test]
+    fn a_single_hit_fades_sooner_than_a_solid_one() {
+        // 30 s ln 4 = 41.6 s, 30 s ln 12 = 74.5 s.
+        for (hits, expected) in [(1, 41.6), (3, 74.5), (50, 74.5)] {
+            let mut map = small();
+            for _ in 0..hits {
+                map.integrate(EYE, &[hit(2.1, 0.1, 3.1)]);
+            }
+            let faded = fades_at(&mut map).unwrap() as f64;
+            assert!(faded >= expected && faded <= expected + 2.0, "{hits} hits fade after {faded} s");
+            assert_eq!(map.state(&AT), VoxelState::Unknown);
+            assert_eq!(map.hits().count(), 0);
+            assert_eq!(map.fading.len(), 0, "nothing is left to look up");
+            assert_eq!(map.state(&Vector3::new(-1.9, 0.1, 3.1)), VoxelState::Free, "free space stays");
+        }
+    }
+
+    #[test]
+    fn fading_tells_the_whole_column() {
+        let mut map = small();
+        map.integrate(EYE, &[hit(2.1, 0.1, 3.1)]);
+        assert!(map.fade(seconds(40)).is_empty());
+        let revision = map.revision();
+        let changes = map.fade(seconds(44)).to_vec();
+        assert_eq!(changes.len(), 7);
+        assert!(changes.iter().all(|change| !change.occupied));
+        assert!(map.revision() > revision);
+        assert!(map.fade(seconds(45)).is_empty(), "told once");
+    }
+
+    #[test]
+    fn what_is_seen_again_and_again_never_fades() {
+        let mut map = small();
+        map.integrate(EYE, &[hit(2.1, 0.1, 3.1)]);
+        for second in (0..1000).step_by(20) {
+            assert!(map.fade(seconds(second)).is_empty(), "gone at {second} s");
+            map.integrate(EYE, &[hit(2.1, 0.1, 3.1)]);
+            assert_eq!(map.fading.len(), 1, "looked up once at a time");
+        }
+        // Seen through now and then, and hit again.
+        for second in 1000..2000 {
+            let end = if second % 20 < 4 { hit(4.1, 0.1, 3.1) } else { hit(2.1, 0.1, 3.1) };
+            map.fade(seconds(second));
+            map.integrate(EYE, &[end]);
+            assert_eq!(map.state(&AT), VoxelState::Occupied, "gone at {second} s");
+        }
+        assert_eq!(map.fading.len(), 2);
+    }
+
+    #[test]
+    fn a_hit_after_a_voxel_was_given_up_fades_like_a_first_one() {
+        for after in [1, 20, 41] {
+            let mut map = small();
+            map.integrate(EYE, &[hit(2.1, 0.1, 3.1)]);
+            map.fade(seconds(after));
+            map.clear_ball(&AT, 0.1);
+            map.integrate(EYE, &[hit(2.1, 0.1, 3.1)]);
+            let faded = fades_at(&mut map).unwrap() as f64 - after as f64;
+            assert!((40.6..=43.6).contains(&faded), "{faded} s after a hit at {after} s");
+        }
+    }
+
+    #[test]
+    fn what_is_known_beforehand_does_not_fade() {
+        let mut map = small();
+        map.insert(&AT);
+        map.integrate(EYE, &[hit(2.1, 0.1, 3.1)]);
+        assert_eq!(fades_at(&mut map), None, "also when it is hit");
+        let mut map = small();
+        map.integrate(EYE, &[hit(2.1, 0.1, 3.1)]);
+        map.insert(&AT);
+        assert_eq!(fades_at(&mut map), None, "also when it was hit before");
+        map.clear_ball(&AT, 0.1);
+        map.integrate(EYE, &[hit(2.1, 0.1, 3.1)]);
+        map.fade(seconds(500));
+        assert_eq!(map.state(&AT), VoxelState::Unknown, "but what is hit after it has gone does");
+    }
+
+    #[test]
+    fn an_infinite_time_constant_keeps_everything() {
+        let config = VoxelMapConfig { fade_tau_s: f64::INFINITY, ..*small().config() };
+        let mut map = VoxelMap::new(config, Vector3::new(0.0, 0.0, 3.0)).unwrap();
+        map.integrate(EYE, &[hit(2.1, 0.1, 3.1)]);
+        assert!(map.fade(Duration::from_secs(1_000_000_000)).is_empty());
+        assert_eq!(map.state(&AT), VoxelState::Occupied);
+        assert_eq!(map.fading.len(), 0);
+    }
+
+    #[test]
+    fn a_clock_that_leaps_forgets_and_one_that_steps_back_does_not() {
+        // 240 s are eight time constants, after which stamps are used again.
+        for leap in [76, 239, 240, 241, 280, 100_000] {
+            let mut map = small();
+            map.fade(seconds(1000));
+            (0..3).for_each(|_| drop(map.integrate(EYE, &[hit(2.1, 0.1, 3.1)]).to_vec()));
+            assert!(map.fade(seconds(0)).is_empty());
+            assert_eq!(map.fade(seconds(1000 + leap)).len(), 7, "after {leap} s");
+        }
+    }
+
+    #[test]
+    fn hits_fade_where_the_window_has_taken_them() {
+        let mut map = small();
+        map.integrate(EYE, &[hit(2.1, 0.1, 3.1), hit(-3.9, 2.1, 3.1)]);
+        assert_eq!(map.fading.len(), 2);
+        assert!(map.recentre(&Vector3::new(4.0, -3.0, 3.0)));
+        assert_eq!(map.fading.len(), 1, "what has left is dropped");
+        map.integrate(Vector3::new(4.1, -3.1, 3.1), &[hit(7.1, -3.1, 3.1)]);
+        map.fade(seconds(20));
+        map.integrate(Vector3::new(4.1, -3.1, 3.1), &[hit(7.1, -3.1, 3.1)]);
+        map.fade(seconds(44));
+        assert_eq!(map.state(&AT), VoxelState::Unknown);
+        assert_eq!(map.state(&Vector3::new(7.1, -3.1, 3.1)), VoxelState::Occupied);
+    }
+
+    #[test]
+    fn scans_are_told_apart_after_their_count_begins_anew() {
+        let mut map = small();
+        map.integrate(EYE, &[hit(2.1, 0.1, 3.1)]);
+        // Whatever scan first touched a voxel, its number comes again.
+        for _ in 0..usize::from(u16::MAX) {
+            map.integrate(EYE, &[]);
+        }
+        let before = map.state(&AT);
+        for _ in 0..3 {
+            map.integrate(EYE, &[hit(4.1, 0.1, 3.1)]);
+        }
+        assert_eq!((before, map.state(&AT)), (VoxelState::Occupied, VoxelState::Free), "seen through thrice");
+    }
+
+    #[test]
+    fn a_time_constant_that_is_none_is_refused() {
+        for fade_tau_s in [0.0, -1.0, f64::NAN] {
+            let bad = VoxelMapConfig { fade_tau_s, ..VoxelMapConfig::default() };
+            let error = VoxelMap::new(bad, Vector3::zeros()).unwrap_err();
+            assert!(error.to_string().contains("fade_tau_s"), "{error}");
+        }
     }
 
     #[test]

@@ -91,6 +91,7 @@ fn clearance_map(grid: &OccupancyGrid) -> ClearanceMap {
         max_range_m: 1.0,
         vertical_extent_m: 0.0,
         ground_m: -1.0,
+        ..VoxelMapConfig::default()
     };
     let mut map = ClearanceMap::new(config, Vector3::from(size_m) / 2.0, 1.0).unwrap();
     for cell in cells(grid.size()).filter(|cell| grid.is_blocked(*cell)) {
