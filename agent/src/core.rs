@@ -208,7 +208,7 @@ impl AgentCore {
         let mut scripts = Scripts::new(me.clone(), &config.roster);
         for assignment in &config.scripts {
             scripts
-                .load(&mut program, assignment, CONFIGURATION, Begins::AtOnce)
+                .load(&mut program, assignment, CONFIGURATION, Begins::WhenReleased)
                 .and_then(|()| check_script(&config, assignment, STATES_TRIED))
                 .map_err(|why| AgentError::Script { name: assignment.name().to_owned(), why })?;
         }
@@ -436,7 +436,7 @@ impl AgentCore {
             }
             self.tell_scripts(&motion, neighbours);
         }
-        self.scripts.catch_up();
+        self.scripts.catch_up(now);
         if let Some(state) = self.state(now) {
             let state = State { echo: self.neighbours.echo(now), ..state };
             self.node.put_state(&state, link);
@@ -724,7 +724,7 @@ impl AgentCore {
         self.scripts.running()
     }
 
-    /// Why a script that runs no more may run again in this agent's next life, if so: it could not be forgotten yet.
+    /// Why this agent's next life would not run the scripts that run now, if so: they could not be written down yet.
     #[must_use]
     pub fn unsaved_scripts(&self) -> Option<&str> {
         self.scripts.unsaved()

@@ -20,6 +20,7 @@ use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_bp::{Event, Program, ProgramConfig};
 use skein_mav::Datum;
 use skein_wire::vocabulary::{self, *};
+use skein_wire::{Network, NetworkConfig};
 
 const ME: &str = "uav/1";
 const ROSTER: [&str; 4] = ["uav/1", "uav/2", "ground/main", "script/operator"];
@@ -337,8 +338,15 @@ fn a_script_that_cannot_be_kept_is_refused_and_one_that_cannot_be_forgotten_is_t
     vehicle.hears(mine(UNLOAD).with("name", "test"));
     assert!(vehicle.moves(), "it is withdrawn all the same");
     assert_eq!(vehicle.scripts.unsaved(), Some("no space left"));
+    vehicle.scripts.catch_up(Duration::ZERO);
     disk.0.store(true, Ordering::Relaxed);
-    vehicle.scripts.catch_up();
+    vehicle.scripts.catch_up(Duration::from_millis(900));
+    assert_eq!(
+        vehicle.scripts.unsaved(),
+        Some("no space left"),
+        "a disk that fails is left alone for a while"
+    );
+    vehicle.scripts.catch_up(Duration::from_secs(1));
     assert_eq!(vehicle.scripts.unsaved(), None);
 }
 
@@ -358,6 +366,37 @@ fn a_script_of_a_former_life_begins_when_the_vehicle_is_let_go_on() {
     assert!(begins_with(Vehicle::on_the_ground(), mine(READY)));
     assert!(begins_with(Vehicle::in_the_air(), mine(ORDER).with("what", "resume")));
     assert!(!begins_with(Vehicle::in_the_air(), mine(ORDER).with("what", "hold")));
+}
+
+#[test]
+fn a_script_that_is_there_from_the_start_does_not_end_the_hold_of_a_vehicle_found_in_the_air() {
+    let onward = script(json!([
+        {"sync": {"request": {"name": "uav/1/order", "data": {"what": "resume", "by": "script/test"}}}},
+        {"sync": {"wait": "uav/1/landed"}},
+    ]));
+    let by_script = |events: &[Event]| events.iter().any(|event| event.text("by") == Some("script/test"));
+    let found = |begins| {
+        let mut vehicle = Vehicle::on_the_ground();
+        vehicle.scripts.load(&mut vehicle.program, &onward, SENDER, begins).unwrap();
+        let events = vehicle.hears(mine(FOUND_AIRBORNE));
+        (vehicle, by_script(&events))
+    };
+    assert!(found(Begins::AtOnce).1, "one that is sent then may");
+    let (mut vehicle, orders) = found(Begins::WhenReleased);
+    assert!(!orders);
+    assert!(by_script(&vehicle.hears(mine(HAND_BACK))), "whoever hands it back lets it go on");
+
+    let (mut vehicle, _) = found(Begins::WhenReleased);
+    let events = vehicle.hears(mine(UNLOAD).with("name", "test"));
+    assert_eq!(events.iter().filter_map(|event| event.text("state")).collect::<Vec<_>>(), [WITHDRAWN]);
+    assert!(!by_script(&vehicle.hears(mine(ORDER).with("what", "resume"))), "withdrawn before it began");
+
+    // So are those of the configuration.
+    let mut core = AgentCore::new(AgentConfig { scripts: vec![onward], ..config() }).unwrap();
+    let mut link = Network::new(NetworkConfig::default(), 1).join(core.name());
+    core.tick(Duration::ZERO, &mut link);
+    let bid = core.node().node().program().bid(&Runner::bthread_name("test")).unwrap();
+    assert!(bid.waits().contains(&mine(READY)), "{bid:?}");
 }
 
 #[test]

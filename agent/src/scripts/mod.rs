@@ -10,7 +10,7 @@ mod kept;
 mod rights;
 mod runner;
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, time::Duration};
 
 use skein_bp::script::{Argument, Assignment, BoundScript};
 use skein_bp::{Event, EventSet, Program};
@@ -30,6 +30,9 @@ use crate::me::Me;
 /// How many scripts may run at once.
 const MOST_SCRIPTS: usize = skein_wire::State::MAX_SCRIPTS;
 
+/// What could not be kept is tried again after so long.
+const RETRY_AFTER: Duration = Duration::from_secs(1);
+
 /// Who has sent the scripts that come with the vehicle's configuration.
 pub const CONFIGURATION: &str = "configuration";
 
@@ -38,8 +41,8 @@ pub const CONFIGURATION: &str = "configuration";
 pub enum Begins {
     /// At once.
     AtOnce,
-    /// When the vehicle is ready on the ground, or an operator lets it go on or takes it back in the air. A script that a
-    /// former life had been sent cannot know what has become of the vehicle since, and must not end its hold by itself.
+    /// When the vehicle is ready on the ground, or an operator lets it go on or takes it back in the air: one that is there when
+    /// the agent starts cannot know what has become of the vehicle, and must not end its hold by itself.
     WhenReleased,
 }
 
@@ -64,8 +67,10 @@ pub struct Scripts {
     rights: ScriptRights,
     running: BTreeMap<String, RunningScript>,
     store: Option<Box<dyn ScriptStore>>,
-    /// Why the store does not know yet which scripts run no more.
+    /// Why the store does not hold what runs.
     unsaved: Option<String>,
+    /// When to try that again.
+    retry_at: Duration,
 }
 
 /// How many states of a script a vehicle looks at: no more than there is time for between two ticks. The ground looks at
@@ -85,6 +90,7 @@ impl Scripts {
             running: BTreeMap::new(),
             store: None,
             unsaved: None,
+            retry_at: Duration::ZERO,
         }
     }
 
@@ -174,14 +180,15 @@ impl Scripts {
         }
     }
 
-    /// Tries again to keep what could not be kept.
-    pub fn catch_up(&mut self) {
-        if self.unsaved.is_some() {
+    /// Tries again to keep what could not be kept, once a second: a disk that fails may take its time about it.
+    pub fn catch_up(&mut self, now: Duration) {
+        if self.unsaved.is_some() && now >= self.retry_at {
+            self.retry_at = now + RETRY_AFTER;
             self.note_unsaved();
         }
     }
 
-    /// Why a script that runs no more may run again in the agent's next life, if so: the store does not take it in.
+    /// Why the agent's next life would not run the scripts that run now, if so: the store does not take them in.
     #[must_use]
     pub fn unsaved(&self) -> Option<&str> {
         self.unsaved.as_deref()

@@ -60,7 +60,7 @@ struct Driver {
     looked: Duration,
     next_tick: Duration,
     strange_scans: u64,
-    /// Whether it has been told that a script could not be forgotten.
+    /// Whether it has been told that what runs could not be written down.
     told_unsaved: bool,
 }
 
@@ -170,11 +170,13 @@ impl Driver {
         }
     }
 
-    /// Warns once when a script that has been given up would run again after a restart.
+    /// Warns once when another life of the agent would not run the scripts that run now.
     fn tell_unsaved(&mut self) {
         let unsaved = self.core.unsaved_scripts();
         if let (false, Some(why)) = (self.told_unsaved, unsaved) {
-            tracing::warn!("a script that runs no more runs again if the agent starts again now: {why}");
+            tracing::warn!(
+                "which scripts run cannot be written down, so the agent would run others if it started again now: {why}"
+            );
         }
         self.told_unsaved = unsaved.is_some();
     }
