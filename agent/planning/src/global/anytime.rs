@@ -239,21 +239,21 @@ impl Search {
     /// Expands cells until no open one promises a better path at this weight, or `limit` cells have been expanded in all.
     /// Whether the former came first.
     fn improve(&mut self, lattice: &impl Lattice, limit: usize) -> bool {
-        while let Some(next) = self.open.peek() {
+        while let Some(next) = self.open.pop() {
             if self.open.rank(self.goal_g) <= next.rank {
+                self.open.put_back(next);
                 return true;
             }
             let node = self.nodes.slot(next.cell.unpacked());
             if node.closed_in == self.round || g_of(&next) > node.g {
-                self.open.pop();
                 continue;
             }
             if self.expanded >= limit {
+                self.open.put_back(next);
                 return false;
             }
             node.closed_in = self.round;
             let arrived_by = usize::from(node.arrived_by);
-            self.open.pop();
             self.expanded += 1;
             self.expand(lattice, next, arrived_by);
         }
@@ -332,10 +332,10 @@ impl Search {
         cells.map(|cell| (cell, self.nodes.get(cell).g, self.heuristic(cell)))
     }
 
-    /// The path known. Its cost may be less than the goal's `g`: a cell on it may have improved since.
+    /// The path known. With weight, its cost may be less than the goal's `g`: a cell on it may have improved since.
     fn route(&self, lattice: &impl Lattice) -> Route {
         let cells = self.way_to(self.goal);
-        let cost = cost_of(lattice, &cells).min(self.goal_g);
+        let cost = if self.seeks_least() { self.goal_g } else { cost_of(lattice, &cells).min(self.goal_g) };
         Route { bound: self.bound.max(1.0), expanded: self.expanded, cost, cells }
     }
 

@@ -8,8 +8,8 @@ use crate::grid::Packed;
 /// Keys are told apart to 2^-32 of the list's unit: sums of the same costs in different order are the same key, so that ties
 /// are ties.
 const FRACTION_BITS: u32 = 32;
-/// A range is 2^-4 of the unit wide.
-const RANGE_BITS: u32 = FRACTION_BITS - 4;
+/// A range is a quarter of the unit wide.
+const RANGE_BITS: u32 = FRACTION_BITS - 2;
 /// More ranges than this are not told apart.
 const MOST_RANGES: usize = 1 << 16;
 
@@ -94,20 +94,39 @@ impl OpenList {
     /// The first, without taking it.
     #[inline]
     pub fn peek(&mut self) -> Option<Open> {
-        while self.lowest.is_empty() && self.range + 1 < self.used {
-            self.range += 1;
-            let emptied = std::mem::take(&mut self.lowest).into_vec();
-            self.lowest = std::mem::replace(&mut self.later[self.range], emptied).into();
-        }
+        self.raise();
         self.lowest.peek().copied()
     }
 
     /// Takes the first.
     #[inline]
     pub fn pop(&mut self) -> Option<Open> {
-        self.peek()?;
+        self.raise();
+        let first = self.lowest.pop()?;
         self.len -= 1;
-        self.lowest.pop()
+        Some(first)
+    }
+
+    /// Puts the first back that was taken last.
+    pub fn put_back(&mut self, first: Open) {
+        self.len += 1;
+        self.lowest.push(first);
+    }
+
+    /// Goes on to the next range that is not empty, if there is nothing left in this one.
+    #[inline]
+    fn raise(&mut self) {
+        if self.lowest.is_empty() && self.len > 0 {
+            self.next_range();
+        }
+    }
+
+    fn next_range(&mut self) {
+        let later = self.later.get(self.range + 1..self.used).unwrap_or_default();
+        let empty = later.iter().take_while(|range| range.is_empty()).count();
+        self.range += 1 + empty;
+        let emptied = std::mem::take(&mut self.lowest).into_vec();
+        self.lowest = std::mem::replace(&mut self.later[self.range], emptied).into();
     }
 
     /// All of them, in no order that means anything.
@@ -156,7 +175,8 @@ mod tests {
                     prop_assert_eq!((list.len(), list.iter().count()), (heap.len(), heap.len()));
                 }
                 while let Some(open) = heap.pop() {
-                    prop_assert_eq!(list.peek(), Some(open));
+                    prop_assert_eq!(list.pop(), Some(open));
+                    list.put_back(open);
                     prop_assert_eq!(list.pop(), Some(open));
                 }
                 prop_assert_eq!(list.pop(), None);

@@ -42,15 +42,18 @@ static DETOURS: [[Detours; 26]; 26] = all();
 pub(super) fn without(ends: u32, blocked: u32, arrived_by: usize, worth: Worth) -> u32 {
     let blocked = blocked | NEVER;
     let detours = &DETOURS[arrived_by];
-    let has_detour = |number: &usize| {
-        let Detours { direct, by_way } = detours[*number];
-        match worth {
-            Worth::None => false,
-            Worth::Direct => blocked & direct == 0,
-            Worth::Any => blocked & direct == 0 || by_way.iter().any(|needed| blocked & needed == 0),
-        }
-    };
-    moves_to(ends).filter(has_detour).fold(ends, |left, number| left & !MOVES[number].end)
+    let is_free = |needed: u32| blocked & needed == 0;
+    match worth {
+        Worth::None => ends,
+        Worth::Direct => moves_to(ends).fold(ends, |left, number| {
+            left & !(u32::from(is_free(detours[number].direct)) * MOVES[number].end)
+        }),
+        Worth::Any => moves_to(ends).fold(ends, |left, number| {
+            let Detours { direct, by_way: [one, other] } = detours[number];
+            let has_detour = is_free(direct) | is_free(one) | is_free(other);
+            left & !(u32::from(has_detour) * MOVES[number].end)
+        }),
+    }
 }
 
 const fn all() -> [[Detours; 26]; 26] {

@@ -9,6 +9,8 @@ const MOST_ALONG_AN_AXIS: usize = 2_000_000;
 /// The neighbourhood's lowest and highest cells along x, y and z, as bits.
 const FACES: [[u32; 2]; 3] =
     [[0o111_111_111, 0o444_444_444], [0o007_007_007, 0o700_700_700], [0o000_000_777, 0o777_000_000]];
+/// All of the neighbourhood that is outside a grid of one layer for certain.
+const ABOVE_AND_BELOW: u32 = FACES[2][0] | FACES[2][1];
 
 /// The size of a grid cannot be.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -102,14 +104,16 @@ impl OccupancyGrid {
         // Cell (x, y, z) is bit x + 1 of row y + 1 of layer z + 1, so its lowest neighbour is bit x of row y of layer z.
         let first = cell.z * slab + cell.y * self.row + cell.x / 8;
         let shift = cell.x % 8;
-        let mut around = 0;
-        for (dz, low) in [first, first + slab, first + 2 * slab].into_iter().enumerate() {
-            for (dy, byte) in [low, low + self.row, low + 2 * self.row].into_iter().enumerate() {
-                let pair = u16::from_le_bytes([self.bits[byte], self.bits[byte + 1]]);
-                around |= u32::from(pair >> shift & 7) << (9 * dz + 3 * dy);
-            }
+        let in_row = |byte: usize| {
+            let pair = &self.bits[byte..byte + 2];
+            u32::from(u16::from_le_bytes([pair[0], pair[1]]) >> shift & 7)
+        };
+        let in_layer =
+            |byte: usize| in_row(byte) | in_row(byte + self.row) << 3 | in_row(byte + 2 * self.row) << 6;
+        if self.size[2] == 1 {
+            return ABOVE_AND_BELOW | in_layer(first + slab) << 9;
         }
-        around
+        in_layer(first) | in_layer(first + slab) << 9 | in_layer(first + 2 * slab) << 18
     }
 
     /// Which of the 27 cells around a cell of the grid lie outside, in the order of
