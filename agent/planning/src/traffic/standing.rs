@@ -4,6 +4,9 @@
 //! that the last to arrive arrives early; and whoever goes the same way through the same narrow places goes with it, in its *convoy*:
 //! it takes over the leader's rank, and keeps it until it has arrived. So a corridor is used in one direction by many before it is
 //! used in the other, and a vehicle in the middle of it is not sent back because the one ahead of it has arrived.
+//!
+//! Standings that never changed could let all wait for ever: the first for one in its way, and that one for another, which goes
+//! before it and has time. So a vehicle that has waited for long is lent another for a while; see [`Traveller`](super::Traveller).
 
 use std::cmp::Reverse;
 
@@ -23,7 +26,7 @@ pub struct Standing {
     pub arrived: bool,
     /// The rank of its convoy's leader.
     pub convoy: Rank,
-    /// Steps it still has to its goal: within a convoy the one ahead goes first.
+    /// Steps of its shortest way when it set out: within a convoy the one that began further ahead goes first.
     pub left: u16,
     /// Its own rank.
     pub own: Rank,

@@ -19,6 +19,10 @@ const FORGOTTEN_AFTER: u32 = 8;
 const CORNERED_FOR: u32 = 12;
 /// A vehicle at its goal is believed to stay there for so many steps by those that it goes before.
 const STAYS_FOR: u32 = 20;
+/// A vehicle that has rested for so many steps away from its goal does not wait for its turn any longer.
+const PATIENCE: u32 = 30;
+/// Another standing is lent for so many steps.
+const LENT_FOR: u32 = 12;
 
 /// What a vehicle tells the others in its turn.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -110,6 +114,12 @@ pub struct Traveller {
     distances: Distances,
     config: TravellerConfig,
     word: Word,
+    /// Where it stands by itself.
+    standing: Standing,
+    /// The step from which on it has rested where it is.
+    rests_since: u32,
+    /// The standing that it has instead, and until which step.
+    lent: Option<(Standing, u32)>,
     is_hindered: bool,
     heard: BTreeMap<u32, Word>,
     scratch: Scratch,
@@ -151,6 +161,9 @@ impl Traveller {
             roads,
             distances,
             config,
+            standing: word.standing,
+            rests_since: 0,
+            lent: None,
             word,
             is_hindered: false,
             heard: BTreeMap::new(),
@@ -207,6 +220,10 @@ impl Traveller {
         let start = self.movement(step)?.from;
         let flown_from = self.movement(step.saturating_sub(1))?.from;
         self.stand(start);
+        if flown_from != start || start == self.word.goal {
+            self.rests_since = step;
+        }
+        self.word.standing = self.present_standing(step, start);
         let found = self.search(step, start);
         self.is_hindered = found.is_hindered;
         if !found.is_clear && found.itinerary.at(step + 1) == Some(start) {
@@ -254,9 +271,36 @@ impl Traveller {
         search::plan(&request, self.config.budget, &mut self.scratch)
     }
 
+    /// Its own standing, or the one lent to it.
+    fn present_standing(&mut self, step: u32, start: State) -> Standing {
+        if step >= self.rests_since + PATIENCE {
+            self.lent = Some((self.lent_standing(step, start), step + LENT_FOR));
+        }
+        self.lent = self.lent.filter(|(_, until)| step < *until);
+        self.lent.map_or(self.standing, |(lent, _)| lent.min(self.standing))
+    }
+
+    /// The standing that it has for a while after it has rested for long away from its goal. In the way of one that goes before it
+    /// has that one's, but for that one itself: who is in its own way out makes way in turn (priority inheritance: Sha 1990).
+    /// Else, if it has been at its goal, it has its own from before: who rests at its own goal in front of it makes way.
+    fn lent_standing(&self, step: u32, start: State) -> Standing {
+        let rest = Move { from: start, to: start };
+        let crosses = |word: &&Word| {
+            let mut movements = (step..step + LENT_FOR).filter_map(|step| word.itinerary.movement(step));
+            movements.any(|movement| self.config.apart.is_broken(&movement, &rest))
+        };
+        let before = self.heard.values().filter(|word| word.standing < self.standing && !word.is_settled());
+        let first = before.filter(crosses).map(|word| word.standing).min();
+        first.map_or(Standing { arrived: false, ..self.standing }, |first| Standing {
+            left: first.left.saturating_add(1),
+            own: self.standing.own,
+            ..first
+        })
+    }
+
     /// Finds its standing among those it hears.
     fn stand(&mut self, state: State) {
-        let standing = &mut self.word.standing;
+        let standing = &mut self.standing;
         standing.arrived |= state == self.word.goal;
         self.word.lanes = lanes(&self.roads, &self.roads.route(state, &self.distances));
         let leaders = self.heard.values().filter(|word| !word.standing.arrived);
@@ -374,6 +418,46 @@ mod tests {
             "they leave together"
         );
         assert_eq!(ahead.take_turn(1), None);
+    }
+
+    /// Lets all hear one another and take their turns for one step.
+    fn everyone_goes_on(all: &mut [Traveller], step: u32) {
+        for speaker in 0..all.len() {
+            all[speaker].take_turn(step);
+            let word = all[speaker].word().clone();
+            all.iter_mut().for_each(|listener| listener.hear(&word));
+        }
+    }
+
+    #[test]
+    fn who_has_been_at_its_goal_gets_back_to_it_past_one_that_rests_at_its_own() {
+        let roads = Arc::new(room(&["###.###", "......."]));
+        let (mut rests, mut returns) = (traveller(1, &roads, 3.0, 3.0), traveller(2, &roads, 5.0, 1.0));
+        rests.standing.convoy.way = std::cmp::Reverse(100);
+        returns.standing.arrived = true;
+        let mut all = [rests, returns];
+        let home = (1..100).find(|step| {
+            everyone_goes_on(&mut all, *step);
+            all.iter().all(|traveller| traveller.is_home(*step))
+        });
+        assert!(home.is_some_and(|step| step > PATIENCE), "{home:?}");
+    }
+
+    #[test]
+    fn who_stands_in_the_way_for_long_goes_right_after_the_one_whose_way_it_is() {
+        let roads = Arc::new(room(&["......."]));
+        let (first, stands) = (traveller(1, &roads, 0.0, 6.0), traveller(2, &roads, 4.0, 1.0));
+        let by_itself = stands.standing;
+        let mut all = [first, stands];
+        let standings: Vec<Standing> = (1..PATIENCE + 10)
+            .map(|step| {
+                everyone_goes_on(&mut all, step);
+                all[1].word().standing
+            })
+            .collect();
+        let first = all[0].word().standing;
+        assert_eq!(standings[0], by_itself);
+        assert!(standings.iter().any(|standing| first < *standing && standing.convoy == first.convoy));
     }
 
     #[test]
