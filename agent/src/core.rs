@@ -26,6 +26,7 @@ use crate::{
         guidance::{Guidance, Motion, Report, Surroundings},
         perception::{Perception, Pose, Scan},
         set_point::{FRESH_FOR, KeepAlive, SILENT_AFTER, keep_alive, oldest_age},
+        touchdown::Descent,
     },
     precedence,
     scripts::{
@@ -514,8 +515,11 @@ impl AgentCore {
                 }
             }
             Some(ADVANCE | HOMEWARD) => self.guidance.grant_leave(now),
-            Some(LAND) => self.task = format!("landing: {why}"),
-            Some(RETURN) if self.flight.phase() != FlightPhase::Landing => {
+            Some(LAND) => {
+                self.task = format!("landing: {why}");
+                self.settle(now, neighbours);
+            }
+            Some(RETURN) if !self.flight.is_landing() => {
                 self.task = format!("returning: {why}");
             }
             Some(HOLD) => self.task = "holding".to_owned(),
@@ -593,21 +597,49 @@ impl AgentCore {
         self.task = task.to_owned();
     }
 
+    /// When what set-points are made from was measured.
+    fn inputs(&self) -> Vec<Option<Duration>> {
+        let telemetry = self.companion.telemetry();
+        let position = telemetry.position.map(|position| position.stamp);
+        let attitude = telemetry.attitude.map(|attitude| attitude.stamp);
+        let scan = self.config.lidar.then(|| self.perception.last_scan());
+        [position, attitude].into_iter().chain(scan).collect()
+    }
+
+    /// A vehicle that is to land goes to where it can, and lands there; wherever it is in the end, or if it does not see.
+    fn settle(&mut self, now: Duration, neighbours: &[Neighbour]) {
+        let FlightPhase::Settling { until } = self.flight.phase() else { return };
+        let sees = keep_alive(now, &self.inputs()) == KeepAlive::Command;
+        let place = self.motion().filter(|_| sees && now < until).and_then(|motion| {
+            let descent = Descent {
+                name: &self.name,
+                position: motion.position,
+                ground_m: self.config.home[2],
+                envelope: &self.config.envelope,
+                fence: &self.config.fence,
+                map: self.perception.map(),
+                neighbours,
+            };
+            descent.detour(self.guidance.settles_at())
+        });
+        self.guidance.settle_at(place);
+        if place.is_none() {
+            self.flight.touch_down(now, &mut self.companion);
+        }
+    }
+
     /// The control loop: it waits for no b-thread and no network.
     fn steer(&mut self, now: Duration, neighbours: &[Neighbour]) {
+        self.settle(now, neighbours);
         if !self.flight.sends_set_points() {
             self.guidance.rest();
             return;
         }
-        let telemetry = self.companion.telemetry();
-        let position = telemetry.position.map(|position| position.stamp);
-        let attitude = telemetry.attitude.map(|attitude| attitude.stamp);
-        let inputs = [position, attitude, self.perception.last_scan()];
-        let inputs = if self.config.lidar { &inputs[..] } else { &inputs[..2] };
         let Some(motion) = self.motion() else { return };
         let tracks: Vec<_> =
             neighbours.iter().filter(|neighbour| neighbour.armed).map(|neighbour| neighbour.track).collect();
-        match keep_alive(now, inputs) {
+        let inputs = self.inputs();
+        match keep_alive(now, &inputs) {
             KeepAlive::Command => {
                 let surroundings = Surroundings {
                     map: self.perception.map(),
@@ -617,7 +649,7 @@ impl AgentCore {
                 };
                 let set_point = self.guidance.steer(now, &motion, &surroundings);
                 self.set_points.commands += 1;
-                let age = oldest_age(now, inputs).unwrap_or_default();
+                let age = oldest_age(now, &inputs).unwrap_or_default();
                 self.set_points.oldest_input = self.set_points.oldest_input.max(age);
                 self.companion.set_point(now, set_point);
             }

@@ -14,6 +14,8 @@ use crate::me::Me;
 const SET_POINTS_BEFORE_OFFBOARD: Duration = Duration::from_millis(300);
 /// The command to land is repeated this often while the autopilot does something else.
 const REPEAT_LAND: Duration = Duration::from_secs(2);
+/// A vehicle that is to land goes to a better place for it for so long at most.
+const SETTLES_FOR: Duration = Duration::from_secs(15);
 /// Take-off is over this far below the height asked for.
 const TAKEOFF_TOLERANCE_M: f64 = 0.3;
 
@@ -35,6 +37,11 @@ pub enum FlightPhase {
     },
     /// The agent flies the vehicle.
     Flying,
+    /// The agent flies the vehicle, which is to land, to where it can.
+    Settling {
+        /// It lands then, wherever it is.
+        until: Duration,
+    },
     /// The autopilot lands the vehicle.
     Landing,
     /// Somebody else flies the vehicle.
@@ -79,7 +86,16 @@ impl Flight {
     /// Whether set-points may leave the agent at all.
     #[must_use]
     pub fn sends_set_points(&self) -> bool {
-        matches!(self.phase, FlightPhase::Engaging { .. } | FlightPhase::Flying)
+        matches!(
+            self.phase,
+            FlightPhase::Engaging { .. } | FlightPhase::Flying | FlightPhase::Settling { .. }
+        )
+    }
+
+    /// Whether the vehicle is on its way down.
+    #[must_use]
+    pub fn is_landing(&self) -> bool {
+        matches!(self.phase, FlightPhase::Settling { .. } | FlightPhase::Landing)
     }
 
     /// Whether this agent has armed the vehicle, and it is not up yet.
@@ -102,15 +118,23 @@ impl Flight {
                 self.left_ground = false;
                 companion.command(now, Command::Arm);
             }
-            (Some(LAND), phase) if phase != FlightPhase::Grounded => {
-                self.phase = FlightPhase::Landing;
-                self.land_again = now + REPEAT_LAND;
-                companion.command(now, Command::Land);
+            // Where, is seen before the tick is over: see `touch_down`.
+            (Some(LAND), FlightPhase::Flying) => {
+                self.phase = FlightPhase::Settling { until: now + SETTLES_FOR };
             }
+            (Some(LAND), FlightPhase::Grounded | FlightPhase::Settling { .. }) => {}
+            (Some(LAND), _) => self.touch_down(now, companion),
             (Some(HOLD), FlightPhase::Adopted) => companion.command(now, Command::Hold),
             (Some(HAND_BACK), FlightPhase::Taken) => self.engage(now),
             _ => {}
         }
+    }
+
+    /// Has the autopilot land the vehicle where it is.
+    pub fn touch_down(&mut self, now: Duration, companion: &mut Companion) {
+        self.phase = FlightPhase::Landing;
+        self.land_again = now + REPEAT_LAND;
+        companion.command(now, Command::Land);
     }
 
     /// An operator lets an adopted vehicle fly its mission.
@@ -125,7 +149,11 @@ impl Flight {
     pub fn wake(&mut self, pause: Duration) -> Option<Event> {
         let flew = matches!(
             self.phase,
-            FlightPhase::Arming | FlightPhase::Climbing | FlightPhase::Engaging { .. } | FlightPhase::Flying
+            FlightPhase::Arming
+                | FlightPhase::Climbing
+                | FlightPhase::Engaging { .. }
+                | FlightPhase::Flying
+                | FlightPhase::Settling { .. }
         );
         flew.then(|| {
             self.phase = FlightPhase::Taken;
@@ -164,7 +192,7 @@ impl Flight {
     /// Whether a change to `mode` is none that this agent asked for.
     fn is_foreign(&self, mode: FlightMode) -> bool {
         match self.phase {
-            FlightPhase::Flying => mode != FlightMode::Offboard,
+            FlightPhase::Flying | FlightPhase::Settling { .. } => mode != FlightMode::Offboard,
             FlightPhase::Engaging { .. } | FlightPhase::Climbing => {
                 !matches!(mode, FlightMode::Offboard | FlightMode::Takeoff | FlightMode::Hold)
             }
@@ -234,7 +262,11 @@ impl Flight {
                 self.phase = FlightPhase::Flying;
                 return Some(self.me.event(AIRBORNE));
             }
-            FlightPhase::Landing | FlightPhase::Taken | FlightPhase::Flying | FlightPhase::Adopted
+            FlightPhase::Settling { .. }
+            | FlightPhase::Landing
+            | FlightPhase::Taken
+            | FlightPhase::Flying
+            | FlightPhase::Adopted
                 if landed == Landed::OnGround && !armed =>
             {
                 self.phase = FlightPhase::Grounded;

@@ -7,7 +7,7 @@ mod prism;
 use nalgebra::{Vector2, Vector3};
 
 pub use height_grid::{HeightGrid, HeightGridError};
-pub use keep_out::KeepOut;
+pub use keep_out::{KeepOut, places_around};
 pub use prism::NoFlyPrism;
 
 /// Beyond this many slopes from its peak a mountain has ended: 2 mm are left there of 400 m.

@@ -62,6 +62,8 @@ const GIVES_WAY_M: f64 = 1.0;
 const ROOM_AHEAD_M: f64 = 1.5;
 /// Speed at which a hovering vehicle goes back to its place, at most, m/s.
 const STATION_KEEPING_M_S: f64 = 0.5;
+/// Speed at which a vehicle that is to land goes to where it can, at most, m/s.
+const SETTLING_M_S: f64 = 1.0;
 
 /// Nearer than this is the same place, m.
 const SAME_PLACE_M: f64 = 1e-6;
@@ -158,6 +160,8 @@ pub struct Guidance {
     passage: Option<Passage>,
     /// Where to hover while there is no leave to move.
     hover_at: Option<Vector3<f64>>,
+    /// Where to go before landing.
+    settles_at: Option<Vector3<f64>>,
     local: Local,
     filter: FilterConfig,
     escape: EscapeDetector,
@@ -181,6 +185,7 @@ impl Guidance {
             leave_until: Duration::ZERO,
             passage: None,
             hover_at: None,
+            settles_at: None,
             local: Local::new(&envelope, planners, obstacle_clearance_m),
             filter: FilterConfig {
                 separation_m: envelope.separation_m,
@@ -217,9 +222,21 @@ impl Guidance {
         self.leave_until = now + LEAVE_LASTS;
     }
 
+    /// Where the vehicle goes before it lands.
+    #[must_use]
+    pub fn settles_at(&self) -> Option<Vector3<f64>> {
+        self.settles_at
+    }
+
+    /// Goes to a place to land there, metres ENU, and needs no leave for it; `None` to follow its path again.
+    pub fn settle_at(&mut self, place: Option<Vector3<f64>>) {
+        self.settles_at = place;
+    }
+
     /// Somebody else moves the vehicle, or nobody: whatever place it hovered at is not its place any more.
     pub fn rest(&mut self) {
         self.hover_at = None;
+        self.settles_at = None;
         self.local.rest();
     }
 
@@ -476,7 +493,8 @@ impl Guidance {
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles either way.
     pub fn steer(&mut self, now: Duration, motion: &Motion, surroundings: &Surroundings<'_>) -> SetPoint {
         let wish = self
-            .along_path(now, motion, surroundings.map)
+            .aside(motion)
+            .or_else(|| self.along_path(now, motion, surroundings.map))
             .unwrap_or_else(|| self.keep_station(motion, surroundings.map));
         let unheard = self.local.moving(now, surroundings.map);
         let others: Vec<_> = surroundings.neighbours.iter().copied().chain(unheard).collect();
@@ -535,6 +553,15 @@ impl Guidance {
         desired.z = way.sign() * self.envelope.climb_m_s;
         let request = separation::Motion { desired, planar: false, ..request };
         Kept { velocity: filter(&request, others, &obstacles, &self.filter).velocity, evades: true }
+    }
+
+    /// To where it will land; `None` if it is not to.
+    fn aside(&mut self, motion: &Motion) -> Option<Wish> {
+        let place = self.settles_at?;
+        self.local.pause();
+        self.hover_at = None;
+        let velocity = apf::limited(place - motion.position, SETTLING_M_S);
+        Some(Wish { velocity, height_m: place.z })
     }
 
     /// Along the path; `None` without path or leave.

@@ -9,3 +9,4 @@ pub mod local;
 pub mod perception;
 pub mod route_search;
 pub mod set_point;
+pub mod touchdown;

@@ -143,17 +143,36 @@ impl KeepOut {
         accepts: impl Fn(&Vector3<f64>) -> bool,
     ) -> Option<Vector3<f64>> {
         let is_open = |place: &Vector3<f64>| self.room_m(place) >= 0.0 && accepts(place);
-        let rings = (1..=(FURTHEST_M / RING_M) as u32).map(|ring| f64::from(ring) * RING_M);
-        let places = rings.flat_map(|radius_m| {
-            // No two neighbours on a ring are much further apart than rings are.
-            let count = (std::f64::consts::TAU * radius_m / RING_M).ceil() as u32;
-            (0..count).map(move |k| {
-                let (sin, cos) = (f64::from(k) / f64::from(count) * std::f64::consts::TAU).sin_cos();
-                point + Vector3::new(cos, sin, 0.0) * radius_m
-            })
-        });
-        std::iter::once(*point).chain(places).find(is_open)
+        places_around(point, FURTHEST_M).find(is_open)
     }
+
+    /// Least distance to a zone, margin included, of the way straight down from `point` to the ground, metres: negative where
+    /// it leads through one. The ground is at `ground_m`, or is the terrain.
+    #[must_use]
+    pub fn room_below_m(&self, point: &Vector3<f64>, ground_m: f64) -> f64 {
+        let mut below = *point;
+        let mut room_m = f64::INFINITY;
+        while below.z >= ground_m && self.off_terrain_m(&below, 0.0) >= 0.0 {
+            room_m = room_m.min(self.off_zones_m(&below) - self.margin_m);
+            below.z -= room_m.abs().max(STEP_M);
+        }
+        room_m
+    }
+}
+
+/// `point`, and places around it at its height up to `furthest_m` away, metres, the nearest first, half a metre apart.
+pub fn places_around(point: &Vector3<f64>, furthest_m: f64) -> impl Iterator<Item = Vector3<f64>> {
+    let point = *point;
+    let rings = (1..=(furthest_m / RING_M) as u32).map(|ring| f64::from(ring) * RING_M);
+    let places = rings.flat_map(move |radius_m| {
+        // No two neighbours on a ring are much further apart than rings are.
+        let count = (std::f64::consts::TAU * radius_m / RING_M).ceil() as u32;
+        (0..count).map(move |k| {
+            let (sin, cos) = (f64::from(k) / f64::from(count) * std::f64::consts::TAU).sin_cos();
+            point + Vector3::new(cos, sin, 0.0) * radius_m
+        })
+    });
+    std::iter::once(point).chain(places)
 }
 
 impl ThreatZone {

@@ -1,0 +1,205 @@
+//! Where a vehicle that is to land goes down: where nobody is below it, nothing that the map knows, and no zone.
+
+use nalgebra::Vector3;
+use skein_dbp::NodeName;
+use skein_planning::airspace::places_around;
+use skein_planning::map::{ClearanceMap, VoxelState};
+
+use crate::config::{Envelope, Fence};
+use crate::neighbours::Neighbour;
+
+/// An autopilot that lands may drift so far, m.
+const DRIFT_M: f64 = 0.3;
+/// A place to go down is looked for within this distance, m.
+const REACH_M: f64 = 8.0;
+/// What the map knows below is looked at every so often, m: no more than a voxel is wide.
+const LAYER_M: f64 = 0.2;
+/// Nearer than this a place is reached, m.
+const ARRIVAL_M: f64 = 0.15;
+/// Places around a hull that are looked at.
+const AROUND: u32 = 8;
+
+/// A vehicle in the air, and what it knows of what is around and below. World ENU, metres.
+#[derive(Clone, Copy, Debug)]
+pub struct Descent<'a> {
+    /// The vehicle's name.
+    pub name: &'a NodeName,
+    /// Where it is.
+    pub position: Vector3<f64>,
+    /// Height of the ground.
+    pub ground_m: f64,
+    /// Its body.
+    pub envelope: &'a Envelope,
+    /// Where it may fly.
+    pub fence: &'a Fence,
+    /// Its map, with what is closed.
+    pub map: &'a ClearanceMap,
+    /// The others, in the air and on the ground.
+    pub neighbours: &'a [Neighbour],
+}
+
+impl Descent<'_> {
+    /// Where to go first, at the vehicle's height: `None` if it can go down where it is, or nowhere within reach. `chosen`
+    /// is kept as long as it will do.
+    #[must_use]
+    pub fn detour(&self, chosen: Option<Vector3<f64>>) -> Option<Vector3<f64>> {
+        let mut places = chosen.into_iter().chain(places_around(&self.position, REACH_M));
+        let place = places.find(|place| self.is_free_below(place) && self.can_be_reached(place))?;
+        ((place - self.position).xy().norm() > ARRIVAL_M).then_some(place)
+    }
+
+    /// Whether nobody and nothing known is straight below a place.
+    fn is_free_below(&self, place: &Vector3<f64>) -> bool {
+        let is_apart = |neighbour: &Neighbour| {
+            let reach_m = self.envelope.hull_m + neighbour.track.radius_m + DRIFT_M;
+            (neighbour.position() - place).xy().norm() >= reach_m
+        };
+        self.neighbours.iter().filter(|neighbour| self.gives_way_to(neighbour)).all(is_apart)
+            && self.map.keep_out().is_none_or(|zones| zones.room_below_m(place, self.ground_m) >= 0.0)
+            && self.is_empty_below(place)
+    }
+
+    /// Of two above one another the lower goes first; at the same height the one whose name comes first.
+    fn gives_way_to(&self, neighbour: &Neighbour) -> bool {
+        let height_m = neighbour.position().z;
+        height_m < self.position.z || (height_m == self.position.z && neighbour.node < *self.name)
+    }
+
+    fn is_empty_below(&self, place: &Vector3<f64>) -> bool {
+        let layers = ((place.z - self.ground_m) / LAYER_M).max(0.0) as u32;
+        let around = (0..AROUND).map(|k| {
+            let (sin, cos) = (f64::from(k) / f64::from(AROUND) * std::f64::consts::TAU).sin_cos();
+            Vector3::new(cos, sin, 0.0) * self.envelope.hull_m
+        });
+        std::iter::once(Vector3::zeros()).chain(around).all(|offset| {
+            (0..=layers).all(|layer| {
+                let point = place + offset - Vector3::z() * (f64::from(layer) * LAYER_M);
+                self.map.voxels().state(&point) != VoxelState::Occupied
+            })
+        })
+    }
+
+    /// Whether the way to a place at the same height is free, and nobody is there.
+    fn can_be_reached(&self, place: &Vector3<f64>) -> bool {
+        let Descent { position, map, .. } = self;
+        let Fence { min, max } = self.fence;
+        let is_inside = (0..2).all(|axis| (min[axis]..=max[axis]).contains(&place[axis]));
+        let clearance_m = self.envelope.hull_m.min(map.clearance(position));
+        let is_taken = |neighbour: &Neighbour| {
+            neighbour.armed && (neighbour.position() - place).norm() < self.envelope.separation_m
+        };
+        let leads_out = map.keep_out().is_some_and(|zones| zones.room_m(position) < 0.0);
+        place == position
+            || is_inside
+                && !self.neighbours.iter().any(is_taken)
+                && map.is_segment_clear(position, place, clearance_m)
+                && (leads_out || map.is_open(position, place))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use skein_planning::map::VoxelMapConfig;
+    use skein_planning::separation::Neighbour as Track;
+
+    use super::*;
+
+    const FENCE: Fence = Fence { min: [-20.0, -20.0, 0.0], max: [20.0, 20.0, 12.0] };
+    const HERE: Vector3<f64> = Vector3::new(0.0, 0.0, 3.0);
+
+    fn name(text: &str) -> NodeName {
+        NodeName::new(text).unwrap()
+    }
+
+    fn other(node: &str, position: [f64; 3], armed: bool) -> Neighbour {
+        let track = Track {
+            id: 0,
+            position: position.into(),
+            velocity: Vector3::zeros(),
+            sigma_m: 0.05,
+            age_s: 0.0,
+            radius_m: 0.25,
+            cooperative: true,
+        };
+        Neighbour { node: name(node), armed, track }
+    }
+
+    fn map() -> ClearanceMap {
+        ClearanceMap::new(VoxelMapConfig::default(), HERE, 1.0).unwrap()
+    }
+
+    /// Where `uav/5` goes before it lands.
+    fn detour(
+        map: &ClearanceMap,
+        neighbours: &[Neighbour],
+        chosen: Option<Vector3<f64>>,
+    ) -> Option<Vector3<f64>> {
+        let (me, envelope) = (name("uav/5"), Envelope::default());
+        let descent = Descent {
+            name: &me,
+            position: HERE,
+            ground_m: 0.0,
+            envelope: &envelope,
+            fence: &FENCE,
+            map,
+            neighbours,
+        };
+        descent.detour(chosen)
+    }
+
+    #[test]
+    fn over_free_ground_there_is_no_detour() {
+        assert_eq!(detour(&map(), &[], None), None);
+        assert_eq!(detour(&map(), &[other("uav/1", [1.0, 0.0, 0.1], false)], None), None, "it stands aside");
+    }
+
+    #[test]
+    fn of_two_above_one_another_the_higher_makes_way_and_at_one_height_the_later_name() {
+        let with = |node, z| detour(&map(), &[other(node, [0.2, 0.0, z], true)], None);
+        assert_eq!(with("uav/1", 4.0), None);
+        assert!(with("uav/9", 2.9).is_some());
+        assert!(with("uav/1", 3.0).is_some());
+        assert_eq!(with("uav/9", 3.0), None);
+    }
+
+    #[test]
+    fn the_place_is_near_and_kept_while_it_will_do() {
+        let below = other("uav/1", [0.0, 0.0, 0.1], false);
+        let place = detour(&map(), std::slice::from_ref(&below), None).unwrap();
+        assert!((0.8..1.6).contains(&(place - HERE).norm()), "{place}");
+        let chosen = HERE + Vector3::new(-3.0, 2.0, 0.0);
+        assert_eq!(detour(&map(), std::slice::from_ref(&below), Some(chosen)), Some(chosen));
+        let taken = other("uav/2", [-3.2, 2.0, 0.1], false);
+        assert_eq!(detour(&map(), &[below, taken], Some(chosen)), Some(place));
+    }
+
+    #[test]
+    fn nobody_goes_to_where_another_flies_at_any_height() {
+        let below = other("uav/1", [0.0, 0.0, 0.1], false);
+        let place = detour(&map(), std::slice::from_ref(&below), None).unwrap();
+        let there = other("uav/9", [place.x, place.y, place.z + 0.5], true);
+        let elsewhere = detour(&map(), &[below, there], None).unwrap();
+        assert!((elsewhere - place).norm() > 1.0);
+    }
+
+    #[test]
+    fn what_the_map_knows_below_is_not_landed_on() {
+        let mut map = map();
+        map.insert(&Vector3::new(0.1, 0.1, 1.5));
+        let place = detour(&map, &[], None).unwrap();
+        assert!((place - HERE).xy().norm() > 0.3, "{place}");
+    }
+
+    #[test]
+    fn where_there_is_no_better_place_within_reach_it_lands_where_it_is() {
+        let standing = |n: i32| {
+            other(
+                &format!("uav/{}", n + 10),
+                [f64::from(n % 25) - 12.0, f64::from(n / 25) - 12.0, 0.1],
+                false,
+            )
+        };
+        let everywhere: Vec<Neighbour> = (0..625).map(standing).collect();
+        assert_eq!(detour(&map(), &everywhere, None), None);
+    }
+}

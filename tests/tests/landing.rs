@@ -1,0 +1,80 @@
+//! A vehicle that is told to land does not come down upon another, or into a zone.
+
+#![allow(clippy::unwrap_used)]
+
+use std::time::Duration;
+
+use nalgebra::Vector3;
+use skein_ground::{Destination, Order, Who};
+use skein_tests::Lockstep;
+
+/// Two vehicles 6 m apart: the first lands after 10 m, the second flies 40 m. And more of the scenario.
+fn two(more: &str) -> Lockstep {
+    Lockstep::from_text(&format!(
+        "name = \"over\"\ntime_limit_s = 200.0\n[bounds]\nmin_m = [-10.0, -10.0, -1.0]\nmax_m = [50.0, 20.0, 15.0]\n\
+         [[vehicle]]\nstart_m = [0.0, 0.0]\nwaypoints_m = [[10.0, 0.0, 3.0]]\n\
+         [[vehicle]]\nstart_m = [0.0, 6.0]\nwaypoints_m = [[40.0, 6.0, 3.0]]\n{more}"
+    ))
+}
+
+fn place(lockstep: &Lockstep, index: usize) -> Vector3<f64> {
+    lockstep.swarm.simulation().vehicle(index).unwrap().motion.position
+}
+
+fn is_airborne(lockstep: &Lockstep, index: usize) -> bool {
+    lockstep.swarm.simulation().vehicle(index).unwrap().airborne
+}
+
+fn step_until(lockstep: &mut Lockstep, what: &str, is_so: impl Fn(&Lockstep) -> bool) {
+    let deadline = lockstep.swarm.now() + Duration::from_secs(60);
+    while !is_so(lockstep) {
+        assert!(lockstep.swarm.now() < deadline, "{what}");
+        lockstep.step();
+    }
+}
+
+/// Has the second vehicle hover above a place, and then land there. Returns where it is then.
+fn land_above(lockstep: &mut Lockstep, [x, y]: [f64; 2]) -> Vector3<f64> {
+    let second = || Who::only(lockstep.nodes[1].clone());
+    let (go, land) = (Order::GoTo(second(), Destination { x, y, z: Some(3.0) }), Order::Land(second()));
+    lockstep.swarm.order(&go).unwrap();
+    let above = Vector3::new(x, y, 3.0);
+    step_until(lockstep, "it does not go there", |lockstep| {
+        let motion = lockstep.swarm.simulation().vehicle(1).unwrap().motion;
+        (motion.position - above).norm() < 0.5 && motion.velocity.norm() < 0.2
+    });
+    lockstep.swarm.order(&land).unwrap();
+    step_until(lockstep, "it does not land", |lockstep| !is_airborne(lockstep, 1));
+    place(lockstep, 1)
+}
+
+#[test]
+fn told_to_land_above_one_that_has_landed_it_comes_down_beside_it() {
+    let mut lockstep = two("");
+    step_until(&mut lockstep, "the first does not fly", |lockstep| place(lockstep, 0).x > 9.0);
+    step_until(&mut lockstep, "the first does not land", |lockstep| !is_airborne(lockstep, 0));
+    let first = place(&lockstep, 0);
+    let second = land_above(&mut lockstep, [first.x, first.y]);
+    assert_eq!(lockstep.swarm.truth().collisions_vehicle, 0);
+    let apart_m = (first - second).xy().norm();
+    assert!((0.7..2.0).contains(&apart_m), "{first} and {second} are {apart_m} m apart");
+}
+
+#[test]
+fn told_to_land_above_a_zone_it_comes_down_outside() {
+    let zone =
+        "[[airspace.no_fly]]\ncentre_m = [20.0, 6.0]\nradius_m = 1.5\nfloor_m = 0.0\nceiling_m = 1.5\n";
+    let mut lockstep = two(zone);
+    step_until(&mut lockstep, "the second does not fly", |lockstep| place(lockstep, 1).x > 9.0);
+    let second = land_above(&mut lockstep, [20.0, 6.0]);
+    let off_m = (second - Vector3::new(20.0, 6.0, 0.0)).xy().norm();
+    assert!((1.5..5.0).contains(&off_m), "it is {off_m} m from the middle");
+}
+
+#[test]
+fn over_free_ground_it_comes_down_where_it_is() {
+    let mut lockstep = two("");
+    step_until(&mut lockstep, "the second does not fly", |lockstep| place(lockstep, 1).x > 9.0);
+    let second = land_above(&mut lockstep, [20.0, 6.0]);
+    assert!((second - Vector3::new(20.0, 6.0, 0.0)).xy().norm() < 0.5, "{second}");
+}
