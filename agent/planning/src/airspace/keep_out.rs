@@ -153,8 +153,9 @@ impl KeepOut {
         let mut below = *point;
         let mut room_m = f64::INFINITY;
         while below.z >= ground_m && self.off_terrain_m(&below, 0.0) >= 0.0 {
-            room_m = room_m.min(self.off_zones_m(&below) - self.margin_m);
-            below.z -= room_m.abs().max(STEP_M);
+            let here_m = self.off_zones_m(&below) - self.margin_m;
+            room_m = room_m.min(here_m);
+            below.z -= here_m.abs().max(STEP_M);
         }
         room_m
     }
@@ -322,6 +323,19 @@ mod tests {
             let inside = (0..SAMPLES).filter(|k| keep_out.room_m(&at(*k)) < 0.0).count();
             let counted_m = inside as f64 / SAMPLES as f64 * (to - from).norm();
             prop_assert!((keep_out.inside_m(&from, &to) - counted_m).abs() < 0.6);
+        }
+
+        #[test]
+        fn the_way_down_leads_through_a_zone_if_a_point_of_it_is_inside(point in point()) {
+            let keep_out = keep_out();
+            let heights = (0..2000).map(|k| point.z * f64::from(k) / 2000.0);
+            let above_ground = heights
+                .map(|height| Vector3::new(point.x, point.y, height))
+                .filter(|below| keep_out.airspace.clearance_m(below) >= 0.0);
+            let least_m = above_ground.map(|below| keep_out.off_zones_m(&below) - 1.0).fold(f64::INFINITY, f64::min);
+            let told_m = keep_out.room_below_m(&point, 0.0);
+            prop_assert!(told_m.is_sign_negative() == least_m.is_sign_negative() || least_m.abs() < STEP_M);
+            prop_assert!(least_m < 0.0 || told_m >= least_m - STEP_M);
         }
 
         #[test]
