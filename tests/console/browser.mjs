@@ -13,7 +13,7 @@ export async function open(url, { renderer = 'webgl', colorScheme = 'dark', befo
   const browser = await chromium.launch({
     executablePath: EXECUTABLE,
     ...(renderer === 'svg'
-      ? { args: [...ARGUMENTS, '--disable-gpu'], ignoreDefaultArgs: ['--enable-unsafe-swiftshader'] }
+      ? { args: [...ARGUMENTS, '--disable-3d-apis'], ignoreDefaultArgs: ['--enable-unsafe-swiftshader'] }
       : { args: [...ARGUMENTS, '--enable-unsafe-swiftshader'] }),
   });
   const page = await browser.newPage({ viewport: { width: 1280, height: 800 }, colorScheme });
