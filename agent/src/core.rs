@@ -614,6 +614,7 @@ impl AgentCore {
             let descent = Descent {
                 name: &self.name,
                 position: motion.position,
+                stop: self.guidance.stop(&motion),
                 ground_m: self.config.home[2],
                 envelope: &self.config.envelope,
                 fence: &self.config.fence,

@@ -122,6 +122,7 @@ impl Flight {
             (Some(LAND), FlightPhase::Flying) => {
                 self.phase = FlightPhase::Settling { until: now + SETTLES_FOR };
             }
+            // Said again it changes nothing: to come down upon somebody is worse than some seconds more of an empty battery.
             (Some(LAND), FlightPhase::Grounded | FlightPhase::Settling { .. }) => {}
             (Some(LAND), _) => self.touch_down(now, companion),
             (Some(HOLD), FlightPhase::Adopted) => companion.command(now, Command::Hold),

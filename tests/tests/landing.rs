@@ -61,6 +61,31 @@ fn told_to_land_above_one_that_has_landed_it_comes_down_beside_it() {
 }
 
 #[test]
+fn told_to_land_at_full_speed_it_does_not_come_to_a_stop_above_one_that_has_landed() {
+    for before_m in [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0] {
+        let mut lockstep = two("");
+        step_until(&mut lockstep, "the first does not fly", |lockstep| place(lockstep, 0).x > 9.0);
+        step_until(&mut lockstep, "the first does not land", |lockstep| !is_airborne(lockstep, 0));
+        let (first, second) = (place(&lockstep, 0), Who::only(lockstep.nodes[1].clone()));
+        // From where it hovers 12 m further on, back over the one that stands.
+        let go = |x| Order::GoTo(second.clone(), Destination { x, y: first.y, z: Some(3.0) });
+        lockstep.swarm.order(&go(first.x + 12.0)).unwrap();
+        step_until(&mut lockstep, "it does not go there", |lockstep| {
+            (place(lockstep, 1) - first).xy().norm() > 11.5 && place(lockstep, 1).x > first.x
+        });
+        lockstep.swarm.order(&go(first.x - 8.0)).unwrap();
+        step_until(&mut lockstep, "it does not come back", |lockstep| {
+            place(lockstep, 1).x < first.x + before_m
+        });
+        lockstep.swarm.order(&Order::Land(second)).unwrap();
+        step_until(&mut lockstep, "it does not land", |lockstep| !is_airborne(lockstep, 1));
+        let apart_m = (first - place(&lockstep, 1)).xy().norm();
+        assert_eq!(lockstep.swarm.truth().collisions_vehicle, 0, "told {before_m} m before");
+        assert!(apart_m > 0.6, "told {before_m} m before, it stands {apart_m} m away");
+    }
+}
+
+#[test]
 fn told_to_land_above_a_zone_it_comes_down_outside() {
     let zone =
         "[[airspace.no_fly]]\ncentre_m = [20.0, 6.0]\nradius_m = 1.5\nfloor_m = 0.0\nceiling_m = 1.5\n";

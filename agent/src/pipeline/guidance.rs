@@ -222,6 +222,13 @@ impl Guidance {
         self.leave_until = now + LEAVE_LASTS;
     }
 
+    /// Where a vehicle that moves like this would come to a stop if it were told to now, metres ENU, at its height.
+    #[must_use]
+    pub fn stop(&self, motion: &Motion) -> Vector3<f64> {
+        let unheld = motion.position + motion.velocity * self.envelope.latency_s;
+        self.local.stop(&unheld, &motion.velocity).xy().push(motion.position.z)
+    }
+
     /// Where the vehicle goes before it lands.
     #[must_use]
     pub fn settles_at(&self) -> Option<Vector3<f64>> {

@@ -10,6 +10,8 @@ use crate::neighbours::Neighbour;
 
 /// An autopilot that lands may drift so far, m.
 const DRIFT_M: f64 = 0.3;
+/// It may come to a stop this share of the way sooner or later than planned.
+const STOPS_WITHIN: f64 = 0.3;
 /// A place to go down is looked for within this distance, m.
 const REACH_M: f64 = 8.0;
 /// What the map knows below is looked at every so often, m: no more than a voxel is wide.
@@ -26,6 +28,8 @@ pub struct Descent<'a> {
     pub name: &'a NodeName,
     /// Where it is.
     pub position: Vector3<f64>,
+    /// Where it would come to a stop: from there it would go down.
+    pub stop: Vector3<f64>,
     /// Height of the ground.
     pub ground_m: f64,
     /// Its body.
@@ -39,19 +43,20 @@ pub struct Descent<'a> {
 }
 
 impl Descent<'_> {
-    /// Where to go first, at the vehicle's height: `None` if it can go down where it is, or nowhere within reach. `chosen`
+    /// Where to go first, at the vehicle's height: `None` if it can go down where it stops, or nowhere within reach. `chosen`
     /// is kept as long as it will do.
     #[must_use]
     pub fn detour(&self, chosen: Option<Vector3<f64>>) -> Option<Vector3<f64>> {
-        let mut places = chosen.into_iter().chain(places_around(&self.position, REACH_M));
+        let mut places = chosen.into_iter().chain(places_around(&self.stop, REACH_M));
         let place = places.find(|place| self.is_free_below(place) && self.can_be_reached(place))?;
-        ((place - self.position).xy().norm() > ARRIVAL_M).then_some(place)
+        ((place - self.stop).xy().norm() > ARRIVAL_M).then_some(place)
     }
 
     /// Whether nobody and nothing known is straight below a place.
     fn is_free_below(&self, place: &Vector3<f64>) -> bool {
+        let drift_m = DRIFT_M + STOPS_WITHIN * (self.stop - self.position).xy().norm();
         let is_apart = |neighbour: &Neighbour| {
-            let reach_m = self.envelope.hull_m + neighbour.track.radius_m + DRIFT_M;
+            let reach_m = self.envelope.hull_m + neighbour.track.radius_m + drift_m;
             (neighbour.position() - place).xy().norm() >= reach_m
         };
         self.neighbours.iter().filter(|neighbour| self.gives_way_to(neighbour)).all(is_apart)
@@ -89,7 +94,7 @@ impl Descent<'_> {
             neighbour.armed && (neighbour.position() - place).norm() < self.envelope.separation_m
         };
         let leads_out = map.keep_out().is_some_and(|zones| zones.room_m(position) < 0.0);
-        place == position
+        *place == self.stop
             || is_inside
                 && !self.neighbours.iter().any(is_taken)
                 && map.is_segment_clear(position, place, clearance_m)
@@ -138,6 +143,7 @@ mod tests {
         let descent = Descent {
             name: &me,
             position: HERE,
+            stop: HERE,
             ground_m: 0.0,
             envelope: &envelope,
             fence: &FENCE,
