@@ -74,6 +74,28 @@ impl Default for Envelope {
     }
 }
 
+/// What finds a path through the map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GlobalPlanner {
+    /// Searches anew for every path: [`astar`](skein_planning::global::astar).
+    #[default]
+    Astar,
+    /// Repairs the last path: [`dstar`](skein_planning::global::dstar). A* where it finds none.
+    DstarLite,
+}
+
+impl GlobalPlanner {
+    /// Its name in configuration files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Astar => "astar",
+            Self::DstarLite => "dstar-lite",
+        }
+    }
+}
+
 /// What turns a path into the velocity to fly now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -116,6 +138,8 @@ pub enum Layer {
 /// Which planners the pipeline is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Planners {
+    /// The global planner.
+    pub global: GlobalPlanner,
     /// The local planner.
     pub local: LocalPlanner,
     /// What is left out. For experiments alone: every layer is there for a reason.

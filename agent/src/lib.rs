@@ -21,7 +21,9 @@ mod watches;
 
 pub use self::{
     airspace_table::{AirspaceError, AirspaceTable},
-    config::{AgentConfig, Controller, Envelope, Fence, Layer, LocalPlanner, PassageRule, Planners},
+    config::{
+        AgentConfig, Controller, Envelope, Fence, GlobalPlanner, Layer, LocalPlanner, PassageRule, Planners,
+    },
     core::{AgentCore, AgentError, Outcome, SetPointRecord, Status},
     flight::FlightPhase,
     me::Me,

@@ -223,6 +223,7 @@ impl Plan {
             .set("envelope", "hull_m", &envelope.hull_m)
             .set("envelope", "margin_m", &envelope.margin_m)
             .set("envelope", "separation_m", &envelope.separation_m)
+            .set("planners", "global", &agent.planners.global.name())
             .set("planners", "local", &agent.planners.local.name());
         let before =
             [WORLD_PORT, GROUND_PORT].into_iter().chain((0..index).map(|index| FIRST_VEHICLE_PORT + index));
@@ -272,6 +273,7 @@ mod tests {
             assert_eq!(agent["mission"]["waypoints"].as_array().unwrap().len(), agents[1].waypoints.len());
             assert_eq!(agent["autopilot"]["link"].as_str(), Some("udp:127.0.0.1:14641"));
             assert_eq!(agent["envelope"].as_table().unwrap().len(), 7);
+            assert_eq!(agent["planners"]["global"].as_str(), Some("astar"));
             assert_eq!(agent["planners"]["local"].as_str(), Some("apf"));
             let ground: toml::Table = plan.ground(&agents, true, false).parse().unwrap();
             assert_eq!(ground["vehicles"].as_array().unwrap().len(), agents.len());

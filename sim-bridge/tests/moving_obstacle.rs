@@ -69,7 +69,7 @@ impl Intruder {
 /// Flies until the vehicle's mission is over.
 fn meet(local: LocalPlanner, intruder_m_s: f64, seed: u64) -> (Option<Outcome>, Truth) {
     let mut scenario = Scenario::from_toml(SCENARIO, "crossing.toml", None, seed).unwrap();
-    scenario.local = local;
+    scenario.planners.local = local;
     let mut config = fly::simulation_config(&scenario);
     let start = Vector3::new(CROSSING_M, -AWAY_M, 0.0);
     let model = VehicleModel::built_in("x500").unwrap();

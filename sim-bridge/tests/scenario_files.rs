@@ -6,13 +6,14 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
-use skein_agent::LocalPlanner;
+use skein_agent::{GlobalPlanner, LocalPlanner};
 use skein_sim::scenario::{Order, OrderKind, Overrides, Scenario, ScenarioError, Who};
 
 const YARD: &str = r#"
 name = "yard"
 about = "two vehicles change places round a pole"
 cruise_speed_m_s = 1.5
+global = "dstar-lite"
 local = "vfh"
 takeoff_height_m = 2.0
 time_limit_s = 60
@@ -79,7 +80,7 @@ fn a_scenario_file_sets_vehicles_obstacles_orders_and_conditions() -> Result<(),
     let yard = read(YARD)?;
     assert_eq!((yard.name.as_str(), yard.vehicles.len()), ("yard", 2));
     assert_eq!((yard.cruise_speed_m_s, yard.takeoff_height_m, yard.time_limit_s), (1.5, 2.0, 60.0));
-    assert_eq!(yard.local, LocalPlanner::Vfh);
+    assert_eq!((yard.planners.global, yard.planners.local), (GlobalPlanner::DstarLite, LocalPlanner::Vfh));
     assert_eq!((yard.network.latency_ms, yard.network.loss), (20.0, 0.1));
     assert_eq!((yard.wind.mean, yard.wind.gust_sigma_m_s), (Vector3::new(2.0, 0.0, 0.0), 0.5));
     let orders = [

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use nalgebra::Vector3;
-use skein_agent::{AgentConfig, Layer, LocalPlanner};
+use skein_agent::{AgentConfig, GlobalPlanner, Layer, LocalPlanner, Planners};
 use skein_planning::airspace::KeepOut;
 use skein_sim::cli::Controller;
 use skein_sim::fly::Trial;
@@ -90,9 +90,9 @@ fn unknowing(agent: &mut AgentConfig) {
 }
 
 /// Flies, once the vehicle's configuration has been changed.
-fn fly(world: &str, local: LocalPlanner, change: fn(&mut AgentConfig)) -> Flight {
+fn fly(world: &str, planners: Planners, change: fn(&mut AgentConfig)) -> Flight {
     let mut scenario = Scenario::from_toml(&format!("{BOUNDS}{world}"), "zones.toml", None, 1).unwrap();
-    scenario.local = local;
+    scenario.planners = planners;
     let zones = KeepOut::new(scenario.airspace.clone(), 0.0, 0.0);
     let mut track = Vec::new();
     let trial = Trial::new(&scenario, Controller::Bp).with_agents(change);
@@ -108,33 +108,35 @@ fn fly(world: &str, local: LocalPlanner, change: fn(&mut AgentConfig)) -> Flight
 
 #[test]
 fn neither_the_straight_way_nor_a_detour_leads_through_a_zone() {
-    for local in [LocalPlanner::Apf, LocalPlanner::Vfh] {
-        let flight = fly(DETOUR, local, knowing);
-        assert_eq!(flight.summary.reason, None, "{local:?}");
-        assert!(flight.least_room_m() > 0.25, "{local:?}: the hull stays out, {}", flight.least_room_m());
+    let gentle = Planners { local: LocalPlanner::Vfh, ..Planners::default() };
+    let repaired = Planners { global: GlobalPlanner::DstarLite, ..Planners::default() };
+    for planners in [Planners::default(), gentle, repaired] {
+        let flight = fly(DETOUR, planners, knowing);
+        assert_eq!(flight.summary.reason, None, "{planners:?}");
+        assert!(flight.least_room_m() > 0.25, "{planners:?}: the hull stays out, {}", flight.least_room_m());
     }
     assert!(
-        fly(DETOUR, LocalPlanner::Apf, unknowing).least_room_m() < -2.0,
+        fly(DETOUR, Planners::default(), unknowing).least_room_m() < -2.0,
         "without knowing it flies through"
     );
 }
 
 #[test]
 fn the_way_home_leads_around_a_zone() {
-    let flight = fly(RETURN, LocalPlanner::Apf, knowing);
+    let flight = fly(RETURN, Planners::default(), knowing);
     assert!(flight.least_room_m() > 0.25, "{}", flight.least_room_m());
     let last = flight.track.last().unwrap().0;
     assert!((last.xy() - nalgebra::Vector2::new(-15.0, 0.0)).norm() < 1.0, "it is home: {last}");
     assert!(flight.track.iter().any(|(place, _)| place.x > 8.0), "it has been behind the zone");
     assert!(
-        fly(RETURN, LocalPlanner::Apf, unknowing).least_room_m() < -1.0,
+        fly(RETURN, Planners::default(), unknowing).least_room_m() < -1.0,
         "without knowing it flies through"
     );
 }
 
 #[test]
 fn who_stands_in_a_zone_leaves_it_by_the_shortest_way_and_lands_beside_it() {
-    let flight = fly(INSIDE, LocalPlanner::Apf, knowing);
+    let flight = fly(INSIDE, Planners::default(), knowing);
     // From 3 m inside, and a metre of margin.
     let out = flight.track.iter().position(|(_, room_m)| *room_m > 0.0).unwrap();
     assert!((flight.track[out].0.xy() - flight.track[0].0.xy()).norm() < 4.0, "{}", flight.track[out].0);
@@ -148,7 +150,7 @@ fn who_stands_in_a_zone_leaves_it_by_the_shortest_way_and_lands_beside_it() {
 #[test]
 fn who_follows_no_path_is_kept_out_by_the_filter() {
     let straight = |agent: &mut AgentConfig| agent.planners.without = Some(Layer::GlobalPath);
-    let flight = fly(DETOUR, LocalPlanner::Apf, straight);
+    let flight = fly(DETOUR, Planners::default(), straight);
     assert!(flight.least_room_m() > 0.25, "the hull stays out, {}", flight.least_room_m());
     assert!(flight.least_room_m() < 3.0, "it does come near: {}", flight.least_room_m());
 }

@@ -198,7 +198,7 @@ impl Guidance {
             },
             escape: EscapeDetector::new(EscapeConfig::default()),
             evasion: Evasion::default(),
-            routes: RouteSearch::default(),
+            routes: RouteSearch::new(planners.global),
             allowance: ALLOWANCE,
         }
     }

@@ -1,7 +1,7 @@
 //! Ablation: each layer of the pipeline is left out in turn, to see what it contributes.
 
 use serde_json::json;
-use skein_agent::Layer;
+use skein_agent::{GlobalPlanner, Layer, LocalPlanner, Planners};
 
 use super::statistics::mean;
 use super::{Bound, Options, Report, runs};
@@ -18,30 +18,37 @@ const SCENARIOS: [(&str, usize); 3] = [("forest", 1), ("antipodal", 5), ("window
 /// Who has not arrived after this has failed, s: three times what a vehicle needs.
 const TIME_LIMIT_S: f64 = 120.0;
 
-const VARIANTS: [(&str, Option<Layer>); 7] = [
-    ("all layers", None),
-    ("without global path", Some(Layer::GlobalPath)),
-    ("without local avoidance", Some(Layer::LocalAvoidance)),
-    ("without repulsion", Some(Layer::Repulsion)),
-    ("without safety filter", Some(Layer::SafetyFilter)),
-    ("without escape", Some(Layer::Escape)),
-    ("without right of way", Some(Layer::RightOfWay)),
+const VARIANTS: [(&str, Planners); 8] = [
+    ("all layers", ALL),
+    ("D* Lite in place of A*", Planners { global: GlobalPlanner::DstarLite, ..ALL }),
+    ("without global path", without(Layer::GlobalPath)),
+    ("without local avoidance", without(Layer::LocalAvoidance)),
+    ("without repulsion", without(Layer::Repulsion)),
+    ("without safety filter", without(Layer::SafetyFilter)),
+    ("without escape", without(Layer::Escape)),
+    ("without right of way", without(Layer::RightOfWay)),
 ];
+
+const ALL: Planners = Planners { global: GlobalPlanner::Astar, local: LocalPlanner::Apf, without: None };
+
+const fn without(layer: Layer) -> Planners {
+    Planners { without: Some(layer), ..ALL }
+}
 
 pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
     let runs = options.runs.unwrap_or(RUNS);
     let mut flights = Vec::new();
     for (scenario, fewer) in SCENARIOS {
-        for (_, without) in VARIANTS {
-            flights.extend((1..=runs.div_ceil(fewer) as u64).map(|seed| (scenario, without, seed)));
+        for (_, planners) in VARIANTS {
+            flights.extend((1..=runs.div_ceil(fewer) as u64).map(|seed| (scenario, planners, seed)));
         }
     }
-    let summaries = runs::in_turn("flights", &flights, |(scenario, without, seed)| {
+    let summaries = runs::in_turn("flights", &flights, |(scenario, planners, seed)| {
         let mut scenario = Scenario::built_in(scenario, options.vehicles, *seed)?;
         scenario.orders.clear();
         scenario.time_limit_s = TIME_LIMIT_S;
         let trial = Trial::new(&scenario, Controller::Bp);
-        Ok(trial.with_agents(|agent| agent.planners.without = *without).fly(&mut |_, _| {})?.summary)
+        Ok(trial.with_agents(|agent| agent.planners = *planners).fly(&mut |_, _| {})?.summary)
     })?;
     let mut report = Report::default();
     let mut rest = summaries.as_slice();
@@ -49,11 +56,11 @@ pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
     for (scenario, fewer) in SCENARIOS {
         let worlds = runs.div_ceil(fewer);
         let mut rows = Vec::new();
-        for (name, without) in VARIANTS {
+        for (name, planners) in VARIANTS {
             let (summaries, others) = rest.split_at(worlds);
             rest = others;
             let found = Found::of(summaries);
-            if without.is_none() {
+            if planners == ALL {
                 let what = format!("worlds of `{scenario}` that all layers together bring everyone through");
                 report.goal(&what, found.succeeded as f64, Bound::Exactly(worlds as f64));
             }
@@ -155,8 +162,10 @@ mod tests {
             let whole = &variants[place * VARIANTS.len()];
             assert_eq!((whole["scenario"].as_str(), whole["succeeded"].as_u64()), (Some(*scenario), Some(1)));
         }
+        assert_eq!(variants[1]["succeeded"].as_u64(), Some(1), "D* Lite brings them through the forest too");
         let distance_m = |variant: usize| json["variants"][variant]["path_length_m"].as_f64();
-        assert!(distance_m(0) != distance_m(2), "without local avoidance another way is flown");
-        assert_eq!(distance_m(1), None, "without a path nobody arrives, and there is no mean of nothing");
+        assert!(distance_m(0) != distance_m(1), "its ways are others than those of A*");
+        assert!(distance_m(0) != distance_m(3), "without local avoidance another way is flown");
+        assert_eq!(distance_m(2), None, "without a path nobody arrives, and there is no mean of nothing");
     }
 }

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AgentConfig, Controller, Envelope, Fence, PassageRule, Planners};
+use skein_agent::{AgentConfig, Controller, Envelope, Fence, PassageRule};
 use skein_bp::script::Assignment;
 use skein_dbp::{Kept, NodeName};
 use skein_ground::{GroundConfig, Order, Who};
@@ -98,7 +98,7 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
                 separation_m: SEPARATION_HULLS * plan.model.hull_radius_m,
                 ..Envelope::default()
             },
-            planners: Planners { local: scenario.local, without: None },
+            planners: scenario.planners,
             link_loss: LinkLossPolicy::default(),
             passage_rule: PassageRule::Confirmed,
             controller: match controller {

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
-use skein_agent::{AirspaceTable, LocalPlanner};
+use skein_agent::{AirspaceTable, GlobalPlanner, LocalPlanner, Planners};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_planning::airspace::Airspace;
 use skein_world::{Aabb, Obstacle, Scene, Shape, VehicleModel, WindConfig};
@@ -52,6 +52,8 @@ struct FileTable {
     model: Option<String>,
     #[serde(default, deserialize_with = "field::optional_positive")]
     cruise_speed_m_s: Option<f64>,
+    #[serde(default)]
+    global: GlobalPlanner,
     #[serde(default)]
     local: LocalPlanner,
     #[serde(default, deserialize_with = "field::optional_positive")]
@@ -249,7 +251,7 @@ impl ScenarioFile {
             vehicles: plans,
             muster: table.formation.is_some() || table.targets.is_some(),
             cruise_speed_m_s,
-            local: table.local,
+            planners: Planners { global: table.global, local: table.local, without: None },
             takeoff_height_m,
             time_limit_s,
             wind: table.wind.map(WindConfig::from).unwrap_or_default(),

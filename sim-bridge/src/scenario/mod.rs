@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use serde::Deserialize;
-use skein_agent::LocalPlanner;
+use skein_agent::Planners;
 use skein_bp::script::Assignment;
 use skein_mav::Datum;
 use skein_planning::airspace::{Airspace, KeepOut};
@@ -78,8 +78,8 @@ pub struct Scenario {
     pub muster: bool,
     /// Speed the vehicles aim for between waypoints.
     pub cruise_speed_m_s: f64,
-    /// What turns a path into a velocity on board.
-    pub local: LocalPlanner,
+    /// How they plan on board.
+    pub planners: Planners,
     /// Height above the ground at which a take-off ends.
     pub takeoff_height_m: f64,
     /// Simulated seconds after which the mission has failed.

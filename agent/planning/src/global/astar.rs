@@ -133,7 +133,7 @@ const CLOSED_WEIGHT: f64 = 20.0;
 /// How finely depth in a disc is told apart.
 const DISC_STEPS: f64 = 64.0;
 /// Beginning to track a layer takes as long as so many expansions in one layer.
-const LAYER_EXPANSIONS: usize = 4000;
+pub(super) const LAYER_EXPANSIONS: usize = 4000;
 /// An expansion with 26 neighbours takes as long as so many with 8.
 const SPACE_EXPANSIONS: usize = 4;
 
@@ -433,16 +433,10 @@ impl Rooms<'_> {
         cost
     }
 
-    /// The way through cells, the first and the last replaced by the exact places.
+    /// The way through cells.
     fn path(&self, cells: &[VoxelIndex], end: Vector3<f64>, planar: bool) -> Path {
-        let inner = cells.get(1..cells.len().saturating_sub(1)).unwrap_or_default();
-        let centres = inner.iter().map(|cell| self.map.voxels().centre_of(self.voxel(*cell)));
-        let mut points: Vec<Vector3<f64>> =
-            std::iter::once(self.request.start).chain(centres).chain([end]).collect();
-        if planar {
-            spread_height(&mut points, self.request);
-        }
-        Path::new(points).unwrap_or_else(|| Path::at(self.request.start))
+        let centres = cells.iter().map(|cell| self.map.voxels().centre_of(self.voxel(*cell)));
+        path_through(self.request, centres, end, planar)
     }
 
     fn contains(&self, cell: VoxelIndex) -> bool {
@@ -463,6 +457,22 @@ impl Rooms<'_> {
     fn resolution_m(&self) -> f64 {
         self.map.voxels().config().resolution_m
     }
+}
+
+/// The path through the centres of voxels, the first and the last replaced by the exact places.
+pub(super) fn path_through(
+    request: &Request<'_>,
+    centres: impl ExactSizeIterator<Item = Vector3<f64>>,
+    end: Vector3<f64>,
+    planar: bool,
+) -> Path {
+    let last = centres.len().saturating_sub(1);
+    let inner = centres.take(last).skip(1);
+    let mut points: Vec<Vector3<f64>> = std::iter::once(request.start).chain(inner).chain([end]).collect();
+    if planar {
+        spread_height(&mut points, request);
+    }
+    Path::new(points).unwrap_or_else(|| Path::at(request.start))
 }
 
 /// Lets height change evenly along a path planned in one layer.

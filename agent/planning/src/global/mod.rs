@@ -2,6 +2,7 @@
 
 mod anytime;
 pub mod astar;
+pub mod dstar;
 mod dstar_lite;
 mod open_list;
 mod potential;

@@ -287,6 +287,14 @@ impl ClearanceMap {
         squared(self.offset_at(voxel))
     }
 
+    /// The same along a row of a layer that is tracked; of one that is not, nothing.
+    pub(crate) fn row_squared(&self, y: usize, z: usize) -> impl Iterator<Item = i32> + '_ {
+        let [nx, ..] = self.voxels.counts();
+        let layer = self.layers.get(z).and_then(Option::as_ref);
+        let row = layer.and_then(|layer| layer.offsets.get(y * nx..(y + 1) * nx));
+        row.unwrap_or_default().iter().map(|offset| squared(*offset))
+    }
+
     /// Carries changes of occupation into the tracked layers. What counts is whether a voxel is occupied now,
     /// not the change.
     fn repair(&mut self, changes: &[Change]) {

@@ -8,7 +8,8 @@ use anyhow::{Context as _, ensure};
 use serde::Deserialize;
 use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{
-    AgentConfig, AirspaceTable, Controller, Envelope, Fence, LocalPlanner, PassageRule, Planners,
+    AgentConfig, AirspaceTable, Controller, Envelope, Fence, GlobalPlanner, LocalPlanner, PassageRule,
+    Planners,
 };
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_dbp::{Authority, Kept};
@@ -145,6 +146,7 @@ struct EnvelopeTable {
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct PlannersTable {
+    global: GlobalPlanner,
     local: LocalPlanner,
 }
 
@@ -226,7 +228,7 @@ impl File {
             fence,
             airspace,
             envelope: self.envelope.check()?,
-            planners: Planners { local: self.planners.local, without: None },
+            planners: Planners { global: self.planners.global, local: self.planners.local, without: None },
             link_loss: match self.mission.without_ground {
                 WithoutGround::Continue => LinkLossPolicy::Continue,
                 WithoutGround::Return => LinkLossPolicy::Return,
