@@ -28,6 +28,7 @@ mod inbox;
 mod incarnation;
 mod kept;
 mod link;
+mod runtime;
 mod session;
 
 pub use bell::Bell;
@@ -37,4 +38,5 @@ pub use error::ZenohError;
 pub use incarnation::{IncarnationError, next_incarnation};
 pub use kept::{FileStore, KeptError};
 pub use link::{ZenohLink, ZenohLinkStats};
+pub use runtime::work_together;
 pub use session::{ZenohSession, ZenohStats};

@@ -2,9 +2,9 @@
 //!
 //! The other processes are this program again, in a role of its own (see `link_peer`).
 
-use std::io::{Read as _, Write as _};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Ipv4Addr, TcpListener};
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
@@ -19,25 +19,17 @@ use skein_dbp::{NodeName, facts};
 use skein_wire::vocabulary::{ADVANCE, event, of_every_vehicle};
 use skein_wire::{Key, Link as _, Topic};
 use skein_zenoh::{ZenohLink, ZenohSession};
-use zenoh::Wait as _;
-use zenoh::handlers::FifoChannelHandler;
-use zenoh::pubsub::Subscriber;
-use zenoh::qos::CongestionControl;
-use zenoh::sample::Sample;
 
 use super::link_peer::{
-    GROUND, Member, PING, Role, Seen, ZENOH_PING, ZENOH_PONG, fleet, home, plain_zenoh, session,
+    GROUND, Member, PATIENCE, PAYLOAD, PING, Role, Seen, TIME_TO_MEET, fleet, home, meet, microseconds,
+    session,
 };
 use super::quantile::quantile;
 
-/// As long as a bid or an occurrence of one short event.
-const PAYLOAD: usize = 100;
-/// The three kinds take turns, so that a disturbance meets all alike.
+/// Zenoh's threads as it comes.
+const AS_IT_COMES: &str = "()";
+/// The kinds take turns, so that a disturbance meets all alike.
 const TURNS: usize = 20;
-/// How long a peer may take to answer for the first time.
-const TIME_TO_MEET: Duration = Duration::from_secs(20);
-/// How long an answer may take before it counts as lost.
-const PATIENCE: Duration = Duration::from_secs(1);
 /// Between two blocks that are to be confirmed.
 const REST: Duration = Duration::from_millis(7);
 
@@ -66,7 +58,7 @@ impl Times {
 }
 
 pub(super) fn run(extent: Extent, as_json: bool) -> anyhow::Result<()> {
-    let [zenoh, queued, event] = round_trips(extent.round_trips)?;
+    let [zenoh, together, queued, event] = round_trips(extent.round_trips)?;
     let SwarmSeen { confirm, before, during, others_lost } = swarm(extent)?;
     let stopped = json!({
         "leases_lost": others_lost,
@@ -76,9 +68,11 @@ pub(super) fn run(extent: Extent, as_json: bool) -> anyhow::Result<()> {
     if as_json {
         let object = json!({
             "zenoh_rtt_us": zenoh,
+            "zenoh_together_rtt_us": together,
             "queued_rtt_us": queued,
             "event_rtt_us": event,
             "ratio_p50": event.p50 / zenoh.p50,
+            "ratio_event_together_p50": event.p50 / together.p50,
             "ratio_event_queued_p50": event.p50 / queued.p50,
             "homes": extent.homes,
             "confirm_10_homes_us": confirm,
@@ -91,11 +85,13 @@ pub(super) fn run(extent: Extent, as_json: bool) -> anyhow::Result<()> {
         println!("{what:<32} median {:>7.0} us, p99 {:>7.0} us", times.p50, times.p99);
     };
     line("plain Zenoh, there and back", zenoh);
+    line("the same on two threads, as ours", together);
     line("through our queues", queued);
     line("request to resumed b-thread", event);
     println!(
-        "an event takes {:.2} times plain Zenoh, {:.2} times our queues",
+        "an event takes {:.2} times plain Zenoh, {:.2} times Zenoh on two threads, {:.2} times our queues",
         event.p50 / zenoh.p50,
+        event.p50 / together.p50,
         event.p50 / queued.p50
     );
     line(&format!("a block confirmed by {} homes", extent.homes), confirm);
@@ -105,74 +101,50 @@ pub(super) fn run(extent: Extent, as_json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Times in microseconds over plain Zenoh, through our queues, and as events.
-fn round_trips(count: usize) -> anyhow::Result<[Times; 3]> {
-    let mut plain = Plain::start()?;
+/// Times in microseconds over plain Zenoh, over Zenoh on the threads that ours works on, through our queues, and as events.
+fn round_trips(count: usize) -> anyhow::Result<[Times; 4]> {
+    let each = count.div_ceil(TURNS);
+    let mut plain = Plain::start(each, Some(AS_IT_COMES))?;
+    let mut together = Plain::start(each, None)?;
     let mut queues = Queues::start()?;
     let mut events = Events::start()?;
-    let mut times = [Vec::new(), Vec::new(), Vec::new()];
+    let mut times = [Vec::new(), Vec::new(), Vec::new(), Vec::new()];
     for _ in 0..TURNS {
-        let [zenoh_us, queued_us, event_us] = &mut times;
+        let [zenoh_us, together_us, queued_us, event_us] = &mut times;
         // The first of each turn finds everything cold.
-        plain.round_trip()?;
+        zenoh_us.extend(plain.round_trips()?);
+        together_us.extend(together.round_trips()?);
         queues.round_trip()?;
-        events.round_trip()?;
-        for _ in 0..count.div_ceil(TURNS) {
-            zenoh_us.push(plain.round_trip()?);
-        }
-        for _ in 0..count.div_ceil(TURNS) {
+        for _ in 0..each {
             queued_us.push(queues.round_trip()?);
         }
         events.round_trip()?;
-        for _ in 0..count.div_ceil(TURNS) {
+        for _ in 0..each {
             event_us.push(events.round_trip()?);
         }
     }
     Ok(times.map(Times::of))
 }
 
-/// Tries until the peer is there.
-fn meet(mut answered: impl FnMut() -> anyhow::Result<bool>) -> anyhow::Result<()> {
-    let deadline = Instant::now() + TIME_TO_MEET;
-    while !answered()? {
-        anyhow::ensure!(Instant::now() < deadline, "a peer does not answer");
-    }
-    Ok(())
-}
-
-fn microseconds(since: Instant) -> f64 {
-    since.elapsed().as_secs_f64() * 1e6
-}
-
-/// A put, and a reply through a subscriber.
+/// A put, and a reply through a subscriber: between two other processes, whose Zenoh can be set up differently from ours.
 struct Plain {
-    session: zenoh::Session,
-    replies: Subscriber<FifoChannelHandler<Sample>>,
-    _peer: Peer,
+    asks: Peer,
+    _echoes: Peer,
 }
 
 impl Plain {
-    fn start() -> anyhow::Result<Self> {
+    fn start(count: usize, runtime: Option<&str>) -> anyhow::Result<Self> {
         let endpoint = free_endpoint()?;
-        let session = plain_zenoh(std::slice::from_ref(&endpoint), &[])?;
-        let replies = session.declare_subscriber(ZENOH_PONG).wait().map_err(anyhow::Error::from_boxed)?;
-        let plain = Self { session, replies, _peer: Peer::start(Role::Zenoh, 1, 1, &endpoint)? };
-        meet(|| Ok(plain.ask(Duration::from_millis(50))?.is_some()))?;
-        Ok(plain)
+        let mut asks = Peer::start_on(Role::ZenohAsk, count, 1, &endpoint, runtime)?;
+        asks.hear()?;
+        let echoes = Peer::start_on(Role::ZenohEcho, 1, 1, &endpoint, runtime)?;
+        Ok(Self { asks, _echoes: echoes })
     }
 
-    fn ask(&self, patience: Duration) -> anyhow::Result<Option<Sample>> {
-        let put = self.session.put(ZENOH_PING, vec![0; PAYLOAD]).congestion_control(CongestionControl::Drop);
-        put.wait().map_err(anyhow::Error::from_boxed)?;
-        self.replies.recv_timeout(patience).map_err(anyhow::Error::from_boxed)
-    }
-
-    fn round_trip(&mut self) -> anyhow::Result<f64> {
-        // An answer that came too late is no answer to the next.
-        while let Ok(Some(_)) = self.replies.try_recv() {}
-        let since = Instant::now();
-        self.ask(PATIENCE)?.context("a message over plain Zenoh was lost")?;
-        Ok(microseconds(since))
+    /// Microseconds of each of one turn.
+    fn round_trips(&mut self) -> anyhow::Result<Vec<f64>> {
+        self.asks.end_section()?;
+        Ok(serde_json::from_str(&self.asks.hear()?)?)
     }
 }
 
@@ -371,19 +343,38 @@ impl BThread for Confirm {
 struct Peer {
     child: Child,
     sections: Option<ChildStdin>,
+    said: BufReader<ChildStdout>,
 }
 
 impl Peer {
     fn start(role: Role, number: usize, homes: usize, connect: &str) -> anyhow::Result<Self> {
+        Self::start_on(role, number, homes, connect, None)
+    }
+
+    /// A process whose Zenoh works on the threads that `runtime` says.
+    fn start_on(
+        role: Role,
+        number: usize,
+        homes: usize,
+        endpoint: &str,
+        runtime: Option<&str>,
+    ) -> anyhow::Result<Self> {
         let role = role.to_possible_value().context("every role has a name")?;
-        let mut child = Command::new(std::env::current_exe().context("where this program is")?)
-            .args(["bench", "link-peer", role.get_name(), connect])
-            .args([number, homes].map(|n| n.to_string()))
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()?;
+        let mut command = Command::new(std::env::current_exe().context("where this program is")?);
+        command.envs(runtime.map(|runtime| ("ZENOH_RUNTIME", runtime)));
+        command.args(["bench", "link-peer", role.get_name(), endpoint]);
+        command.args([number, homes].map(|n| n.to_string()));
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
         let sections = child.stdin.take();
-        Ok(Self { child, sections })
+        let said = BufReader::new(child.stdout.take().context("its output is read")?);
+        Ok(Self { child, sections, said })
+    }
+
+    /// The next line that it says.
+    fn hear(&mut self) -> anyhow::Result<String> {
+        let mut line = String::new();
+        anyhow::ensure!(self.said.read_line(&mut line)? > 0, "a peer has ended");
+        Ok(line)
     }
 
     fn signal(&self, signal: Signal) -> anyhow::Result<()> {
@@ -400,7 +391,7 @@ impl Peer {
     fn end(mut self) -> anyhow::Result<Vec<Seen>> {
         self.sections = None;
         let mut said = String::new();
-        self.child.stdout.take().context("it is read once")?.read_to_string(&mut said)?;
+        self.said.read_to_string(&mut said)?;
         serde_json::from_str(&said).context("a peer has ended without a report")
     }
 }

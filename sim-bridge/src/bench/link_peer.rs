@@ -7,6 +7,7 @@ use std::io::BufRead as _;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
+use anyhow::Context as _;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use skein_bp::script::{Op, Script};
@@ -23,17 +24,25 @@ pub(super) const GROUND: &str = "ground/main";
 /// The event that is requested of a home from afar.
 pub(super) const PING: &str = "ping";
 /// Keys of the round trip over plain Zenoh.
-pub(super) const ZENOH_PING: &str = "skein-bench/ping";
+const ZENOH_PING: &str = "skein-bench/ping";
 /// The way back.
-pub(super) const ZENOH_PONG: &str = "skein-bench/pong";
+const ZENOH_PONG: &str = "skein-bench/pong";
+/// As long as a bid or an occurrence of one short event.
+pub(super) const PAYLOAD: usize = 100;
+/// How long a peer may take to answer for the first time.
+pub(super) const TIME_TO_MEET: Duration = Duration::from_secs(20);
+/// How long an answer may take before it counts as lost.
+pub(super) const PATIENCE: Duration = Duration::from_secs(1);
 /// A peer looks this often whether it is to end, if nothing comes.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// What a peer does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Role {
+    /// Measures round trips over plain Zenoh: as many as its number in each section.
+    ZenohAsk,
     /// Puts what it hears over plain Zenoh.
-    Zenoh,
+    ZenohEcho,
     /// Puts what it hears through a link's queues.
     Queues,
     /// Is a node of a fleet, and home to events.
@@ -120,7 +129,7 @@ pub(super) fn session(connect: Vec<String>) -> anyhow::Result<ZenohSession> {
 }
 
 /// Zenoh as it comes, except that it looks for nobody by multicast.
-pub(super) fn plain_zenoh(listen: &[String], connect: &[String]) -> anyhow::Result<zenoh::Session> {
+fn plain_zenoh(listen: &[String], connect: &[String]) -> anyhow::Result<zenoh::Session> {
     let mut config = zenoh::Config::default();
     for (key, value) in [
         ("scouting/multicast/enabled", "false".to_owned()),
@@ -137,7 +146,8 @@ pub(super) fn run(role: Role, number: usize, homes: usize, connect: &str) -> any
     let sections = sections();
     let connect = vec![connect.to_owned()];
     match role {
-        Role::Zenoh => echo_over_zenoh(&connect, &sections),
+        Role::ZenohAsk => ask_over_zenoh(number, &connect, &sections),
+        Role::ZenohEcho => echo_over_zenoh(&connect, &sections),
         Role::Queues => echo_through_queues(connect, &sections),
         Role::Node => be_a_node(number, homes, connect, &sections),
     }
@@ -154,6 +164,46 @@ fn sections() -> Receiver<()> {
         }
     });
     sections
+}
+
+/// Tries until the peer is there.
+pub(super) fn meet(mut answered: impl FnMut() -> anyhow::Result<bool>) -> anyhow::Result<()> {
+    let deadline = Instant::now() + TIME_TO_MEET;
+    while !answered()? {
+        anyhow::ensure!(Instant::now() < deadline, "a peer does not answer");
+    }
+    Ok(())
+}
+
+pub(super) fn microseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e6
+}
+
+/// Says when it listens, and then for each section, in a line, how many microseconds its round trips took.
+fn ask_over_zenoh(count: usize, listen: &[String], sections: &Receiver<()>) -> anyhow::Result<()> {
+    let session = plain_zenoh(listen, &[])?;
+    let replies = session.declare_subscriber(ZENOH_PONG).wait().map_err(anyhow::Error::from_boxed)?;
+    let ask = |patience: Duration| {
+        let put = session.put(ZENOH_PING, vec![0; PAYLOAD]).congestion_control(CongestionControl::Drop);
+        put.wait().map_err(anyhow::Error::from_boxed)?;
+        replies.recv_timeout(patience).map_err(anyhow::Error::from_boxed)
+    };
+    let round_trip = || {
+        // An answer that came too late is no answer to the next.
+        while let Ok(Some(_)) = replies.try_recv() {}
+        let since = Instant::now();
+        ask(PATIENCE)?.context("a message over plain Zenoh was lost")?;
+        Ok(microseconds(since))
+    };
+    println!();
+    meet(|| Ok(ask(LOOK)?.is_some()))?;
+    while sections.recv().is_ok() {
+        // The first finds everything cold.
+        round_trip()?;
+        let times = (0..count).map(|_| round_trip()).collect::<anyhow::Result<Vec<f64>>>()?;
+        println!("{}", serde_json::to_string(&times)?);
+    }
+    Ok(())
 }
 
 fn echo_over_zenoh(connect: &[String], sections: &Receiver<()>) -> anyhow::Result<()> {
