@@ -6,6 +6,8 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_ground::{Destination, Order, Who};
+use skein_mav::dialect::{COMMAND_LONG_DATA, MavCmd};
+use skein_mav::{Address, FrameWriter};
 use skein_tests::Lockstep;
 
 /// Two vehicles 6 m apart: the first lands after 10 m, the second flies 40 m. And more of the scenario.
@@ -102,4 +104,46 @@ fn over_free_ground_it_comes_down_where_it_is() {
     step_until(&mut lockstep, "the second does not fly", |lockstep| place(lockstep, 1).x > 9.0);
     let second = land_above(&mut lockstep, [20.0, 6.0]);
     assert!((second - Vector3::new(20.0, 6.0, 0.0)).xy().norm() < 0.5, "{second}");
+}
+
+/// What a pilot's ground station says to take the vehicle over.
+fn pilot_takes_over(target_system: u8) -> Vec<u8> {
+    let mut writer = FrameWriter::new(Address { system_id: 255, component_id: 190 });
+    writer.write(&COMMAND_LONG_DATA {
+        command: MavCmd::MAV_CMD_DO_SET_MODE,
+        param1: 1.0,
+        param2: 3.0, // POSCTL
+        target_system,
+        target_component: 1,
+        ..Default::default()
+    });
+    writer.take()
+}
+
+#[test]
+fn a_pilot_who_takes_over_on_the_way_to_where_it_would_land_has_it() {
+    let mut lockstep = two("");
+    step_until(&mut lockstep, "the first does not fly", |lockstep| place(lockstep, 0).x > 9.0);
+    step_until(&mut lockstep, "the first does not land", |lockstep| !is_airborne(lockstep, 0));
+    let first = place(&lockstep, 0);
+    let second = || Who::only(lockstep.nodes[1].clone());
+    let above = Destination { x: first.x, y: first.y, z: Some(3.0) };
+    let (go, land) = (Order::GoTo(second(), above), Order::Land(second()));
+    lockstep.swarm.order(&go).unwrap();
+    let off_m = |lockstep: &Lockstep| (place(lockstep, 1) - first).xy().norm();
+    step_until(&mut lockstep, "it does not go there", |lockstep| off_m(lockstep) < 0.1);
+    lockstep.swarm.order(&land).unwrap();
+    step_until(&mut lockstep, "it does not go aside", |lockstep| off_m(lockstep) > 0.4);
+    assert!(place(&lockstep, 1).z > 2.5, "it does not come down yet");
+    lockstep.swarm.send_mavlink(1, &pilot_takes_over(2));
+    let commands = |lockstep: &Lockstep| lockstep.swarm.agents().nth(1).unwrap().set_points().commands;
+    let (taken, mut last) = (lockstep.swarm.now(), commands(&lockstep));
+    while lockstep.swarm.now() < taken + Duration::from_secs(25) {
+        lockstep.step();
+        if lockstep.swarm.now() < taken + Duration::from_secs(2) {
+            last = commands(&lockstep);
+        }
+    }
+    assert_eq!(commands(&lockstep), last, "the agent goes on commanding");
+    assert!(is_airborne(&lockstep, 1) && place(&lockstep, 1).z > 2.0, "{}", place(&lockstep, 1));
 }

@@ -65,6 +65,6 @@ pub enum ZenohError {
         source: zenoh::Error,
     },
     /// The thread of the session cannot be started or has ended.
-    #[error("the session's thread is gone")]
+    #[error("the session has ended")]
     ThreadGone,
 }

@@ -2,15 +2,18 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use skein_wire::{Fleet, Key, NodeName};
+use tokio::sync::mpsc::{Receiver, Sender, UnboundedReceiver, UnboundedSender, channel, unbounded_channel};
 use zenoh::Wait;
+use zenoh::internal::runtime::ZRuntime;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
+use zenoh::sample::Locality;
 
 use crate::inbox::Inbox;
 use crate::{Mode, ZenohConfig, ZenohError, ZenohLink};
@@ -21,12 +24,15 @@ const OPENING_TRIES: usize = 8;
 const MOST_PUBLISHERS: usize = 1024;
 /// A client looks for its router this often.
 const TRY_AGAIN: Duration = Duration::from_millis(200);
+/// Longer payloads, in bytes, may travel in fragments, for which Zenoh waits up to 50 ms where there is no room; for whole messages
+/// it waits a millisecond, and not again before there is room.
+const MOST_WHOLE: usize = 32 << 10;
 
 /// A session that any number of links of one process share. Cloning gives another handle to the same session, which
 /// closes with its last handle or link.
 ///
-/// All of Zenoh is done on a thread of the session's own: whoever puts a message hands it to a bounded queue and never
-/// waits, whatever the network does.
+/// All of Zenoh is done on its own threads: whoever puts a message hands it to a bounded queue and never waits, whatever the
+/// network does. The task behind the queue runs where Zenoh sends, so that a message wakes one thread on its way out, not two.
 #[derive(Clone, Debug)]
 pub struct ZenohSession(Arc<Shared>);
 
@@ -53,7 +59,7 @@ struct Shared {
     next_port: AtomicU64,
     counters: Arc<Counters>,
     /// Gone only while the session closes.
-    commands: Option<SyncSender<Command>>,
+    queue: Option<QueueEntry>,
     thread: Mutex<Option<JoinHandle<()>>>,
 }
 
@@ -65,12 +71,49 @@ struct Counters {
     failed: AtomicU64,
 }
 
-/// What the session's thread is asked to do.
+/// A message to put.
+struct Put {
+    port: u64,
+    key: Key,
+    payload: Vec<u8>,
+}
+
+/// What else the session is asked to do.
 enum Command {
-    Put { port: u64, key: Key, payload: Vec<u8> },
     Join { port: u64, patterns: Vec<String>, inbox: Arc<Inbox>, answer: SyncSender<Result<(), ZenohError>> },
     Leave { port: u64 },
     CountPeers { answer: SyncSender<usize> },
+}
+
+/// Where messages to put wait, so many at most, and orders, which are few.
+#[derive(Debug)]
+struct QueueEntry {
+    puts: Sender<Put>,
+    commands: UnboundedSender<Command>,
+}
+
+/// The queue's other end.
+struct Queue {
+    puts: Receiver<Put>,
+    commands: UnboundedReceiver<Command>,
+}
+
+/// What comes out of the queue.
+enum Asked {
+    Put(Put),
+    Command(Command),
+}
+
+impl Queue {
+    /// The next one; none when nobody can ask any more.
+    async fn next(&mut self) -> Option<Asked> {
+        tokio::select! {
+            biased;
+            Some(command) = self.commands.recv() => Some(Asked::Command(command)),
+            Some(put) = self.puts.recv() => Some(Asked::Put(put)),
+            else => None,
+        }
+    }
 }
 
 impl ZenohSession {
@@ -83,20 +126,24 @@ impl ZenohSession {
     /// [`ZenohError`] when an endpoint is none, cannot be listened on, or could reach others without security.
     pub fn open(config: ZenohConfig) -> Result<Self, ZenohError> {
         let counters = Arc::new(Counters::default());
-        let (commands, queue) = sync_channel(config.outgoing_capacity.max(1));
+        let (puts, puts_out) = channel(config.outgoing_capacity.max(1));
+        let (commands, commands_out) = unbounded_channel();
+        let mut queue = Queue { puts: puts_out, commands: commands_out };
         let (answer, opened) = sync_channel(1);
         let thread = std::thread::Builder::new().name("zenoh session".into()).spawn({
             let (config, counters) = (config.clone(), counters.clone());
-            move || match config.network.mode {
-                Mode::Client => await_router(&config, &queue, &counters, &answer),
-                Mode::Peer | Mode::Router => match open(&config) {
-                    Ok((session, locators)) => {
-                        if answer.send(Ok(locators)).is_ok() {
-                            serve(&session, Vec::new(), &queue, &counters);
-                        }
+            move || {
+                let opened = match config.network.mode {
+                    Mode::Client => await_router(&config, &mut queue, &counters, &answer),
+                    Mode::Peer | Mode::Router => {
+                        open_at_once(&config, &answer).map(|session| (session, Vec::new()))
                     }
-                    Err(error) => drop(answer.send(Err(error))),
-                },
+                };
+                if let Some((session, waited)) = opened {
+                    let served = ZRuntime::TX.spawn(serve(session, waited, queue, counters));
+                    // Its panic, if any, has been reported where it happened.
+                    let _ = ZRuntime::TX.block_on(served);
+                }
             }
         });
         let thread = thread.map_err(|_| ZenohError::ThreadGone)?;
@@ -108,7 +155,7 @@ impl ZenohSession {
             waits: config.network.mode != Mode::Client,
             next_port: AtomicU64::new(0),
             counters,
-            commands: Some(commands),
+            queue: Some(QueueEntry { puts, commands }),
             thread: Mutex::new(Some(thread)),
         })))
     }
@@ -165,34 +212,29 @@ impl ZenohSession {
 
     /// Hands a message over for sending, or drops it when too many wait.
     pub(crate) fn put(&self, port: u64, key: &Key, payload: Vec<u8>) {
-        let command = Command::Put { port, key: key.clone(), payload };
-        let taken = self.0.commands.as_ref().map(|commands| commands.try_send(command));
+        let put = Put { port, key: key.clone(), payload };
+        let taken = self.0.queue.as_ref().map(|queue| queue.puts.try_send(put));
         if !matches!(taken, Some(Ok(()))) {
             self.0.counters.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Ends a link. When the queue is full its subscriptions stay until the session closes, and fill nothing but the
-    /// link's own bounded inbox.
+    /// Ends a link.
     pub(crate) fn leave(&self, port: u64) {
-        if let Some(commands) = &self.0.commands {
-            match commands.try_send(Command::Leave { port }) {
-                Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
-            }
-        }
+        // Where nobody serves any more, there is nothing to leave.
+        let _ = self.ask(Command::Leave { port });
     }
 
-    /// Waits for room in the queue: for use outside control loops.
     fn ask(&self, command: Command) -> Result<(), ZenohError> {
-        let commands = self.0.commands.as_ref().ok_or(ZenohError::ThreadGone)?;
-        commands.send(command).map_err(|_| ZenohError::ThreadGone)
+        let queue = self.0.queue.as_ref().ok_or(ZenohError::ThreadGone)?;
+        queue.commands.send(command).map_err(|_| ZenohError::ThreadGone)
     }
 }
 
 impl Drop for Shared {
     /// Ends the thread, which sends what still waits and closes the session.
     fn drop(&mut self) {
-        self.commands = None;
+        self.queue = None;
         if let Some(thread) = self.thread.get_mut().ok().and_then(Option::take) {
             // Its panic, if any, has been reported where it happened.
             let _ = thread.join();
@@ -213,67 +255,92 @@ fn open(config: &ZenohConfig) -> Result<(zenoh::Session, Vec<String>), ZenohErro
     }
 }
 
-/// The life of a client's thread: without its router it has no session yet, and drops what it is to put.
+/// Opens a session, or says why not.
+fn open_at_once(
+    config: &ZenohConfig,
+    answer: &SyncSender<Result<Vec<String>, ZenohError>>,
+) -> Option<zenoh::Session> {
+    let (session, outcome) = match open(config) {
+        Ok((session, locators)) => (Some(session), Ok(locators)),
+        Err(error) => (None, Err(error)),
+    };
+    answer.send(outcome).ok().and(session)
+}
+
+/// Waits for a client's router, with what is asked for meanwhile: without it there is no session yet, and what is to be put is
+/// dropped. None if nobody asks any more.
 fn await_router(
     config: &ZenohConfig,
-    queue: &Receiver<Command>,
+    queue: &mut Queue,
     counters: &Counters,
     answer: &SyncSender<Result<Vec<String>, ZenohError>>,
-) {
+) -> Option<(zenoh::Session, Vec<Command>)> {
     // What is wrong with the configuration is said at once; a router that is not there is not wrong.
     let checked = config.network.to_zenoh().map(|(_, listen)| listen);
-    if answer.send(checked).is_err() {
-        return;
-    }
+    answer.send(checked).ok()?;
     let mut waiting = Vec::new();
     loop {
         match open(config) {
-            Ok((session, _)) => return serve(&session, waiting, queue, counters),
+            Ok((session, _)) => return Some((session, waiting)),
             Err(error) => tracing::debug!("the router is not there yet: {error}"),
         }
-        let again = Instant::now() + TRY_AGAIN;
-        loop {
-            match queue.recv_timeout(again.saturating_duration_since(Instant::now())) {
-                Ok(Command::Put { .. }) => drop(counters.dropped.fetch_add(1, Ordering::Relaxed)),
-                Ok(Command::CountPeers { answer }) => drop(answer.send(0)),
-                Ok(command) => waiting.push(command),
-                Err(RecvTimeoutError::Timeout) => break,
-                Err(RecvTimeoutError::Disconnected) => return,
+        let until_nobody_asks = async {
+            while let Some(asked) = queue.next().await {
+                match asked {
+                    Asked::Put(_) => drop(counters.dropped.fetch_add(1, Ordering::Relaxed)),
+                    Asked::Command(Command::CountPeers { answer }) => drop(answer.send(0)),
+                    Asked::Command(command) => waiting.push(command),
+                }
             }
+        };
+        let ended = ZRuntime::TX.block_on(async { tokio::time::timeout(TRY_AGAIN, until_nobody_asks).await });
+        if ended.is_ok() {
+            return None;
         }
     }
 }
 
-/// The life of the session's thread, until the last handle is gone. First it does what has `waited`.
-fn serve(session: &zenoh::Session, waited: Vec<Command>, queue: &Receiver<Command>, counters: &Counters) {
+/// The life of a session, until the last handle is gone. First it does what has `waited`.
+async fn serve(session: zenoh::Session, waited: Vec<Command>, mut queue: Queue, counters: Arc<Counters>) {
     let mut subscribers: BTreeMap<u64, Vec<Subscriber<()>>> = BTreeMap::new();
-    let mut publishers = Publishers { session, declared: BTreeMap::new() };
-    for command in waited.into_iter().chain(queue.iter()) {
-        match command {
-            Command::Put { port, key, payload } => {
+    let mut publishers =
+        Publishers { session: &session, destination: Locality::Remote, declared: BTreeMap::new() };
+    let mut waited = waited.into_iter();
+    loop {
+        let asked = match waited.next() {
+            Some(command) => Some(Asked::Command(command)),
+            None => queue.next().await,
+        };
+        match asked {
+            Some(Asked::Put(Put { port, key, payload })) => {
                 let key = key.to_string();
                 counters.messages.fetch_add(1, Ordering::Relaxed);
                 counters.bytes.fetch_add((key.len() + payload.len()) as u64, Ordering::Relaxed);
-                if let Err(error) = publishers.put(key, payload, mark(session, port)) {
+                if let Err(error) = publishers.put(key, payload, port) {
                     counters.failed.fetch_add(1, Ordering::Relaxed);
                     tracing::debug!("Zenoh did not put: {error}");
                 }
             }
-            Command::Join { port, patterns, inbox, answer } => {
+            Some(Asked::Command(Command::Join { port, patterns, inbox, answer })) => {
                 let joined: Result<Vec<_>, _> =
-                    patterns.into_iter().map(|pattern| subscribe(session, port, pattern, &inbox)).collect();
+                    patterns.into_iter().map(|pattern| subscribe(&session, port, pattern, &inbox)).collect();
                 let outcome = joined.map(|joined| drop(subscribers.insert(port, joined)));
+                publishers.reach(subscribers.len());
                 // Who asked may have given up waiting.
                 let _ = answer.send(outcome);
             }
-            Command::Leave { port } => drop(subscribers.remove(&port)),
-            Command::CountPeers { answer } => {
-                let _ = answer.send(session.info().peers_zid().wait().count());
+            Some(Asked::Command(Command::Leave { port })) => {
+                subscribers.remove(&port);
+                publishers.reach(subscribers.len());
             }
+            Some(Asked::Command(Command::CountPeers { answer })) => {
+                let _ = answer.send(session.info().peers_zid().await.count());
+            }
+            None => break,
         }
     }
     drop((subscribers, publishers));
-    if let Err(error) = session.close().wait() {
+    if let Err(error) = session.close().await {
         tracing::debug!("Zenoh did not close in order: {error}");
     }
 }
@@ -281,21 +348,42 @@ fn serve(session: &zenoh::Session, waited: Vec<Command>, queue: &Receiver<Comman
 /// A publisher for each key that has been put, so that Zenoh finds out once, and not with each message, who hears it.
 struct Publishers<'a> {
     session: &'a zenoh::Session,
+    /// Whether what is put has listeners in this session too.
+    destination: Locality,
     declared: BTreeMap<String, Publisher<'a>>,
 }
 
 impl Publishers<'_> {
-    fn put(&mut self, key: String, payload: Vec<u8>, mark: Vec<u8>) -> zenoh::Result<()> {
+    /// From now on the session has so many links. A single one is not told what it has put itself.
+    fn reach(&mut self, links: usize) {
+        let destination = if links > 1 { Locality::Any } else { Locality::Remote };
+        if std::mem::replace(&mut self.destination, destination) != destination {
+            self.declared.clear();
+        }
+    }
+
+    /// Puts what the link at `port` says. Meanwhile Zenoh's other tasks leave this thread, if it may take long.
+    fn put(&mut self, key: String, payload: Vec<u8>, port: u64) -> zenoh::Result<()> {
+        if payload.len() > MOST_WHOLE {
+            return tokio::task::block_in_place(|| self.put_now(key, payload, port));
+        }
+        self.put_now(key, payload, port)
+    }
+
+    fn put_now(&mut self, key: String, payload: Vec<u8>, port: u64) -> zenoh::Result<()> {
         if self.declared.len() < MOST_PUBLISHERS && !self.declared.contains_key(&key) {
             let publisher = self.session.declare_publisher(key.clone());
+            let publisher = publisher.allowed_destination(self.destination);
             let publisher = publisher.congestion_control(CongestionControl::Drop).wait()?;
             self.declared.insert(key.clone(), publisher);
         }
+        // Nobody else here means nobody who could hear what was his own.
+        let mark = (self.destination == Locality::Any).then(|| mark(self.session, port));
         match self.declared.get(&key) {
             Some(publisher) => publisher.put(payload).attachment(mark).wait(),
             None => {
                 let put = self.session.put(key, payload).congestion_control(CongestionControl::Drop);
-                put.attachment(mark).wait()
+                put.allowed_destination(self.destination).attachment(mark).wait()
             }
         }
     }

@@ -132,9 +132,13 @@ fn two_processes_worth_of_nodes_request_and_block_across_tcp() {
 #[test]
 fn nodes_of_one_session_hear_one_another_and_not_themselves() {
     let session = ZenohSession::open(config(Vec::new())).unwrap();
-    let (mut one, mut two) = (session.link(&name("uav/1")).unwrap(), session.link(&name("uav/2")).unwrap());
+    let mut one = session.link(&name("uav/1")).unwrap();
     let state = Payload::State(State::new(name("uav/1"))).encode();
     let key = Key::new(&fleet(), Topic::State { node: name("uav/1") });
+    // Alone in the session it is heard by nobody, and from then on by who joins.
+    one.put(&key, vec![1]);
+    wait_until("the first is put", || session.stats().messages == 1);
+    let mut two = session.link(&name("uav/2")).unwrap();
     one.put(&key, state.clone());
     let mut heard = None;
     wait_until("the state arrives", || {
@@ -177,6 +181,23 @@ fn putting_never_waits_and_what_does_not_fit_is_counted() {
     assert!(start.elapsed() < Duration::from_secs(2), "putting waited");
     let stats = session.stats();
     assert!(stats.dropped > 0 && stats.messages + stats.dropped <= 20_000, "{stats:?}");
+}
+
+#[test]
+fn a_long_message_arrives_whole() {
+    let (first, second) = sessions();
+    let mut link = first.link(&name("uav/1")).unwrap();
+    let mut other = second.link(&name("uav/2")).unwrap();
+    let key = Key::new(&fleet(), Topic::State { node: name("uav/2") });
+    let long: Vec<u8> = (0..skein_wire::MAX_PAYLOAD).map(|n| n as u8).collect();
+    let mut heard = None;
+    wait_until("it is heard", || {
+        other.put(&key, long.clone());
+        std::thread::sleep(Duration::from_millis(20));
+        heard = link.poll();
+        heard.is_some()
+    });
+    assert_eq!(heard, Some((key, long)));
 }
 
 #[test]
