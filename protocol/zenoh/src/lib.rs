@@ -3,7 +3,7 @@
 //! A [`ZenohSession`] does all its work where Zenoh does its own. A [`ZenohLink`] hands messages to it through a bounded
 //! queue and takes what has arrived from a bounded ring, so that no control loop ever waits for the network: what does
 //! not fit is dropped and counted, and the protocol above repeats it. Congested links drop too
-//! (`CongestionControl::Drop`). A program that calls [`work_together`] first has messages wake fewer threads.
+//! (`CongestionControl::Drop`). A program that calls [`share_threads`] first has messages wake fewer threads.
 //!
 //! Several nodes of one process share a session; other processes connect to its [`locators`](ZenohSession::locators).
 //! Without security configured, only the loopback interface is used, and nothing is announced by multicast.
@@ -38,5 +38,5 @@ pub use error::ZenohError;
 pub use incarnation::{IncarnationError, next_incarnation};
 pub use kept::{FileStore, KeptError};
 pub use link::{ZenohLink, ZenohLinkStats};
-pub use runtime::work_together;
+pub use runtime::share_threads;
 pub use session::{ZenohSession, ZenohStats};

@@ -58,7 +58,7 @@ impl Times {
 }
 
 pub(super) fn run(extent: Extent, as_json: bool) -> anyhow::Result<()> {
-    let [zenoh, together, queued, event] = round_trips(extent.round_trips)?;
+    let [zenoh, shared, queued, event] = round_trips(extent.round_trips)?;
     let SwarmSeen { confirm, before, during, others_lost } = swarm(extent)?;
     let stopped = json!({
         "leases_lost": others_lost,
@@ -68,11 +68,11 @@ pub(super) fn run(extent: Extent, as_json: bool) -> anyhow::Result<()> {
     if as_json {
         let object = json!({
             "zenoh_rtt_us": zenoh,
-            "zenoh_together_rtt_us": together,
+            "zenoh_shared_rtt_us": shared,
             "queued_rtt_us": queued,
             "event_rtt_us": event,
             "ratio_p50": event.p50 / zenoh.p50,
-            "ratio_event_together_p50": event.p50 / together.p50,
+            "ratio_event_shared_p50": event.p50 / shared.p50,
             "ratio_event_queued_p50": event.p50 / queued.p50,
             "homes": extent.homes,
             "confirm_10_homes_us": confirm,
@@ -85,13 +85,13 @@ pub(super) fn run(extent: Extent, as_json: bool) -> anyhow::Result<()> {
         println!("{what:<32} median {:>7.0} us, p99 {:>7.0} us", times.p50, times.p99);
     };
     line("plain Zenoh, there and back", zenoh);
-    line("the same on two threads, as ours", together);
+    line("the same on two threads, as ours", shared);
     line("through our queues", queued);
     line("request to resumed b-thread", event);
     println!(
         "an event takes {:.2} times plain Zenoh, {:.2} times Zenoh on two threads, {:.2} times our queues",
         event.p50 / zenoh.p50,
-        event.p50 / together.p50,
+        event.p50 / shared.p50,
         event.p50 / queued.p50
     );
     line(&format!("a block confirmed by {} homes", extent.homes), confirm);
@@ -105,15 +105,15 @@ pub(super) fn run(extent: Extent, as_json: bool) -> anyhow::Result<()> {
 fn round_trips(count: usize) -> anyhow::Result<[Times; 4]> {
     let each = count.div_ceil(TURNS);
     let mut plain = Plain::start(each, Some(AS_IT_COMES))?;
-    let mut together = Plain::start(each, None)?;
+    let mut shared = Plain::start(each, None)?;
     let mut queues = Queues::start()?;
     let mut events = Events::start()?;
     let mut times = [Vec::new(), Vec::new(), Vec::new(), Vec::new()];
     for _ in 0..TURNS {
-        let [zenoh_us, together_us, queued_us, event_us] = &mut times;
+        let [zenoh_us, shared_us, queued_us, event_us] = &mut times;
         // The first of each turn finds everything cold.
         zenoh_us.extend(plain.round_trips()?);
-        together_us.extend(together.round_trips()?);
+        shared_us.extend(shared.round_trips()?);
         queues.round_trip()?;
         for _ in 0..each {
             queued_us.push(queues.round_trip()?);

@@ -54,7 +54,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    skein_zenoh::work_together();
+    skein_zenoh::share_threads();
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
         .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
