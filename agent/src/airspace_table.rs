@@ -8,13 +8,10 @@ use skein_planning::airspace::{Airspace, HeightGrid, Mountain, NoFlyPrism, NoFly
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AirspaceTable {
-    /// Mountains.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub mountain: Vec<MountainTable>,
-    /// Threats.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub threat: Vec<ThreatTable>,
-    /// No-fly zones.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub no_fly: Vec<NoFlyTable>,
     /// Heights of the ground.

@@ -13,9 +13,7 @@ use crate::bthreads::LinkLossPolicy;
 /// An axis-aligned box, metres ENU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fence {
-    /// Least coordinates.
     pub min: [f64; 3],
-    /// Greatest coordinates.
     pub max: [f64; 3],
 }
 
@@ -127,7 +125,6 @@ pub enum Layer {
     LocalAvoidance,
     /// Repulsion between vehicles.
     Repulsion,
-    /// The safety filter.
     SafetyFilter,
     /// Planning anew where no way is made.
     Escape,
@@ -138,9 +135,7 @@ pub enum Layer {
 /// Which planners the pipeline is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Planners {
-    /// The global planner.
     pub global: GlobalPlanner,
-    /// The local planner.
     pub local: LocalPlanner,
     /// What is left out. For experiments alone: every layer is there for a reason.
     pub without: Option<Layer>,
@@ -173,7 +168,6 @@ pub struct AgentConfig {
     pub return_altitude_m: f64,
     /// Whether the vehicle has a lidar: without scans younger than 200 ms it then stands still.
     pub lidar: bool,
-    /// The geofence.
     pub fence: Fence,
     /// Terrain, threats and no-fly zones that are known; its box counts for nothing, the fence does.
     pub airspace: Airspace,
@@ -183,7 +177,6 @@ pub struct AgentConfig {
     pub planners: Planners,
     /// What to do without the ground station.
     pub link_loss: LinkLossPolicy,
-    /// What decides.
     pub controller: Controller,
     /// How it shares narrow passages.
     pub passage_rule: PassageRule,

@@ -73,9 +73,7 @@ pub enum AgentError {
     /// A node name in the configuration is none.
     #[error("agent configuration: `{field}` is {value:?}: {source}")]
     Name {
-        /// The field.
         field: &'static str,
-        /// Its value.
         value: String,
         /// What is wrong with it.
         source: skein_dbp::NodeNameError,
@@ -83,19 +81,13 @@ pub enum AgentError {
     /// The fleet's name is none.
     #[error("agent configuration: `fleet` is {value:?}: {source}")]
     Fleet {
-        /// Its value.
         value: String,
         /// What is wrong with it.
         source: skein_wire::KeyError,
     },
     /// A script is not run.
     #[error("agent configuration: script `{name}`: {why}")]
-    Script {
-        /// Its name.
-        name: String,
-        /// Why.
-        why: String,
-    },
+    Script { name: String, why: String },
     /// The fence is no space to fly in.
     #[error("agent configuration: `fence`: {0}")]
     Fence(#[from] MapError),

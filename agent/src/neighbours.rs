@@ -50,7 +50,6 @@ struct Clock {
 /// One neighbour, as of now.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Neighbour {
-    /// Its name.
     pub node: NodeName,
     /// Whether its motors are armed: from before take-off until after landing.
     pub armed: bool,

@@ -1,7 +1,5 @@
 //! A vehicle's b-threads, run together: what they make of what the vehicle and the fleet report.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::time::Duration;
 
 use skein_agent::{

@@ -1,7 +1,5 @@
 //! A vehicle that others have come too near to on all sides leaves its height.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::time::Duration;
 
 use nalgebra::Vector3;

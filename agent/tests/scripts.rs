@@ -1,7 +1,5 @@
 //! Scripts on a vehicle: what they may, what becomes of them, and what those do that come with the agent.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::{
     sync::{
         Arc,

@@ -1,7 +1,5 @@
 //! The verification of the program that flies: it holds, and each thing that is looked for can fail.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::time::Duration;
 
 use serde::Serialize;

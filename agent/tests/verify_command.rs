@@ -1,7 +1,6 @@
 //! `skein-agent verify` at the command line: what it prints, and its exit codes.
 
 #![cfg(feature = "zenoh")] // The program is built with it.
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
 
 use std::process::{Command, Output};
 

@@ -15,7 +15,6 @@ use crate::{Order, OrderRecord, Who};
 /// What a ground station must know.
 #[derive(Clone, Debug)]
 pub struct GroundConfig {
-    /// The fleet.
     pub fleet: Fleet,
     /// The station's node name, such as `ground/main`.
     pub name: NodeName,
@@ -70,7 +69,6 @@ impl GroundConfig {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{name}` is no vehicle of this station")]
 pub struct UnknownVehicle {
-    /// The name.
     pub name: NodeName,
 }
 

@@ -15,7 +15,6 @@ use skein_wire::vocabulary::{self, LOAD, UNLOAD};
 pub enum Who {
     /// Every vehicle of the roster.
     All,
-    /// These vehicles.
     These(Vec<NodeName>),
 }
 
@@ -30,7 +29,6 @@ pub enum Order {
     Abort,
     /// Stay where you are until resumed.
     Hold(Who),
-    /// Go on.
     Resume(Who),
     /// Land where you are.
     Land(Who),
@@ -88,9 +86,7 @@ impl SentScript {
 /// Where to go, metres ENU. Several vehicles spread out around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Destination {
-    /// East.
     pub x: f64,
-    /// North.
     pub y: f64,
     /// Up; none to keep the height that each vehicle has.
     pub z: Option<f64>,
@@ -241,7 +237,6 @@ pub fn is_for(event: &Event, vehicle: &NodeName) -> bool {
 pub(crate) const ALL: &str = "all";
 
 impl Who {
-    /// One vehicle.
     #[must_use]
     pub fn only(vehicle: NodeName) -> Self {
         Self::These(vec![vehicle])

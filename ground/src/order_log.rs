@@ -18,7 +18,6 @@ const KEPT: usize = 10;
 pub struct OrderRecord {
     /// Its number at this station, from 1.
     pub id: u64,
-    /// The order.
     pub order: Order,
     /// When it was given, on the station's clock.
     pub at: Duration,
@@ -29,7 +28,6 @@ pub struct OrderRecord {
 /// What a vehicle has said to an order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
-    /// Nothing yet.
     Pending,
     /// Nothing, and it is out of reach.
     Missing,

@@ -1,7 +1,5 @@
 //! What is said of a vehicle, from boards made by hand and from recordings.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // A test fails by panicking.
-
 use std::path::Path;
 use std::time::Duration;
 

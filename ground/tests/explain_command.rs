@@ -1,7 +1,5 @@
 //! `skein-ground explain`: what it prints, and its exit codes.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::path::Path;
 use std::process::{Command, Output};
 use std::time::Duration;

@@ -1,7 +1,5 @@
 //! The station with three simple vehicles over the in-memory network.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::collections::BTreeMap;
 use std::time::Duration;
 

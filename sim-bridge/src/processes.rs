@@ -192,7 +192,6 @@ impl Processes {
         self.world.step();
     }
 
-    /// The world.
     #[must_use]
     pub fn world(&self) -> &WorldHost {
         &self.world

@@ -39,7 +39,6 @@ pub struct Summary {
     pub path_length_m: Spread,
     /// Wall time of single path plans.
     pub plan_ms: PlanTimes,
-    /// Behavioural programming.
     pub events: EventCounts,
     /// Traffic between nodes.
     pub network: Traffic,
@@ -61,9 +60,7 @@ pub struct Collisions {
 /// Mean and largest of some values; 0 where there are none.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// Arithmetic mean.
     pub mean: f64,
-    /// Largest.
     pub max: f64,
 }
 
@@ -83,11 +80,9 @@ impl Spread {
 /// How long path planning took, in milliseconds on the wall; 0 where nothing was planned.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlanTimes {
-    /// Arithmetic mean.
     pub mean: f64,
     /// 99 of 100 plans took at most this long.
     pub p99: f64,
-    /// Longest.
     pub max: f64,
 }
 
@@ -114,7 +109,6 @@ pub struct EventCounts {
 /// Traffic between nodes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Traffic {
-    /// Messages delivered.
     pub messages: u64,
     /// Their payloads, in bytes.
     pub bytes: u64,
@@ -137,7 +131,6 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// In words.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Arrived => "arrived",
@@ -160,7 +153,6 @@ pub struct VehicleSummary {
     pub reason: Option<String>,
     /// From take-off to landing; 0 if it never flew.
     pub flight_time_s: f64,
-    /// Way flown.
     pub path_length_m: f64,
     /// Set-points made from fresh inputs, and the greatest age of an input to one of them, which must not exceed 200 ms.
     pub set_points: u64,

@@ -41,7 +41,6 @@ pub struct Row {
 /// How far the run is.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Progress {
-    /// Simulated time.
     pub sim_time_s: f64,
     /// Simulated time over wall time.
     pub realtime_factor: f64,
@@ -51,12 +50,10 @@ pub struct Progress {
     pub messages: u64,
     /// Vehicles that have landed at their goals.
     pub arrived: usize,
-    /// Vehicles in all.
     pub vehicles: usize,
 }
 
 impl Progress {
-    /// In one line.
     pub fn line(&self) -> String {
         let Self { sim_time_s, realtime_factor, events, messages, arrived, vehicles } = self;
         format!(

@@ -208,7 +208,6 @@ impl WorldHost {
         }
     }
 
-    /// The world.
     #[must_use]
     pub fn simulation(&self) -> &Simulation {
         &self.simulation

@@ -1,7 +1,5 @@
 //! What `bench --json` prints. No figure decides a test.
 
-#![allow(clippy::expect_used)]
-
 use std::process::Command;
 
 use serde_json::Value;

@@ -1,7 +1,5 @@
 //! The program as a user meets it: exit codes, and errors that name what is wrong.
 
-#![allow(clippy::expect_used)]
-
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};

@@ -1,7 +1,6 @@
 //! What each built-in scenario promises, whatever the seed.
 
 // Helpers fail like the tests that call them.
-#![allow(clippy::expect_used)]
 
 use nalgebra::Vector3;
 use skein_sim::scenario::{Scenario, ScenarioError};

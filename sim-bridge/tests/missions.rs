@@ -1,7 +1,6 @@
 //! Mission files: what of them is flown, by whom, and how users are told what is wrong.
 
 // Helpers fail like the tests that call them.
-#![allow(clippy::expect_used)]
 
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,5 @@
 //! Something that tells nobody where it is flies across a vehicle's way: the vehicle sees it by lidar alone.
 
-#![allow(clippy::unwrap_used)]
-
 use std::time::Duration;
 
 use nalgebra::Vector3;

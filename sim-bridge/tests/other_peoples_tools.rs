@@ -2,8 +2,6 @@
 //!
 //! The tests share the UDP ports of `serve` or measure times, so they take turns.
 
-#![allow(clippy::expect_used)]
-
 use std::io::{Read as _, Write as _};
 use std::net::UdpSocket;
 use std::process::{Child, Command, Stdio};

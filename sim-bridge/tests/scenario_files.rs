@@ -1,7 +1,6 @@
 //! Scenario files that users write: what they may say, and how they are told what is wrong.
 
 // Helpers fail like the tests that call them.
-#![allow(clippy::expect_used)]
 
 use std::path::Path;
 

@@ -1,7 +1,5 @@
 //! Vehicles keep out of what is known to be closed: on their way, around what they had not known of, and on the way home.
 
-#![allow(clippy::unwrap_used)]
-
 use nalgebra::Vector3;
 use skein_agent::{AgentConfig, GlobalPlanner, Layer, LocalPlanner, Planners};
 use skein_planning::airspace::KeepOut;

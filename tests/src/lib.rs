@@ -49,13 +49,11 @@ pub fn fly(mut flight: Fly) -> Summary {
 
 /// A swarm in lockstep that a test steps, and the network between its nodes.
 pub struct Lockstep {
-    /// The swarm.
     pub swarm: Swarm,
     /// Its network, to be cut and mended.
     pub network: Network,
     /// Vehicles, then the ground station.
     pub nodes: Vec<NodeName>,
-    /// The scenario.
     pub scenario: Scenario,
 }
 

@@ -51,9 +51,7 @@ pub struct NoFlyZone {
 /// A box of air over flat ground at height 0 (ENU, metres), with what stands in it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Airspace {
-    /// Least coordinates.
     pub lower: Vector3<f64>,
-    /// Greatest coordinates.
     pub upper: Vector3<f64>,
     /// The terrain; where mountains overlap, their heights add up.
     pub mountains: Vec<Mountain>,

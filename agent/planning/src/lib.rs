@@ -4,10 +4,7 @@
 //! This crate turns what it has seen into the velocity it should fly, one arrow at a time: rays -> [`map`] ->
 //! path ([`global`]) -> velocity along it ([`local`]) -> velocity that keeps its distance ([`separation`]).
 //! [`passage`] finds the places that only one vehicle should be in.
-//! In [`traffic`] vehicles that know the map agree, among themselves, who is where and when.
-//!
-//! What is known beforehand, an [`airspace`] of terrain and threats, is planned through before take-off: [`route`] by
-//! [`particle_swarm`], with [`assignment`] of vehicles to targets. [`coverage`] and [`formation`] make missions.
+//! An [`airspace`] holds terrain, threats and no-fly zones that are known beforehand.
 //!
 //! Nothing here reads a clock, and random numbers come from a seed that is given: the same inputs give the same outputs,
 //! bit for bit. Budgets count expansions or evaluations. The world frame is ENU; metres, seconds, radians.
@@ -30,18 +27,12 @@
 //! ```
 
 pub mod airspace;
-pub mod assignment;
-pub mod coverage;
-pub mod formation;
 pub mod global;
 pub mod grid;
 pub mod local;
 pub mod map;
-pub mod particle_swarm;
 pub mod passage;
 mod path;
-pub mod route;
 pub mod separation;
-pub mod traffic;
 
 pub use path::{Corner, Path, Projection};

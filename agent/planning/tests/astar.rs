@@ -1,7 +1,5 @@
 //! A* finds optimal paths, keeps its rules, and says why when it finds none.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
-
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;

@@ -1,7 +1,5 @@
 //! A way that is repaired is as good as one that is searched for, whatever the map has learnt and wherever the vehicle went.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
-
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
 use skein_planning::airspace::{Airspace, KeepOut, NoFlyZone};

@@ -1,7 +1,5 @@
 //! Narrow passages are found, are the same from both sides, and single obstacles are none.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
-
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use skein_planning::Path;

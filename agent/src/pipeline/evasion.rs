@@ -13,9 +13,7 @@ const LASTS: Duration = Duration::from_millis(1500);
 /// Up or down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
-    /// Climbs.
     Up,
-    /// Sinks.
     Down,
 }
 
@@ -33,9 +31,7 @@ impl Way {
 /// Where there is room to leave the height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Room {
-    /// Above.
     pub up: bool,
-    /// Below.
     pub down: bool,
 }
 

@@ -95,7 +95,6 @@ pub enum Report {
     Unplannable {
         /// Leg of the waypoint.
         leg: i64,
-        /// Why.
         why: String,
     },
     /// The waypoint of this leg is reached.
@@ -654,7 +653,6 @@ struct Kept {
 /// What is around the vehicle now.
 #[derive(Clone, Copy, Debug)]
 pub struct Surroundings<'a> {
-    /// The map.
     pub map: &'a ClearanceMap,
     /// Obstacle points of the newest scan, metres ENU: more exact than the map.
     pub obstacles: &'a [Vector3<f64>],

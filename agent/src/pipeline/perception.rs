@@ -116,7 +116,6 @@ impl Perception {
         Self { map: self.map.with_keep_out(keep_out), ..self }
     }
 
-    /// The map.
     #[must_use]
     pub fn map(&self) -> &ClearanceMap {
         &self.map

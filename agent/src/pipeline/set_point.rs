@@ -15,7 +15,6 @@ pub const SILENT_AFTER: Duration = Duration::from_millis(1000);
 pub enum KeepAlive {
     /// The pipeline's set-point.
     Command,
-    /// Zero velocity.
     Stop,
     /// Nothing at all.
     Silence,

@@ -32,7 +32,6 @@ pub struct Descent<'a> {
     pub stop: Vector3<f64>,
     /// Height of the ground.
     pub ground_m: f64,
-    /// Its body.
     pub envelope: &'a Envelope,
     /// Where it may fly.
     pub fence: &'a Fence,

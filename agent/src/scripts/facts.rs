@@ -24,7 +24,6 @@ pub struct Circumstances<'a> {
     pub ahead: Option<Vector3<f64>>,
     /// Share of the battery's energy left.
     pub battery: Option<f64>,
-    /// The others.
     pub neighbours: &'a [Neighbour],
 }
 

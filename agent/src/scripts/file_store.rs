@@ -19,7 +19,6 @@ pub struct FileScriptStore(PathBuf);
 #[derive(Debug, thiserror::Error)]
 #[error("`{}`: {problem}; the scripts that this vehicle had been sent are kept there, as JSON. {fate}", path.display())]
 pub struct ScriptsLost {
-    /// The file.
     pub path: PathBuf,
     /// What is wrong with it.
     pub problem: String,

@@ -39,7 +39,6 @@ pub const CONFIGURATION: &str = "configuration";
 /// When a script that is taken in begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Begins {
-    /// At once.
     AtOnce,
     /// When the vehicle is ready on the ground, or an operator lets it go on or takes it back in the air: one that is there when
     /// the agent starts cannot know what has become of the vehicle, and must not end its hold by itself.
@@ -49,7 +48,6 @@ pub enum Begins {
 /// A script that runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunningScript {
-    /// What it is for.
     pub about: String,
     /// The values of its parameters.
     pub with: BTreeMap<String, Argument>,

@@ -20,7 +20,6 @@ pub struct Runner {
     me: Me,
     name: String,
     script: Script,
-    /// What it may block.
     may_block: EventSet,
     over: bool,
     /// Whether it has yet to begin.

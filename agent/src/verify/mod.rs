@@ -37,7 +37,6 @@ const LONGEST_BURST: u32 = 16;
 /// Name of the part of the world that is the flight.
 const FLIGHT: &str = "world/flight";
 
-/// See [`MAY_BLOCK`].
 const SAFETY_RULE: &str = "nobody blocks a safety event but who goes before it";
 
 /// Which b-threads may block an event that is for the vehicle's safety; nobody may block those that are not named. `goto` is
@@ -84,7 +83,6 @@ pub fn check_script(config: &AgentConfig, script: &Assignment, most_states: usiz
 /// What came of one scene.
 #[derive(Clone, Debug)]
 pub struct SceneReport {
-    /// Which.
     pub scene: Scene,
     /// The verdict, how much was looked at, and what was not.
     pub report: Report,

@@ -58,7 +58,6 @@ impl Scene {
         Self::Everything,
     ];
 
-    /// Its name.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -34,18 +34,10 @@ pub enum ConsoleError {
     #[error(
         "console address `{address}` is not on the loopback interface: use 127.0.0.1, and a tunnel from elsewhere"
     )]
-    NotLoopback {
-        /// The address.
-        address: SocketAddr,
-    },
+    NotLoopback { address: SocketAddr },
     /// The address cannot be listened on.
     #[error("console address `{address}`: {source}; use another port, or 0 for any that is free")]
-    Listen {
-        /// The address.
-        address: SocketAddr,
-        /// Why.
-        source: std::io::Error,
-    },
+    Listen { address: SocketAddr, source: std::io::Error },
     /// The system gives no thread.
     #[error("the console's thread cannot be started: {0}")]
     Thread(std::io::Error),

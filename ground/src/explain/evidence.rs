@@ -53,9 +53,7 @@ pub(super) struct Vehicle {
 pub struct Occurred {
     /// When, on the listener's clock.
     pub at: Duration,
-    /// Where.
     pub home: NodeName,
-    /// What.
     pub event: Event,
     /// Who requested it, as its home names them.
     pub requested_by: Vec<String>,
@@ -130,7 +128,6 @@ impl Evidence {
         vehicle.events.push_back(occurred);
     }
 
-    /// All vehicles.
     pub fn vehicles(&self) -> impl Iterator<Item = &NodeName> {
         self.vehicles.keys()
     }

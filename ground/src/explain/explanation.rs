@@ -14,9 +14,7 @@ const SLOW_M_S: f64 = 0.2;
 /// B-threads of the vehicle are named plainly, those elsewhere as `node#bthread`. Times are the listener's, in seconds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Explanation {
-    /// The vehicle.
     pub vehicle: String,
-    /// The moment.
     pub time_s: f64,
     /// Where it is and what it does; none of one that has not been heard.
     pub situation: Option<Situation>,
@@ -54,7 +52,6 @@ pub struct Situation {
 /// An event that has happened.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EventNote {
-    /// When.
     pub time_s: f64,
     /// Its name and data.
     pub event: String,
@@ -71,7 +68,6 @@ pub struct EventNote {
 pub struct Request {
     /// Its name and data.
     pub event: String,
-    /// By whom.
     pub by: String,
     /// At which priority.
     pub priority: Option<i32>,
@@ -82,9 +78,7 @@ pub struct Request {
 /// Who blocks a request.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Blocker {
-    /// Its node.
     pub node: String,
-    /// The b-thread.
     pub bthread: String,
     /// Whether it runs where it blocks.
     pub local: bool,

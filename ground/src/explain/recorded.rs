@@ -16,30 +16,17 @@ use super::{Evidence, Occurred};
 pub enum RecordedError {
     /// The file cannot be opened.
     #[error("{}: {source}", path.display())]
-    Open {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    Open { path: PathBuf, source: std::io::Error },
     /// It is no MCAP file, or nothing of it can be read.
     #[error("{} is no recording that can be read: {source}; expected an MCAP file such as mission.mcap", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: McapError,
-    },
+    Unreadable { path: PathBuf, source: McapError },
     /// A message of Skein's is none.
     #[error("{}: a message on {topic} at {at_s:.3} s cannot be read: {source}", path.display())]
     Message {
-        /// The file.
         path: PathBuf,
-        /// Its topic.
         topic: String,
         /// When it was recorded, seconds since the run began.
         at_s: f64,
-        /// Why.
         source: DecodeError,
     },
 }

@@ -14,7 +14,6 @@ const TEXT: Color = Color { r: 1.0, g: 1.0, b: 1.0, a: 1.0 };
 const PATH_THICKNESS_M: f64 = 0.05;
 const TEXT_HEIGHT_M: f64 = 0.4;
 
-/// All obstacles as one entity.
 pub fn obstacles(timestamp: Timestamp, solids: &[Solid]) -> SceneEntity {
     let mut entity = entity(timestamp, WORLD, "obstacles");
     for solid in solids {
@@ -80,7 +79,6 @@ pub fn vector(v: &Vector3<f64>) -> Vector {
     Vector { x: v.x, y: v.y, z: v.z }
 }
 
-/// An orientation.
 pub fn quaternion(rotation: &UnitQuaternion<f64>) -> Quaternion {
     Quaternion { x: rotation.i, y: rotation.j, z: rotation.k, w: rotation.w }
 }

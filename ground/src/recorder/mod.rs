@@ -54,20 +54,10 @@ const WORLD: &str = "world";
 pub enum RecorderError {
     /// The file cannot be made.
     #[error("cannot record to `{}`: {source}; give a folder that can be written to", path.display())]
-    Create {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    Create { path: PathBuf, source: std::io::Error },
     /// The file cannot be continued, for instance because the disk is full.
     #[error("recording to `{}` failed: {source}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: McapError,
-    },
+    Write { path: PathBuf, source: McapError },
 }
 
 /// A planar laser scan in its vehicle's xy plane.

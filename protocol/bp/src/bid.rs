@@ -122,12 +122,10 @@ impl Bid {
         &self.0.requests
     }
 
-    /// The events waited for.
     pub fn waits(&self) -> &EventSet {
         &self.0.waits
     }
 
-    /// The blocked events.
     pub fn blocks(&self) -> &EventSet {
         &self.0.blocks
     }

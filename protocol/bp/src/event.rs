@@ -86,12 +86,9 @@ impl Event {
         self.get(key)?.as_number()
     }
 
-    /// The whole number under `key`.
+    /// The whole number under `key`, `2.0` included.
     pub fn int(&self, key: &str) -> Option<i64> {
-        match self.get(key)? {
-            Value::Int(n) => Some(*n),
-            _ => None,
-        }
+        self.get(key)?.as_whole()
     }
 
     /// The text under `key`.

@@ -23,10 +23,8 @@ use crate::value::{Real, Value};
 /// ```
 #[derive(Clone, PartialEq, Eq, Hash, Default)]
 pub enum EventSet {
-    /// No event.
     #[default]
     None,
-    /// Every event.
     All,
     /// One event, name and data.
     Exactly(Event),

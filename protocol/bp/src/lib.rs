@@ -33,6 +33,7 @@
 mod bid;
 mod board;
 mod bthread;
+pub mod catalogue;
 pub mod conformance;
 mod event;
 mod event_set;
@@ -59,3 +60,7 @@ pub use program::{PASSED_OVER_LIMIT, Program, ProgramConfig, ProgramError};
 pub use selection::{Names, Origin, Rival, Selection};
 pub use strategy::Strategy;
 pub use value::{Real, Value};
+
+// `words!` writes it out where it is called.
+#[doc(hidden)]
+pub use serde;

@@ -91,7 +91,6 @@ pub enum ProgramError {
     /// A b-thread's assertion failed; the program selects nothing more.
     #[error("b-thread `{bthread}` failed: {message}")]
     Failed {
-        /// The b-thread.
         bthread: Arc<str>,
         /// What it said.
         message: String,

@@ -36,7 +36,6 @@ impl fmt::Display for Origin {
 /// One event that happened and the b-threads it moved, each list in the order in which the b-threads were added.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Selection {
-    /// What happened.
     pub event: Event,
     /// Where it came from.
     pub origin: Origin,
@@ -58,9 +57,7 @@ pub struct Selection {
 /// A request that another one went before.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rival {
-    /// Who requested.
     pub bthread: Arc<str>,
-    /// What.
     pub event: Event,
     /// At which priority.
     pub priority: Option<i32>,

@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-/// A 64-bit float under a total order, so that data holding it can be compared and hashed.
+/// A 64-bit float that can be compared and hashed.
 ///
-/// Two reals are equal when their bits are: `0.0` and `-0.0` differ, a NaN equals itself. Order is [`f64::total_cmp`].
+/// Numbers compare as numbers, so `-0.0` is `0.0`. A NaN equals itself; NaNs stand at the ends, as in [`f64::total_cmp`].
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Real(f64);
@@ -18,6 +18,13 @@ impl Real {
     /// The number as a plain float.
     pub const fn get(self) -> f64 {
         self.0
+    }
+
+    /// The same number as an integer, if it is one.
+    fn as_whole(self) -> Option<i64> {
+        // 2^63, which is no `i64` any more.
+        const END: f64 = 9_223_372_036_854_775_808.0;
+        (self.0.trunc() == self.0 && (-END..END).contains(&self.0)).then_some(self.0 as i64)
     }
 }
 
@@ -29,7 +36,7 @@ impl From<f64> for Real {
 
 impl PartialEq for Real {
     fn eq(&self, other: &Self) -> bool {
-        self.0.to_bits() == other.0.to_bits()
+        self.0 == other.0 || self.0.to_bits() == other.0.to_bits()
     }
 }
 
@@ -43,13 +50,16 @@ impl PartialOrd for Real {
 
 impl Ord for Real {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.0.total_cmp(&other.0)
+        if self.0 == other.0 { Ordering::Equal } else { self.0.total_cmp(&other.0) }
     }
 }
 
 impl Hash for Real {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        self.0.to_bits().hash(state);
+        match self.as_whole() {
+            Some(whole) => whole.hash(state),
+            None => self.0.to_bits().hash(state),
+        }
     }
 }
 
@@ -66,8 +76,9 @@ impl fmt::Display for Real {
     }
 }
 
-/// One value in an event's data. Values of different kinds are never equal: `Int(1)` is not `Real(1.0)`.
-#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+/// One value in an event's data. Numbers compare as numbers: `Int(2)` is `Real(2.0)`, for TOML, JSON and Python write a
+/// number as they please. Values of other kinds are never equal.
+#[derive(Clone, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Value {
     /// A truth value.
@@ -80,7 +91,83 @@ pub enum Value {
     Text(Arc<str>),
 }
 
+impl PartialEq for Value {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Bool(a), Self::Bool(b)) => a == b,
+            (Self::Int(a), Self::Int(b)) => a == b,
+            (Self::Real(a), Self::Real(b)) => a == b,
+            (Self::Text(a), Self::Text(b)) => a == b,
+            (Self::Int(whole), Self::Real(real)) | (Self::Real(real), Self::Int(whole)) => {
+                real.as_whole() == Some(*whole)
+            }
+            _ => false,
+        }
+    }
+}
+
+impl Eq for Value {}
+
+impl PartialOrd for Value {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Value {
+    fn cmp(&self, other: &Self) -> Ordering {
+        match (self, other) {
+            (Self::Bool(a), Self::Bool(b)) => a.cmp(b),
+            (Self::Int(a), Self::Int(b)) => a.cmp(b),
+            (Self::Real(a), Self::Real(b)) => a.cmp(b),
+            (Self::Text(a), Self::Text(b)) => a.cmp(b),
+            (Self::Int(whole), Self::Real(real)) => compare(*whole, *real),
+            (Self::Real(real), Self::Int(whole)) => compare(*whole, *real).reverse(),
+            _ => self.rank().cmp(&other.rank()),
+        }
+    }
+}
+
+/// A whole number against a real one, without rounding.
+fn compare(whole: i64, real: Real) -> Ordering {
+    match real.as_whole() {
+        Some(other) => whole.cmp(&other),
+        // It has a fraction, so it is small, or it is beyond all whole numbers: rounding does not carry past it.
+        None => (whole as f64).total_cmp(&real.0),
+    }
+}
+
+impl Hash for Value {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.rank().hash(state);
+        match self {
+            Self::Bool(flag) => flag.hash(state),
+            Self::Int(whole) => whole.hash(state),
+            Self::Real(real) => real.hash(state),
+            Self::Text(text) => text.hash(state),
+        }
+    }
+}
+
 impl Value {
+    /// The place of its kind among the kinds.
+    const fn rank(&self) -> u8 {
+        match self {
+            Self::Bool(_) => 0,
+            Self::Int(_) | Self::Real(_) => 1,
+            Self::Text(_) => 2,
+        }
+    }
+
+    /// The whole number held, `2.0` included; `None` for others.
+    pub fn as_whole(&self) -> Option<i64> {
+        match self {
+            Self::Int(whole) => Some(*whole),
+            Self::Real(real) => real.as_whole(),
+            Self::Bool(_) | Self::Text(_) => None,
+        }
+    }
+
     /// The number held, whole or real; `None` for the other kinds.
     pub fn as_number(&self) -> Option<f64> {
         match self {
@@ -153,5 +240,54 @@ impl fmt::Display for Value {
 impl fmt::Debug for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(self, f)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::hash::BuildHasher as _;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn value() -> impl Strategy<Value = Value> {
+        prop_oneof![
+            any::<bool>().prop_map(Value::from),
+            (-3_i64..3).prop_map(Value::from),
+            any::<i64>().prop_map(Value::from),
+            (-6_i64..6).prop_map(|half| Value::from(half as f64 / 2.0)),
+            any::<i64>().prop_map(|whole| Value::from(whole as f64)),
+            any::<f64>().prop_map(Value::from),
+            Just(Value::from(-0.0)),
+            Just(Value::from(f64::NAN)),
+            Just(Value::from("2")),
+        ]
+    }
+
+    #[test]
+    fn two_is_two_however_it_is_written() {
+        assert_eq!(Value::from(2), Value::from(2.0));
+        assert_eq!(Value::from(0), Value::from(-0.0));
+        assert_ne!(Value::from(2), Value::from("2"));
+        assert_ne!(Value::from(1), Value::from(true));
+        // Beyond 2^53 floats have gaps.
+        assert_ne!(Value::from((1_i64 << 53) + 1), Value::from((1_i64 << 53) as f64));
+        assert_ne!(Value::from(i64::MAX), Value::from(i64::MAX as f64));
+    }
+
+    proptest! {
+        #[test]
+        fn order_equality_and_hash_agree(a in value(), b in value(), c in value()) {
+            prop_assert_eq!(a.cmp(&b), b.cmp(&a).reverse());
+            prop_assert_eq!(a == b, a.cmp(&b) == Ordering::Equal);
+            if a <= b && b <= c {
+                prop_assert!(a <= c);
+            }
+            if a == b {
+                let hasher = rustc_hash::FxBuildHasher;
+                prop_assert_eq!(hasher.hash_one(&a), hasher.hash_one(&b));
+            }
+        }
     }
 }

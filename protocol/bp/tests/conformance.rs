@@ -1,7 +1,5 @@
 //! The kernel against conformance cases, and the runner against itself.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use skein_bp::conformance::Suite;
 
 #[test]

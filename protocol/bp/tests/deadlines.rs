@@ -1,15 +1,11 @@
 //! Deadlines: timers that are part of a bid.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod support;
-
 use std::time::Duration;
 
+use crate::support::plain;
 use serde::Serialize;
 use serde_json::json;
 use skein_bp::{BThread, Bid, Context, Event, Program, ProgramConfig};
-use support::plain;
 
 fn ms(millis: u64) -> Duration {
     Duration::from_millis(millis)

@@ -1,7 +1,5 @@
 //! Event sets: what they hold, and how they are written.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::collections::BTreeMap;
 
 use proptest::prelude::*;

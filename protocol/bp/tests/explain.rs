@@ -1,12 +1,8 @@
 //! `explain` names who requests, blocks and waits.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod support;
-
+use crate::support::{START, plain};
 use serde_json::json;
 use skein_bp::Bid;
-use support::{START, plain};
 
 #[test]
 fn a_stalled_request_is_explained_by_its_blockers() {

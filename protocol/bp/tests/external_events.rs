@@ -1,12 +1,8 @@
 //! Rule 4: external events.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod support;
-
+use crate::support::{START, plain, program, superstep};
 use serde_json::json;
 use skein_bp::{Origin, ProgramConfig};
-use support::{START, plain, program, superstep};
 
 #[test]
 fn an_external_event_waits_until_nothing_internal_is_selectable() {

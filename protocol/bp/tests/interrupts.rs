@@ -1,11 +1,7 @@
 //! Rule 5: interrupts come first.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod support;
-
+use crate::support::{START, plain, superstep};
 use serde_json::json;
-use support::{START, plain, superstep};
 
 #[test]
 fn an_interrupted_bthread_ends_even_if_it_waits_for_the_event_too() {

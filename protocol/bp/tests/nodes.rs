@@ -1,12 +1,8 @@
 //! What lets a channel join programs on several nodes: homes, proxies, occurrences.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod support;
-
+use crate::support::{START, plain, program, superstep};
 use serde_json::json;
 use skein_bp::{Bid, Event, EventSet, Origin, Program, ProgramConfig, Strategy};
-use support::{START, plain, program, superstep};
 
 #[test]
 fn only_events_of_the_home_are_selected() {

@@ -1,17 +1,12 @@
 //! Properties of whole runs, on programs made at random.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod recipes;
-mod support;
-
 use std::collections::BTreeMap;
 
+use crate::recipes::{bid, event};
+use crate::support::START;
 use proptest::prelude::*;
-use recipes::{bid, event};
 use skein_bp::script::{Op, Script};
 use skein_bp::{Bid, Event, EventSet, Origin, Program, ProgramConfig, Selection, Strategy as Selecting};
-use support::START;
 
 const STEPS: usize = 60;
 
@@ -189,7 +184,7 @@ fn every_order_of_independent_events_is_reached() {
         for event in ["a", "b", "c", "d"] {
             program.add(event, Script::new(&[Op::Sync(Bid::new().request(event))]).unwrap());
         }
-        support::superstep(&mut program)
+        crate::support::superstep(&mut program)
     };
     let orders: std::collections::BTreeSet<_> = (0..500).map(run).collect();
     assert_eq!(orders.len(), 24);
@@ -202,7 +197,7 @@ fn a_run_does_not_depend_on_the_order_in_which_equals_were_added() {
         for event in order {
             program.add(event, Script::new(&[Op::Sync(Bid::new().request(event))]).unwrap());
         }
-        support::superstep(&mut program)
+        crate::support::superstep(&mut program)
     };
     assert_eq!(run(["a", "b", "c"]), run(["c", "a", "b"]));
 }

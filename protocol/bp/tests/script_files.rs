@@ -1,18 +1,13 @@
 //! Script files: what they may say, what they become, and how they are refused.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod schema;
-mod support;
-
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use schema::Schema;
+use crate::schema::Schema;
+use crate::support::START;
 use serde_json::{Value, json};
 use skein_bp::script::{Argument, Assignment, BoundScript, MAX_TEXT, ScriptFile};
 use skein_bp::{Event, Program, ProgramConfig};
-use support::START;
 
 const PATROL: &str = r#"
 name = "patrol"
@@ -69,7 +64,7 @@ fn route() -> Argument {
 fn a_script_runs_with_its_parameters_and_leaves_a_block_when_told() {
     let mut program = program(bound(PATROL, &[("route", route())]));
     let there = |program: &mut Program| after(program, START, "uav/3/there");
-    let first = support::superstep(&mut program);
+    let first = crate::support::superstep(&mut program);
     assert_eq!(first, ["uav/3/go{by: \"script/patrol\", x: 1.0, y: 2.0}"]);
     assert_eq!(there(&mut program)[1], "uav/3/go{by: \"script/patrol\", x: 4.0, y: 5.0}");
     assert_eq!(there(&mut program)[1], first[0]);

@@ -1,13 +1,9 @@
 //! Scripts: b-threads as data.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod support;
-
+use crate::support::{START, plain, script, superstep};
 use serde_json::{Value, json};
 use skein_bp::script::{Library, Op, Script, ScriptSource};
 use skein_bp::{Program, ProgramConfig};
-use support::{START, plain, script, superstep};
 
 #[test]
 fn nested_loops_count_separately() {

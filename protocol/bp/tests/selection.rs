@@ -1,12 +1,8 @@
 //! Rules 1 to 7: which event is selected, and whom it resumes.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod support;
-
+use crate::support::{START, names, plain, program, script, superstep};
 use serde_json::json;
 use skein_bp::{Bid, Event, Program, ProgramConfig, Strategy};
-use support::{START, names, plain, program, script, superstep};
 
 fn with(strategy: Strategy) -> ProgramConfig {
     ProgramConfig { strategy, ..ProgramConfig::default() }
@@ -140,7 +136,7 @@ fn the_greatest_priority_among_unblocked_bids_wins() {
     };
     let blocker = json!([{"sync": {"block": "blocked"}}]);
     let mut flown = program(with(Strategy::SyncPriority), bthreads());
-    flown.add("blocker", support::script(blocker));
+    flown.add("blocker", crate::support::script(blocker));
     assert_eq!(selectable(flown.clone()), ["also high", "high"]);
     let order = superstep(&mut flown);
     assert_eq!(order[2..], ["least", "none"], "no priority is lower than the least one");
@@ -237,7 +233,7 @@ fn choose_takes_what_is_selectable_and_nothing_else() {
 #[test]
 fn a_name_that_is_taken_gets_a_number_and_one_that_is_free_again_goes_on_counting() {
     let mut program = plain([]);
-    let once = || support::script(json!([{"sync": {"request": ["a"]}}, {"sync": {"wait": "b"}}]));
+    let once = || crate::support::script(json!([{"sync": {"request": ["a"]}}, {"sync": {"wait": "b"}}]));
     assert_eq!(&*program.add("t", once()), "t");
     assert_eq!(&*program.add("t", once()), "t~2");
     superstep(&mut program);

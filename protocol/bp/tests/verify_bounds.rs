@@ -1,18 +1,14 @@
 //! What a verification says of its bounds, deadlines and progress, and the graph that it draws.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod support;
-
 use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Duration;
 
+use crate::support::plain;
 use serde_json::json;
 use skein_bp::script::{Op, Script};
 use skein_bp::verify::{Inspection, Omission, Search, Timers, Verifier, ViolationKind};
 use skein_bp::{Bid, Event, Program, ProgramConfig};
-use support::plain;
 
 /// Counts to `rounds` and fails.
 fn counter(rounds: u32) -> Program {
@@ -120,7 +116,7 @@ fn where_external_events_get_their_turn_they_may_come_at_any_time() {
         let config = ProgramConfig { externals_after, ..ProgramConfig::default() };
         let endless = json!([{"repeat": "forever", "do": [{"sync": {"request": ["own"]}}]}]);
         let waiting = json!([{"sync": {"wait": "far"}}, {"assert_fail": "came"}]);
-        let mut program = support::program(config, [("endless", endless), ("waiting", waiting)]);
+        let mut program = crate::support::program(config, [("endless", endless), ("waiting", waiting)]);
         program.enqueue("far");
         Verifier::new(program).run().verdict.is_some()
     };

@@ -1,17 +1,13 @@
 //! The verifier on programs whose answers are known.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod support;
-
 use std::collections::BTreeSet;
 
+use crate::support::{START, plain};
 use serde::Serialize;
 use serde_json::json;
 use skein_bp::script::{Op, Script};
 use skein_bp::verify::{Inspection, Report, Search, Verifier, ViolationKind};
 use skein_bp::{BThread, Bid, Context, Event, EventSet, Program, ProgramConfig, Strategy};
-use support::{START, plain};
 
 fn names(report: &Report) -> Vec<String> {
     report.verdict.iter().flat_map(|violation| &violation.trace).map(Event::to_string).collect()

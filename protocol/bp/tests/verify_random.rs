@@ -1,19 +1,14 @@
 //! The verifier against an exploration that is as plain as can be, on programs made at random.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod recipes;
-mod support;
-
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::time::Duration;
 
+use crate::recipes::{bid, event, set};
+use crate::support::START;
 use proptest::prelude::*;
-use recipes::{bid, event, set};
 use skein_bp::script::{Op, Reply, Script, ScriptSource, Spawn};
 use skein_bp::verify::{Graph, Inspection, Report, Search, Verifier, Violation, ViolationKind};
 use skein_bp::{Bid, Event, EventSet, Program, ProgramConfig, Strategy as Selecting};
-use support::START;
 
 /// Programs with more states than this are left out.
 const MOST_STATES: usize = 200;

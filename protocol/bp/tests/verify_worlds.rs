@@ -1,14 +1,10 @@
 //! The verifier on programs with a world around them: when the world may act, whether the program comes to rest, what stays
 //! within reach, and what was met.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod support;
-
+use crate::support::plain;
 use serde_json::{Value, json};
 use skein_bp::verify::{Inspection, Timers, Verifier, ViolationKind};
 use skein_bp::{Bid, Event, Program};
-use support::plain;
 
 fn repeat(syncs: Value) -> Value {
     json!([{"repeat": "forever", "do": syncs}])

@@ -70,7 +70,6 @@ impl Authority {
         Self::new(vec![Role { name: "member".into(), nodes: vec!["**".into()], grant: all }], None)
     }
 
-    /// The roles.
     #[must_use]
     pub fn roles(&self) -> &[Role] {
         &self.roles

@@ -12,9 +12,7 @@ use crate::NodeName;
 /// to the quotas below, and says so.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Board {
-    /// The node.
     pub node: NodeName,
-    /// Its incarnation.
     pub incarnation: u64,
     /// When, on the node's clock.
     pub at: Duration,
@@ -33,7 +31,6 @@ pub struct BoardRow {
     pub requests: Vec<BoardRequest>,
     /// What it waits for; not known of b-threads elsewhere.
     pub waits: EventSet,
-    /// What it blocks.
     pub blocks: EventSet,
     /// What ends it; not known of b-threads elsewhere.
     pub interrupts: EventSet,
@@ -47,10 +44,8 @@ pub struct BoardRow {
     pub cut: bool,
 }
 
-/// One request on a board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardRequest {
-    /// The event.
     pub event: Event,
     /// Who blocks it here, by name. An event of this home that nobody blocks may be selected.
     pub blocked_by: Vec<String>,
@@ -66,7 +61,6 @@ pub struct BoardLease {
 }
 
 impl Board {
-    /// Rows.
     pub const MAX_ROWS: usize = 128;
     /// Requests in a row, and blockers of a request.
     pub const MAX_REQUESTS: usize = 16;

@@ -20,7 +20,6 @@ pub(crate) struct HeldBlock {
     pub(crate) standing: Standing,
 }
 
-/// What is blocked.
 #[derive(Clone, Debug)]
 pub(crate) struct Block {
     pub(crate) set: EventSet,
@@ -34,7 +33,6 @@ pub(crate) struct Block {
 /// What the holder may rely on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Standing {
-    /// Nothing.
     Unsure,
     /// It was told that the block holds, and has moved on with it, or with a part of it. Of the present synchronisation
     /// point it has been told nothing yet.

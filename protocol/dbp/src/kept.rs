@@ -31,10 +31,8 @@ pub struct KeptBlock {
     pub node: NodeName,
     /// The life of that node in which the block was stated last, or another of its lives that have ended.
     pub incarnation: u64,
-    /// The holder.
     pub bthread: String,
     /// At which of its synchronisation points.
     pub sync: u64,
-    /// What it blocks.
     pub block: EventSet,
 }

@@ -13,7 +13,6 @@ use crate::NodeName;
 /// Whom a message is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Recipient {
-    /// One node.
     Node(NodeName),
     /// Every node of the fleet.
     All,
@@ -51,7 +50,6 @@ impl Message {
 /// The newest bids of one node's b-threads for the events of one home.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BidRecord {
-    /// The bidder.
     pub node: NodeName,
     /// The bidder's incarnation: a durable counter that grows with each of its starts.
     pub incarnation: u64,
@@ -80,7 +78,6 @@ pub struct BidRecord {
 /// One b-thread's bid for the events of another node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RemoteBid {
-    /// The b-thread.
     pub bthread: String,
     /// Its synchronisation point: grows each time the b-thread moves on, in one incarnation of its node.
     pub sync: u64,
@@ -125,9 +122,7 @@ pub enum OnLoss {
 pub struct BidAck {
     /// The home that answers.
     pub home: NodeName,
-    /// Its incarnation.
     pub home_incarnation: u64,
-    /// The bidder.
     pub node: NodeName,
     /// The bidder's incarnation.
     pub incarnation: u64,
@@ -148,7 +143,6 @@ pub struct Refusal {
     pub bthread: String,
     /// Its synchronisation point.
     pub sync: u64,
-    /// Why.
     pub reason: RefusalReason,
 }
 
@@ -215,7 +209,6 @@ impl RefusalReason {
 pub struct ServedRequest {
     /// The node that requested.
     pub node: NodeName,
-    /// Its incarnation.
     pub incarnation: u64,
     /// The b-thread that requested.
     pub bthread: String,
@@ -226,7 +219,6 @@ pub struct ServedRequest {
 /// An event that has occurred at its home. It cannot be taken back, nor blocked by who hears of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Occurrence {
-    /// Where.
     pub home: NodeName,
     /// In which life of the home.
     pub incarnation: u64,
@@ -234,7 +226,6 @@ pub struct Occurrence {
     pub seq: u64,
     /// For a joint event the term in which it was decided, and then the number counts the term's decisions (G8); else 0.
     pub term: u64,
-    /// What.
     pub event: Event,
     /// The remote requests it served.
     pub requests_served: Vec<ServedRequest>,
@@ -249,7 +240,6 @@ pub struct Occurrence {
 /// A wish to hear some occurrences again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Repair {
-    /// Whose occurrences.
     pub home: NodeName,
     /// Of which of its lives.
     pub incarnation: u64,
@@ -259,16 +249,13 @@ pub struct Repair {
     pub to_seq: u64,
     /// The term whose decisions are missed; 0 for the home's other occurrences.
     pub term: u64,
-    /// Who asks.
     pub requester: NodeName,
 }
 
 /// A sign of life, from which others see also the loss of a stream's tail.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Presence {
-    /// Who lives.
     pub node: NodeName,
-    /// In which incarnation.
     pub incarnation: u64,
     /// How long it has been up. Who was there before it wants its stream from the start.
     pub up: Duration,

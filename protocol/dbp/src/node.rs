@@ -44,9 +44,7 @@ const PRESENCES_KNOWN: usize = 16;
 /// An event that has happened, here or elsewhere, in the order in which this node's b-threads saw it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Happened {
-    /// What.
     pub event: Event,
-    /// Where.
     pub home: NodeName,
     /// Its number there, from 1; 0 for an event without home, which does not travel.
     pub seq: u64,
@@ -67,7 +65,6 @@ pub struct Happened {
 pub struct ChannelMove {
     /// How many of the selections that [`Node::take_selections`] gives next came before it.
     pub after: usize,
-    /// What has changed.
     pub change: BoardChange,
 }
 
@@ -104,7 +101,6 @@ pub enum NodeError {
     /// The b-threads kept requesting.
     #[error("{node}: the step did not settle within {limit} selections; look at the b-threads that kept requesting: {}", .bthreads.join(", "))]
     Unsettled {
-        /// The node.
         node: NodeName,
         /// The limit, from [`NodeConfig::settle_limit`].
         limit: usize,
@@ -114,11 +110,9 @@ pub enum NodeError {
     /// A b-thread requests events of two homes at one synchronisation point, so that both could occur.
     #[error("{node}: b-thread `{bthread}` requests events of {} at one synchronisation point; request at one home only", .homes.join(" and "))]
     TwoHomes {
-        /// The node.
         node: NodeName,
         /// The b-thread at fault.
         bthread: String,
-        /// The homes.
         homes: Vec<String>,
     },
 }
@@ -204,7 +198,6 @@ enum Delivery {
 /// Where an event is decided.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Home {
-    /// Here.
     Here,
     /// Wherever it is selected: it has no home and does not travel.
     Local,
@@ -421,19 +414,16 @@ impl Node {
 
 /// Asking a node.
 impl Node {
-    /// Its name.
     #[must_use]
     pub fn name(&self) -> &NodeName {
         &self.config.name
     }
 
-    /// Its incarnation.
     #[must_use]
     pub fn incarnation(&self) -> u64 {
         self.config.incarnation
     }
 
-    /// Its program.
     #[must_use]
     pub fn program(&self) -> &Program {
         &self.program

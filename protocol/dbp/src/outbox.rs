@@ -48,7 +48,6 @@ pub(crate) struct Upheld {
     pub(crate) acknowledged: bool,
 }
 
-/// Who bids.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sender<'a> {
     pub(crate) node: &'a NodeName,

@@ -80,7 +80,6 @@ impl Roster {
         Ok(Self { term: term.ok_or(RosterError::Term)?, coordinator, members })
     }
 
-    /// All joint events.
     #[must_use]
     pub fn joint_events() -> EventSet {
         EventSet::prefix(SWARM)

@@ -50,7 +50,6 @@ pub(crate) type ProxyChange = (Arc<str>, Option<Bid>);
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Past<'a> {
     pub(crate) history: &'a History,
-    /// The term it is in.
     pub(crate) term: u64,
     /// The decisions of that term, if it makes them.
     pub(crate) decisions: Option<&'a History>,
@@ -128,9 +127,7 @@ pub(crate) struct TakenBid {
 /// A remote b-thread that stands behind a proxy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RemoteParty {
-    /// Its node.
     pub node: NodeName,
-    /// The b-thread.
     pub bthread: String,
     /// How long ago its bid was renewed, on this home's clock.
     pub lease_age: Duration,

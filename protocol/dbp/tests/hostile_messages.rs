@@ -1,7 +1,5 @@
 //! Whatever a node is told, it neither fails nor believes what the teller has no say in.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::time::Duration;
 
 use proptest::prelude::*;

@@ -1,7 +1,5 @@
 //! A home that has restarted keeps its guarded events back until it knows who blocks them.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::time::Duration;
 
 use skein_bp::script::{Op, Script};

@@ -1,7 +1,5 @@
 //! In which order a node sends what one step has brought about.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::time::Duration;
 
 use skein_bp::{Event, EventSet, Program, ProgramConfig};

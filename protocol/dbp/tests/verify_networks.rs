@@ -1,7 +1,5 @@
 //! The verifier on small networks whose answers are known.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::sync::Arc;
 use std::time::Duration;
 

@@ -19,11 +19,9 @@ pub enum Command {
     /// Fly the companion's set-points. PX4 accepts it only while they already arrive; ArduPilot needs it
     /// before arming and take-off.
     Offboard,
-    /// Land here.
     Land,
     /// Fly home and land.
     Return,
-    /// Stay here.
     Hold,
     /// Fly the uploaded mission.
     StartMission,
@@ -38,7 +36,6 @@ pub enum CommandResult {
     /// Not now; the autopilot's texts say why.
     #[error("rejected for now: its texts say why, repeat when that is mended")]
     TemporarilyRejected,
-    /// Never so.
     #[error("denied")]
     Denied,
     /// The autopilot does not know it.

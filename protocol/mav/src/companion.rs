@@ -64,44 +64,24 @@ impl CompanionConfig {
 pub enum MavEvent {
     /// The autopilot answered a command, or it could not be sent.
     CommandAcked {
-        /// The command.
         command: Command,
         /// Accepted, or why not.
         result: CommandResult,
     },
     /// The autopilot never answered, for all repetitions. It may have obeyed.
-    CommandTimedOut {
-        /// The command.
-        command: Command,
-    },
+    CommandTimedOut { command: Command },
     /// The flight mode changed, whoever asked for it.
-    ModeChanged {
-        /// Before.
-        from: FlightMode,
-        /// Now.
-        to: FlightMode,
-    },
+    ModeChanged { from: FlightMode, to: FlightMode },
     /// The autopilot armed or disarmed, whoever asked for it.
-    ArmedChanged {
-        /// Now.
-        armed: bool,
-    },
+    ArmedChanged { armed: bool },
     /// Heartbeats stopped for [`HEARTBEAT_TIMEOUT`].
     HeartbeatLost,
     /// Heartbeats came (again).
     HeartbeatRegained,
     /// A parameter that was read or written has this value.
-    ParameterRead {
-        /// Its name.
-        name: String,
-        /// Its value.
-        value: ParameterValue,
-    },
+    ParameterRead { name: String, value: ParameterValue },
     /// A parameter that was asked for never came: the autopilot does not have it, or the link is bad.
-    ParameterMissing {
-        /// Its name.
-        name: String,
-    },
+    ParameterMissing { name: String },
     /// The mission was downloaded.
     MissionReceived {
         /// Its items in order.
@@ -110,10 +90,7 @@ pub enum MavEvent {
     /// The mission was uploaded, and the autopilot accepted it.
     MissionUploaded,
     /// A mission transfer failed.
-    MissionFailed {
-        /// Why.
-        error: MissionError,
-    },
+    MissionFailed { error: MissionError },
     /// The autopilot wrote a line.
     Text(Text),
 }

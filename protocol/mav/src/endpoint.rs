@@ -82,7 +82,6 @@ pub enum AutopilotCommand {
         /// Ground speed, m/s.
         speed_m_s: f64,
     },
-    /// Move home.
     SetHome {
         /// Where to, m; `None` for here.
         position: Option<Vector3<f64>>,
@@ -109,32 +108,24 @@ pub enum Request {
         ticket: Ticket,
         /// What is asked.
         command: AutopilotCommand,
-        /// Who asks.
         from: Address,
     },
     /// A set-point.
     SetPoint {
-        /// The wish.
         set_point: SetPoint,
         /// Who sends it.
         from: Address,
     },
     /// A pilot's sticks, each -1..1.
     Sticks {
-        /// Forward.
         forward: f64,
-        /// To the left.
         left: f64,
-        /// Up.
         up: f64,
         /// Counter-clockwise from above.
         turn_left: f64,
     },
     /// A station set a parameter; the table has its value.
-    ParameterChanged {
-        /// Its name.
-        name: &'static str,
-    },
+    ParameterChanged { name: &'static str },
     /// The mission was replaced or cleared.
     MissionChanged,
 }
@@ -224,7 +215,6 @@ impl Endpoint {
         self.requests.pop_front()
     }
 
-    /// Answers a command.
     pub fn answer(&mut self, ticket: Ticket, result: CommandResult) {
         self.remembered.settle(ticket.from, ticket.command, result);
         if ticket.acknowledged {
@@ -269,12 +259,10 @@ impl Endpoint {
         self.writer.write(&MISSION_ITEM_REACHED_DATA { seq });
     }
 
-    /// The parameters.
     pub fn parameters(&self) -> &ParameterTable {
         &self.config.parameters
     }
 
-    /// The mission.
     pub fn mission(&self) -> &[MissionItem] {
         self.missions.items()
     }

@@ -28,11 +28,9 @@ impl Address {
 /// One message, and who sent it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// Sender.
     pub sender: Address,
     /// The sender's packet counter, which wraps at 256.
     pub sequence: u8,
-    /// Content.
     pub message: MavMessage,
 }
 

@@ -121,10 +121,7 @@ pub enum MissionError {
     Refused(MavMissionResult),
     /// The list is longer than [`MAX_ITEMS`].
     #[error("the mission has {items} items, at most {MAX_ITEMS} are taken: split it")]
-    TooLong {
-        /// Its length.
-        items: usize,
-    },
+    TooLong { items: usize },
     /// Another transfer began before this one had ended.
     #[error("another mission transfer began before this one had ended")]
     Superseded,

@@ -9,7 +9,6 @@ use mavlink::dialects::common::MavAutopilot;
 pub enum AutopilotKind {
     /// PX4, or Skein's built-in autopilot, which speaks PX4's dialect.
     Px4,
-    /// ArduPilot (ArduCopter).
     ArduPilot,
     /// Another make: it is listened to, never commanded.
     Other,

@@ -30,7 +30,6 @@ pub enum SetPoint {
         /// Heading, rad.
         yaw: Option<f64>,
     },
-    /// Position.
     Position {
         /// Position, m.
         position: Vector3<f64>,

@@ -14,7 +14,6 @@ use crate::mode::{AutopilotKind, FlightMode};
 pub struct Stamped<T> {
     /// Time since the run began.
     pub stamp: Duration,
-    /// The value.
     pub value: T,
 }
 
@@ -31,11 +30,9 @@ pub enum Landed {
     /// Not said yet.
     #[default]
     Unknown,
-    /// On the ground.
     OnGround,
     /// Leaving the ground.
     TakingOff,
-    /// In the air.
     InAir,
     /// Coming down to the ground.
     Landing,
@@ -65,9 +62,7 @@ pub enum Severity {
     Warning,
     /// Unusual, not an error.
     Notice,
-    /// Normal operation.
     Info,
-    /// For developers.
     Debug,
 }
 

@@ -1,7 +1,5 @@
 //! The companion in front of an ArduPilot: other numbers, other habits, nothing of PX4's.
 
-#![allow(clippy::panic)]
-
 use std::time::Duration;
 
 use nalgebra::Vector3;

@@ -1,12 +1,8 @@
 //! Commands, parameters, missions and telemetry between both ends, over links that lose datagrams.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod lossy_link;
-
 use std::time::Duration;
 
-use lossy_link::{Pair, datum};
+use crate::lossy_link::{Pair, datum};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use skein_mav::dialect::{COMMAND_LONG_DATA, MavCmd, MavFrame, SET_POSITION_TARGET_LOCAL_NED_DATA};

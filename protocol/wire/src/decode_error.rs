@@ -18,10 +18,7 @@ pub enum DecodeError {
     },
     /// Longer than any message may be.
     #[error("payload of {bytes} bytes: expected at most {MAX_PAYLOAD}")]
-    TooLong {
-        /// Its length.
-        bytes: usize,
-    },
+    TooLong { bytes: usize },
     /// A field without which the message means nothing.
     #[error("`{field}` is missing")]
     Missing {

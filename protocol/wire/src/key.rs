@@ -36,48 +36,25 @@ pub struct Fleet(Arc<str>);
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Topic {
     /// `bid/<from>/<home>`: the bids of a node for the events of a home.
-    Bid {
-        /// The bidder.
-        from: NodeName,
-        /// The home.
-        home: NodeName,
-    },
+    Bid { from: NodeName, home: NodeName },
     /// `ack/<home>/<node>`: the home's answer.
-    Ack {
-        /// The home.
-        home: NodeName,
-        /// The bidder.
-        node: NodeName,
-    },
+    Ack { home: NodeName, node: NodeName },
     /// `occ/<home>`: the home's occurrences; `occ/<home>/<node>` when repeated for one.
     Occurrence {
-        /// The home.
         home: NodeName,
         /// Who asked for it again, if any.
         to: Option<NodeName>,
     },
     /// `repair/<from>/<home>`: a wish to hear occurrences again.
-    Repair {
-        /// Who asks.
-        from: NodeName,
-        /// The home.
-        home: NodeName,
-    },
+    Repair { from: NodeName, home: NodeName },
     /// `presence/<node>`: a sign of life.
-    Presence {
-        /// Who lives.
-        node: NodeName,
-    },
+    Presence { node: NodeName },
     /// `state/<node>`: a vehicle's state.
-    State {
-        /// The vehicle.
-        node: NodeName,
-    },
+    State { node: NodeName },
     /// `scan/<sensor>/<vehicle>`: what a vehicle's lidar sees.
     Scan {
         /// The node that reads the lidar.
         sensor: NodeName,
-        /// The vehicle.
         vehicle: NodeName,
     },
     /// `scene/<node>`: what stands in a world.
@@ -86,10 +63,7 @@ pub enum Topic {
         node: NodeName,
     },
     /// `board/<node>`: what all b-threads bid at a node.
-    Board {
-        /// The node.
-        node: NodeName,
-    },
+    Board { node: NodeName },
 }
 
 /// A text that is not one of Skein's keys.
@@ -139,7 +113,6 @@ impl Key {
         Self { fleet: fleet.clone(), topic }
     }
 
-    /// The fleet.
     #[must_use]
     pub fn fleet(&self) -> &Fleet {
         &self.fleet
@@ -151,7 +124,6 @@ impl Key {
         &self.topic
     }
 
-    /// Who speaks.
     #[must_use]
     pub fn sender(&self) -> &NodeName {
         match &self.topic {

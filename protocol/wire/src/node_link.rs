@@ -47,7 +47,6 @@ pub struct NodeLink {
 pub struct NodeLinkStats {
     /// Messages taken in.
     pub received: u64,
-    /// Messages sent.
     pub sent: u64,
     /// Payloads that could not be decoded.
     pub undecodable: u64,
@@ -141,7 +140,6 @@ impl NodeLink {
         std::mem::take(&mut self.states)
     }
 
-    /// The node.
     #[must_use]
     pub fn node(&self) -> &Node {
         &self.node
@@ -152,7 +150,6 @@ impl NodeLink {
         &mut self.node
     }
 
-    /// The fleet.
     #[must_use]
     pub fn fleet(&self) -> &Fleet {
         &self.fleet

@@ -7,7 +7,6 @@ use nalgebra::{Isometry3, Vector3};
 pub struct Scene {
     /// Least corner of the space to fly in, metres ENU.
     pub min: Vector3<f64>,
-    /// Greatest corner.
     pub max: Vector3<f64>,
     /// What stands there.
     pub solids: Vec<Solid>,
@@ -35,10 +34,7 @@ pub enum Form {
         height: f64,
     },
     /// A ball.
-    Sphere {
-        /// Radius.
-        radius: f64,
-    },
+    Sphere { radius: f64 },
 }
 
 impl Scene {

@@ -8,9 +8,7 @@ use skein_dbp::NodeName;
 /// A vehicle's state. World frame ENU, SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// The vehicle.
     pub node: NodeName,
-    /// Its incarnation.
     pub incarnation: u64,
     /// When the position was measured, on the vehicle's clock.
     pub time: Duration,
@@ -47,9 +45,7 @@ pub struct State {
 /// A state that was heard, told back.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Echo {
-    /// Whose state.
     pub node: NodeName,
-    /// Its incarnation.
     pub incarnation: u64,
     /// Its time, on the clock of that node.
     pub time: Duration,
@@ -60,7 +56,6 @@ pub struct Echo {
 /// How far a vehicle's mission is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MissionState {
-    /// Not over.
     #[default]
     UnderWay,
     /// It did what it was sent for, and stands on the ground.

@@ -1,16 +1,12 @@
 //! A node tells what is on its board: exactly who blocks what, seldom, and never more than there is room for.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod swarm;
-
 use std::time::Duration;
 
+use crate::swarm::{Always, LEASE, Requester, Swarm, TICK, name, program};
 use proptest::prelude::*;
 use skein_bp::{Bid, Event, EventSet};
 use skein_dbp::{Board, BoardLease, BoardRow};
 use skein_wire::{Link as _, MAX_PAYLOAD, NetworkConfig, NodeLink, Payload};
-use swarm::{Always, LEASE, Requester, Swarm, TICK, name, program};
 
 /// `uav/1` wants to advance, `ground/main` blocks that, and something of the vehicle's own that it may not.
 fn held() -> Swarm {

@@ -1,12 +1,8 @@
 //! Equal seeds give equal runs, faults and all.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod swarm;
-
 use std::time::Duration;
 
-use swarm::{Blocker, Requester, Swarm, hostile, program};
+use crate::swarm::{Blocker, Requester, Swarm, hostile, program};
 
 fn run(seed: u64) -> (Vec<String>, skein_wire::NetworkStats) {
     let fleet = ["uav/1", "uav/2", "ground/main"];

@@ -1,14 +1,10 @@
 //! G1: a node sees a home's occurrences in order; a hole is repaired, or becomes a `gap`.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod swarm;
-
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use crate::swarm::{Requester, Swarm, hostile, name, program};
 use skein_dbp::NodeName;
-use swarm::{Requester, Swarm, hostile, name, program};
 
 const FLEET: [&str; 3] = ["uav/1", "uav/2", "uav/3"];
 
@@ -91,7 +87,7 @@ fn what_the_home_no_longer_keeps_is_told_as_a_gap() {
     program.add("talk", Requester::new("uav/1/word", 60, Duration::from_millis(20)));
     let config = skein_dbp::NodeConfig { history: 8, ..swarm.config("uav/1", 1) };
     swarm.start_with(config, program);
-    swarm.start("uav/2", 1, swarm::program(1));
+    swarm.start("uav/2", 1, crate::swarm::program(1));
     swarm.run(Duration::from_millis(200));
     swarm.network.partition(&[&[name("uav/1")]]);
     swarm.run(Duration::from_secs(2));
@@ -129,7 +125,7 @@ fn a_late_joiner_hears_the_present_not_the_past() {
     program.add("talk", Requester::new("uav/1/word", 100, Duration::from_millis(100)));
     swarm.start("uav/1", 1, program);
     swarm.run(Duration::from_secs(3));
-    swarm.start("uav/2", 1, swarm::program(1));
+    swarm.start("uav/2", 1, crate::swarm::program(1));
     swarm.run(Duration::from_secs(2));
     let first = swarm.saw("uav/2", "uav/1/word").next().unwrap().happened.event.int("n").unwrap();
     assert!(first > 20, "heard word {first} of long ago");

@@ -1,15 +1,11 @@
 //! G2: an event occurs only while a bid in its home's table requests it.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod swarm;
-
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use crate::swarm::{Blocker, LEASE, Swarm, TICK, hostile, program};
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use swarm::{Blocker, LEASE, Swarm, TICK, hostile, program};
 
 const ASKING: Duration = Duration::from_millis(500);
 const RESTING: Duration = Duration::from_millis(2500);
@@ -79,7 +75,7 @@ fn a_withdrawn_request_is_never_served_late() {
 fn an_event_of_another_home_is_never_selected_here() {
     let mut swarm = Swarm::new(&["uav/1", "ground/main"], hostile(), 3);
     let mut ground = program(3);
-    ground.add("ask", swarm::Requester::new("uav/1/act", 5, Duration::ZERO));
+    ground.add("ask", crate::swarm::Requester::new("uav/1/act", 5, Duration::ZERO));
     swarm.start("ground/main", 1, ground);
     swarm.run(Duration::from_secs(2));
     assert_eq!(swarm.saw("ground/main", "uav/1/act").count(), 0, "an event occurred without its home");

@@ -1,17 +1,13 @@
 //! G3: after `confirmed`, a blocked event does not occur until the block is withdrawn or its holder has been told
 //! `block_lapsed`.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod swarm;
-
 use std::time::Duration;
 
+use crate::swarm::{Always, Blocker, LEASE, Requester, Swarm, hostile, name, program};
 use skein_bp::script::{Op, Script};
 use skein_bp::{Bid, EventSet, Program};
 use skein_dbp::{NodeConfig, Roster, facts};
 use skein_wire::NetworkConfig;
-use swarm::{Always, Blocker, LEASE, Requester, Swarm, hostile, name, program};
 
 const HOMES: [&str; 3] = ["uav/1", "uav/2", "uav/3"];
 const HOLDER: &str = "ground/main";
@@ -20,7 +16,7 @@ const ALL: [&str; 4] = ["uav/1", "uav/2", "uav/3", HOLDER];
 /// A home that does `step` all the time.
 fn stepper(home: &str, seed: u64) -> Program {
     let mut program = program(seed);
-    program.add("steps", Requester::new(&format!("{home}/step"), i64::MAX, swarm::TICK));
+    program.add("steps", Requester::new(&format!("{home}/step"), i64::MAX, crate::swarm::TICK));
     program
 }
 

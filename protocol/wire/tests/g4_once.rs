@@ -1,16 +1,12 @@
 //! G4: a request is served at most once, whatever is lost, repeated or reordered, and whoever restarts.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod swarm;
-
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use crate::swarm::{LEASE, Requester, Swarm, TICK, hostile, name, program};
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_wire::NetworkConfig;
-use swarm::{LEASE, Requester, Swarm, TICK, hostile, name, program};
 
 /// How often each numbered event has occurred at its home, over all lives of the home.
 fn times_occurred(swarm: &Swarm, event: &str) -> BTreeMap<i64, usize> {
@@ -50,7 +46,7 @@ fn one_occurrence_serves_all_who_ask_for_the_same() {
         let mut home = program(seed);
         home.add(
             "gate",
-            swarm::Blocker::new("uav/1/do", Duration::from_millis(700), Duration::from_millis(100)),
+            crate::swarm::Blocker::new("uav/1/do", Duration::from_millis(700), Duration::from_millis(100)),
         );
         swarm.start("uav/1", 1, home);
         for asker in ["uav/2", "uav/3"] {
@@ -125,10 +121,10 @@ fn a_restarted_requester_begins_anew_and_its_old_requests_are_dropped() {
 fn a_requester_that_has_missed_its_own_occurrence_is_not_served_again() {
     let mut swarm = Swarm::new(&["uav/1", "ground/main"], NetworkConfig::default(), 1);
     let mut home = program(1);
-    let gate = swarm::Blocker {
+    let gate = crate::swarm::Blocker {
         blocking: true,
         until: Duration::from_secs(1),
-        ..swarm::Blocker::new("uav/1/do", TICK, LEASE * 9)
+        ..crate::swarm::Blocker::new("uav/1/do", TICK, LEASE * 9)
     };
     home.add("gate", gate);
     home.add("talk", Requester::new("uav/1/word", 100, TICK));

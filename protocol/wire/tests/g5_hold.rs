@@ -1,16 +1,12 @@
 //! G5: a block that is stated to outlive its holder stays, through the loss of the holder and the restart of the home,
 //! until the holder withdraws it or an authority lifts it.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod swarm;
-
 use std::time::Duration;
 
+use crate::swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, name, program};
 use skein_bp::{Bid, Event};
 use skein_dbp::{NodeConfig, Roster};
 use skein_wire::NetworkConfig;
-use swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, name, program};
 
 const ROSTER: [&str; 3] = ["uav/1", "ground/main", "ground/spare"];
 
@@ -27,7 +23,10 @@ fn start_holder(swarm: &mut Swarm, incarnation: u64, bid: Bid, until: Duration) 
     ground.add("hold", Always(bid.block("uav/1/step").interrupt(&end)));
     ground.add(
         "end",
-        swarm::Requester { resting_until: Some(until), ..Requester::new("ground/main/enough_said", 1, TICK) },
+        crate::swarm::Requester {
+            resting_until: Some(until),
+            ..Requester::new("ground/main/enough_said", 1, TICK)
+        },
     );
     ground.add(
         "tell",

@@ -1,14 +1,10 @@
 //! G5: what a lost node requested and blocked lapses with its lease, and those who remain are told.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod swarm;
-
 use std::time::Duration;
 
+use crate::swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, name, program};
 use skein_bp::Bid;
 use skein_wire::NetworkConfig;
-use swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, name, program};
 
 const LONGEST_DELAY: Duration = Duration::from_millis(300);
 
@@ -45,10 +41,10 @@ fn the_request_of_a_lost_node_lapses_with_its_lease() {
     let mut home = program(1);
     home.add(
         "gate",
-        swarm::Blocker {
+        crate::swarm::Blocker {
             blocking: true,
             until: Duration::from_secs(4),
-            ..swarm::Blocker::new("uav/1/do", LEASE, LEASE)
+            ..crate::swarm::Blocker::new("uav/1/do", LEASE, LEASE)
         },
     );
     swarm.start("uav/1", 1, home);

@@ -1,15 +1,11 @@
 //! G6: safety events never wait for the network, and remote requests for them enter through one gateway.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod swarm;
-
 use std::time::Duration;
 
+use crate::swarm::{Always, Requester, Swarm, TICK, program};
 use skein_bp::{Bid, EventSet};
 use skein_dbp::NodeConfig;
 use skein_wire::NetworkConfig;
-use swarm::{Always, Requester, Swarm, TICK, program};
 
 fn vehicle(swarm: &mut Swarm, bid: Bid) {
     let mut home = program(1);
@@ -29,10 +25,10 @@ fn a_remote_block_of_everything_does_not_stop_a_safety_event() {
     home.add("land", Requester::new("uav/1/land", 1, Duration::ZERO));
     home.add(
         "wait",
-        swarm::Blocker {
+        crate::swarm::Blocker {
             blocking: true,
             until: Duration::from_secs(1),
-            ..swarm::Blocker::new("uav/1/land", TICK, 5 * TICK)
+            ..crate::swarm::Blocker::new("uav/1/land", TICK, 5 * TICK)
         },
     );
     home.add("fly", Requester::new("uav/1/fly", 1000, TICK));

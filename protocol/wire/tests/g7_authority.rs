@@ -1,12 +1,8 @@
 //! G7: a bid outside its sender's rights counts for nothing, and both ends are told why.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod swarm;
-
+use crate::swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, program};
 use skein_bp::{Bid, EventSet};
 use skein_dbp::{Authority, Grant, NodeConfig, Role};
-use swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, program};
 
 /// The ground may request all and block `step`; vehicles may block `enter`; scripts may request `step` at most.
 fn authority() -> Authority {
@@ -35,7 +31,7 @@ fn swarm(seed: u64) -> Swarm {
 
 /// The reasons that `node` was given, and those that the home has noted for it.
 fn reasons(swarm: &Swarm, node: &str) -> (Vec<String>, Vec<String>) {
-    let text = |seen: &swarm::Seen, key: &str| seen.happened.event.text(key).unwrap().to_owned();
+    let text = |seen: &crate::swarm::Seen, key: &str| seen.happened.event.text(key).unwrap().to_owned();
     let refusal = format!("{node}/refused");
     let refused = swarm.saw(node, &refusal).map(|seen| text(seen, "reason"));
     let denied = swarm

@@ -1,18 +1,14 @@
 //! G8: a joint event has one decision, which every member learns before it acts on a later one; it is taken only on
 //! fresh word from the whole roster, and the roster changes by operator order, which fences the old term.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod swarm;
-
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use crate::swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, name, program};
 use skein_bp::script::{Op, Script};
 use skein_bp::{Bid, Event, Origin};
 use skein_dbp::{NodeConfig, Roster, facts};
 use skein_wire::NetworkConfig;
-use swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, name, program};
 
 const GROUND: &str = "ground/main";
 const VEHICLES: [&str; 3] = ["uav/1", "uav/2", "uav/3"];
@@ -179,8 +175,8 @@ fn ask(swarm: &mut Swarm, node: &str) {
 
 /// How often the one event that was asked for was decided, by any coordinator.
 fn decided(swarm: &Swarm) -> usize {
-    let here = |seen: &&swarm::Seen| seen.happened.origin == Origin::Internal;
-    let asked = |seen: &&swarm::Seen| seen.happened.event.int("n") == Some(-1);
+    let here = |seen: &&crate::swarm::Seen| seen.happened.origin == Origin::Internal;
+    let asked = |seen: &&crate::swarm::Seen| seen.happened.event.int("n") == Some(-1);
     swarm.seen.iter().filter(here).filter(asked).count()
 }
 

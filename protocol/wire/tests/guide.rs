@@ -1,7 +1,5 @@
 //! The guide shows code that is compiled: each of its Rust blocks names a file and stands in it word for word.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::fs;
 use std::path::Path;
 

@@ -1,7 +1,5 @@
 //! The network in memory does what it is told, and no more.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::time::Duration;
 
 use skein_wire::{Fleet, Key, Link, MemoryLink, Network, NetworkConfig, NodeName, Topic};

@@ -1,7 +1,5 @@
 //! Messages survive the way over the wire, and nothing that arrives can do harm.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::time::Duration;
 
 use proptest::prelude::*;

@@ -1,14 +1,10 @@
 //! A request blocked from afar is stalled, not deadlocked, and everyone can see by whom.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
-mod swarm;
-
 use std::time::Duration;
 
+use crate::swarm::{Always, Blocker, Requester, Swarm, program};
 use skein_bp::Bid;
 use skein_wire::NetworkConfig;
-use swarm::{Always, Blocker, Requester, Swarm, program};
 
 #[test]
 fn a_stall_is_told_with_its_blockers_and_its_end() {

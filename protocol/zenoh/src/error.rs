@@ -33,7 +33,6 @@ pub enum ZenohError {
     /// The system gives no port.
     #[error("no free port for `{endpoint}`: {source}")]
     NoPort {
-        /// The endpoint.
         endpoint: String,
         /// What the system says.
         source: std::io::Error,
@@ -41,9 +40,7 @@ pub enum ZenohError {
     /// Zenoh does not take a setting.
     #[error("Zenoh refuses the setting `{key}` = {value}: {source}")]
     Config {
-        /// The setting.
         key: &'static str,
-        /// Its value.
         value: String,
         /// What Zenoh says.
         source: zenoh::Error,

@@ -11,16 +11,10 @@ use skein_wire::NodeName;
 pub enum IncarnationError {
     /// The file cannot be read or written.
     #[error("`{}`: {source}; this node's incarnation is kept there, so it must be a folder that can be written to", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    File { path: PathBuf, source: io::Error },
     /// The file holds something else.
     #[error("`{}` holds {found:?}: expected a number; put one there that is greater than any this node has had", path.display())]
     Content {
-        /// The file.
         path: PathBuf,
         /// What stands there.
         found: String,

@@ -11,16 +11,10 @@ use skein_wire::{NodeName, Store, replace_file};
 pub enum KeptError {
     /// The file cannot be read.
     #[error("`{}`: {source}; what this node must not forget is kept there", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    File { path: PathBuf, source: io::Error },
     /// The file holds something else.
     #[error("`{}`: {source}; it should hold the blocks that this node must keep, as JSON. Remove it only if none of them is to hold any more", path.display())]
     Content {
-        /// The file.
         path: PathBuf,
         /// What is wrong, with line and column.
         source: serde_json::Error,

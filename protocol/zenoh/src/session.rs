@@ -39,7 +39,6 @@ pub struct ZenohSession(Arc<Shared>);
 /// What has passed through a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ZenohStats {
-    /// Messages put.
     pub messages: u64,
     /// Bytes of keys and payloads put.
     pub bytes: u64,

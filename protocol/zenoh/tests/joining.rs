@@ -1,7 +1,5 @@
 //! Ways of joining: peer to peer, through a router that comes late, with certificates.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::time::{Duration, Instant};
 
 use skein_wire::{Fleet, Key, Link as _, NodeName, Topic};

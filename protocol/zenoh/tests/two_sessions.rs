@@ -1,7 +1,5 @@
 //! Two sessions over TCP on the loopback interface: what holds in memory holds over Zenoh.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 

@@ -34,7 +34,6 @@ pub struct Experiment {
     run: fn(&Options) -> anyhow::Result<Report>,
 }
 
-/// Every experiment.
 pub const EXPERIMENTS: &[Experiment] = &[
     Experiment {
         name: "feasibility",

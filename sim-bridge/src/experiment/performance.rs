@@ -41,7 +41,6 @@ const PUBLISHED: [Published; 2] = [
 ];
 const PUBLISHED_RUNS: usize = 500;
 
-/// One flight.
 #[derive(Debug, Clone, Copy)]
 struct Flight {
     succeeded: bool,

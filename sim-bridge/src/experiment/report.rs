@@ -27,7 +27,6 @@ pub enum Bound {
     Below(f64),
     /// This or more.
     AtLeast(f64),
-    /// Exactly this.
     Exactly(f64),
 }
 

@@ -11,8 +11,8 @@ mod scene;
 use anyhow::Context as _;
 use serde_json::{Value, json};
 use skein_planning::airspace::Airspace;
-use skein_planning::particle_swarm::{Objective as _, Standard, Swarm};
-use skein_planning::route::{
+use skein_swarm::particle_swarm::{Objective as _, Standard, Swarm};
+use skein_swarm::route::{
     AnyAngleConfig, Effort, Plan, Planner, RouteCost, RouteProblem, any_angle, arrive_together, plan_in_turn,
 };
 

@@ -181,7 +181,6 @@ impl Swarm {
         self.simulation.now()
     }
 
-    /// The world.
     #[must_use]
     pub fn simulation(&self) -> &Simulation {
         &self.simulation

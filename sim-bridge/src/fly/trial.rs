@@ -35,7 +35,6 @@ pub struct Flown {
 }
 
 impl<'a> Trial<'a> {
-    /// The scenario as it is.
     #[must_use]
     pub fn new(scenario: &'a Scenario, controller: Controller) -> Self {
         Self { scenario, controller, agents: agent_configs(scenario, controller) }

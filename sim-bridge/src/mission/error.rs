@@ -9,13 +9,7 @@ use thiserror::Error;
 pub enum MissionError {
     /// A file that cannot be read.
     #[error("cannot read `{}`: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// Not JSON.
+    Unreadable { path: PathBuf, source: std::io::Error },
     #[error("{file}:{line}:{column}: {message}")]
     Syntax {
         /// The mission file.

@@ -142,7 +142,6 @@ impl<'a> Node<'a> {
         numbers.try_into().map_err(|_| self.error(format!("{N} numbers"), format!("{length}")))
     }
 
-    /// Whether it is null.
     pub fn is_null(&self) -> bool {
         self.value.is_null()
     }

@@ -11,7 +11,6 @@ use super::{Ends, Mission, MissionError, MissionSet, Waypoint};
 pub struct LscMission {
     /// Where vehicles may fly.
     pub bounds: Aabb,
-    /// Who flies.
     pub agents: Vec<LscAgent>,
 }
 

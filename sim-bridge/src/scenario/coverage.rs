@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use serde::Deserialize;
-use skein_planning::coverage::{CoverageError, cover};
+use skein_swarm::coverage::{CoverageError, cover};
 
 use super::field::{ground_points, positive};
 

@@ -21,12 +21,7 @@ pub enum ScenarioError {
     },
     /// A file that cannot be read.
     #[error("cannot read `{}`: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    Unreadable { path: PathBuf, source: std::io::Error },
     /// Not TOML, an unknown key, or a value of the wrong type or range.
     #[error("{file}:{line}:{column}: {}{message}", at_field(.field))]
     Malformed {
@@ -94,7 +89,6 @@ pub enum ScenarioError {
         "{missions} missions for {vehicles} vehicles: give one mission that all fly in trail, or one for each vehicle"
     )]
     MissionCount {
-        /// Missions given.
         missions: usize,
         /// Vehicles of the scenario.
         vehicles: usize,

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use serde::Deserialize;
-use skein_planning::formation::{Formation as Places, Shape};
+use skein_swarm::formation::{Formation as Places, Shape};
 
 use super::field::{points, positive};
 

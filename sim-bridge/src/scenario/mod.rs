@@ -145,9 +145,7 @@ impl Default for Network {
 pub struct Order {
     /// When, in simulated seconds.
     pub at_s: f64,
-    /// What.
     pub order: OrderKind,
-    /// To whom.
     pub who: Who,
 }
 
@@ -157,13 +155,11 @@ pub struct Order {
 pub enum OrderKind {
     /// Take off together, instead of one after another as soon as all are there.
     LaunchTogether,
-    /// Land together.
     Abort,
     /// Stop and hover.
     Hold,
     /// Go on after a hold.
     Resume,
-    /// Land here.
     Land,
     /// Fly home and land.
     Return,

@@ -4,8 +4,8 @@
 use nalgebra::Vector3;
 use serde::Deserialize;
 use skein_planning::airspace::{Airspace, NoFlyZone, ThreatZone};
-use skein_planning::assignment::assign;
-use skein_planning::route::{
+use skein_swarm::assignment::assign;
+use skein_swarm::route::{
     Effort, Planner, RouteCost, RouteError, arrival_slots, arrive_together, plan_in_turn,
 };
 use skein_world::Aabb;

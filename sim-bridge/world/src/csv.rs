@@ -16,7 +16,6 @@ const LIMIT_M: f64 = 1e6;
     "{source_name}:{line}:{column}: {message}; a line is x,y,z,dx,dy,dz in metres (centre and size of a box)"
 )]
 pub struct CsvError {
-    /// The file.
     pub source_name: String,
     /// Line from 1.
     pub line: usize,

@@ -54,7 +54,6 @@ pub struct Hull {
 pub struct Surroundings<'a> {
     /// Obstacles and ground.
     pub scene: &'a Scene,
-    /// All vehicles.
     pub hulls: &'a [Hull],
     /// Index of the vehicle that looks, which does not see itself.
     pub own: usize,

@@ -22,10 +22,7 @@ pub enum Shape {
         half_height: f64,
     },
     /// A ball.
-    Sphere {
-        /// Radius.
-        radius: f64,
-    },
+    Sphere { radius: f64 },
     /// Everything below an infinite plane through the origin.
     Plane {
         /// Points out of the solid half.

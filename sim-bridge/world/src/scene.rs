@@ -29,7 +29,6 @@ pub struct Scene {
 /// The obstacle next to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearest<'a> {
-    /// The obstacle.
     pub obstacle: &'a Obstacle,
     /// Distance to its surface, m, negative inside.
     pub distance_m: f64,

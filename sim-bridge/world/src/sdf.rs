@@ -40,7 +40,6 @@ const WORLD_SCENERY: [&str; 12] = [
 /// A place in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// The file.
     pub source_name: String,
     /// Line from 1.
     pub line: u32,
@@ -61,7 +60,6 @@ pub struct Warning {
     pub place: Place,
     /// What, and what was done about it.
     pub message: String,
-    /// How often.
     pub count: usize,
 }
 
@@ -81,7 +79,6 @@ pub enum SdfError {
     /// Not well-formed XML.
     #[error("{place}: {message}; {advice}")]
     Malformed {
-        /// Where.
         place: Place,
         /// What is wrong.
         message: String,
@@ -95,7 +92,6 @@ pub enum SdfError {
         place: Place,
         /// Name of the element.
         element: String,
-        /// Its text.
         found: String,
         /// What it must be.
         expected: &'static str,

@@ -14,7 +14,6 @@ use crate::vehicle::VehicleModel;
 pub struct SensorReadings {
     /// Inertial unit, new at every step.
     pub imu: Imu,
-    /// Satellite fix.
     pub gps: Option<Gps>,
     /// Height above the world's origin by air pressure, m; carries a constant unknown offset.
     pub baro_height_m: Option<f64>,
@@ -24,7 +23,6 @@ pub struct SensorReadings {
     pub rangefinder_down_m: Option<f64>,
     /// Whether the legs touch the ground.
     pub contact: bool,
-    /// Energy store.
     pub battery: Battery,
 }
 

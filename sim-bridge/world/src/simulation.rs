@@ -17,7 +17,6 @@ use crate::wind::{Wind, WindConfig};
 /// All that a run depends on.
 #[derive(Debug, Clone)]
 pub struct SimulationConfig {
-    /// Where.
     pub scene: Scene,
     /// Who; a vehicle's place in this list is its index everywhere else.
     pub vehicles: Vec<VehicleSetup>,
@@ -30,7 +29,6 @@ pub struct SimulationConfig {
 /// One vehicle at the start.
 #[derive(Debug, Clone)]
 pub struct VehicleSetup {
-    /// Its kind.
     pub model: VehicleModel,
     /// Where it stands, world ENU, m; below standing height means on the ground.
     pub position: Vector3<f64>,
@@ -45,7 +43,6 @@ pub struct VehicleSetup {
 pub struct VehicleState {
     /// Position, velocity, attitude and angular rate.
     pub motion: RigidState,
-    /// Energy left.
     pub battery: Battery,
     /// Whether it is off the ground.
     pub airborne: bool,

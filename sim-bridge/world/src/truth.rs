@@ -41,7 +41,6 @@ pub(crate) struct Referee {
     truth: Truth,
     solids: Solids,
     bounds: Aabb,
-    /// Per vehicle.
     watches: Vec<Watch>,
     /// Whether vehicles `i < j` touch, at `j (j - 1) / 2 + i`: a contact counts once.
     touching: Vec<bool>,

@@ -57,15 +57,12 @@ pub struct VehicleModel {
     /// How the built-in autopilot flies it.
     #[serde(default)]
     pub control: ControlModel,
-    /// Energy store.
     pub battery: BatteryModel,
     /// Planar laser scanner with its range finders up and down.
     pub lidar: LidarModel,
-    /// Satellite receiver.
     pub gps: GpsModel,
     /// Accelerometer and gyroscope.
     pub imu: ImuModel,
-    /// Barometer.
     pub baro: BaroModel,
     /// Heading from the magnetic field.
     pub compass: CompassModel,
@@ -201,7 +198,6 @@ pub enum VehicleError {
     /// Not TOML, a missing or unknown field, or a value of the wrong type.
     #[error("{source_name}:{line}:{column}: {message}")]
     Syntax {
-        /// The file.
         source_name: String,
         /// Line from 1.
         line: usize,
@@ -213,11 +209,9 @@ pub enum VehicleError {
     /// A number outside of its range.
     #[error("{source_name}: field `{field}` is {found}; expected {expected}")]
     Range {
-        /// The file.
         source_name: String,
         /// Dotted name of the field.
         field: &'static str,
-        /// Its value.
         found: f64,
         /// What is allowed.
         expected: &'static str,

@@ -1,10 +1,6 @@
 //! The built-in autopilot flies: over MAVLink, with noisy instruments, on the real dynamics.
 
-#![allow(clippy::unwrap_used)]
-
-mod flight;
-
-use flight::{Flight, at, velocity, x500};
+use crate::flight::{Flight, at, velocity, x500};
 use nalgebra::Vector3;
 use skein_mav::dialect::{COMMAND_LONG_DATA, MANUAL_CONTROL_DATA, MavCmd, MavFrame};
 use skein_mav::{

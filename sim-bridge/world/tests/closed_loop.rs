@@ -1,7 +1,5 @@
 //! A vehicle flown over its MAVLink pipe, as its agent will fly it.
 
-#![allow(clippy::expect_used)]
-
 use std::time::Duration;
 
 use nalgebra::Vector3;

@@ -1,8 +1,6 @@
 //! What the world costs. Run with
 //! `cargo test --release -p skein-world --test cost -- --ignored --nocapture --test-threads 1`.
 
-#![allow(clippy::expect_used)]
-
 use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};

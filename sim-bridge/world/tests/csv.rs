@@ -1,7 +1,5 @@
 //! Box tables: what is read and what is refused.
 
-#![allow(clippy::expect_used)]
-
 use std::path::Path;
 
 use nalgebra::Vector3;

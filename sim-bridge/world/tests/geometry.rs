@@ -1,7 +1,5 @@
 //! The exact formulas of obstacles, checked against parry.
 
-#![allow(clippy::expect_used)]
-
 use glamx::{DPose3, DVec3};
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use parry3d_f64::query::Ray;

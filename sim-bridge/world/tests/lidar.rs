@@ -1,7 +1,5 @@
 //! What the scanner sees.
 
-#![allow(clippy::expect_used)]
-
 use std::f64::consts::PI;
 use std::time::Duration;
 

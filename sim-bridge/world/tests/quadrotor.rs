@@ -1,7 +1,5 @@
 //! Flight dynamics with known answers.
 
-#![allow(clippy::expect_used)]
-
 use nalgebra::{UnitQuaternion, Vector3};
 use skein_world::vehicle::GRAVITY_M_S2;
 use skein_world::{MotorCommands, Quadrotor, RigidState, VehicleModel};

@@ -1,7 +1,5 @@
 //! Gazebo worlds: what is read, what is warned of, what is refused.
 
-#![allow(clippy::expect_used)]
-
 use std::path::Path;
 
 use nalgebra::Vector3;

@@ -1,7 +1,5 @@
 //! The world in motion: instruments, collisions, records, repetition.
 
-#![allow(clippy::expect_used)]
-
 use std::time::Duration;
 
 use nalgebra::{UnitQuaternion, Vector3};

@@ -1,7 +1,5 @@
 //! Vehicle files: what is read and what is refused.
 
-#![allow(clippy::expect_used)]
-
 use skein_world::{PositionIntegral, VehicleError, VehicleModel};
 
 const X500: &str = include_str!("../vehicles/x500.toml");

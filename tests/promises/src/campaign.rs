@@ -43,7 +43,6 @@ pub struct Report {
 /// A seed that breaks a promise.
 #[derive(Clone, Debug)]
 pub struct Failure {
-    /// The seed.
     pub seed: u64,
     /// What it breaks.
     pub violation: Violation,

@@ -14,7 +14,6 @@ pub(crate) struct Step<'a> {
     pub(crate) at: Duration,
     /// What the node's clock shows.
     pub(crate) clock: Duration,
-    /// Which node.
     pub(crate) node: usize,
     /// What was handed to it from outside before it.
     pub(crate) enqueued: &'a [Event],
@@ -37,7 +36,6 @@ pub(crate) struct Knowledge {
     stated: BTreeMap<(usize, u64, String, u64), Bid>,
 }
 
-/// One node.
 pub(crate) struct Member {
     pub(crate) name: NodeName,
     pub(crate) cast: Cast,
@@ -346,7 +344,6 @@ impl Member {
         self.lives.get(usize::try_from(incarnation.checked_sub(1)?).ok()?)
     }
 
-    /// Its present life.
     pub(crate) fn present(&self) -> Option<&Life> {
         self.lives.last()
     }

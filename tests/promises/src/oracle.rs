@@ -46,7 +46,6 @@ impl Findings {
     }
 }
 
-/// All observers.
 pub(crate) struct Court {
     knowledge: Knowledge,
     oracles: Vec<Box<dyn Oracle>>,

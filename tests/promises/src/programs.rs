@@ -23,7 +23,6 @@ pub enum Role {
     },
     /// Blocks a set, now and then.
     Blocks {
-        /// What.
         set: EventSet,
         /// For how long.
         on: Duration,
@@ -33,12 +32,7 @@ pub enum Role {
         hold: bool,
     },
     /// Requests an event of its own node each time that a block is confirmed, unless it lapses before.
-    Acts {
-        /// Whose block.
-        holder: String,
-        /// The event.
-        event: String,
-    },
+    Acts { holder: String, event: String },
     /// Answers an event, of any home, with another.
     Echoes {
         /// What is waited for.
@@ -50,7 +44,6 @@ pub enum Role {
     },
     /// Requests two events of one home in turn, and blocks the other one all the while.
     Alternates {
-        /// The events.
         events: [String; 2],
         /// Rest after each.
         every: Duration,
@@ -136,7 +129,6 @@ enum Phase {
     Asking(Duration),
 }
 
-/// See [`Role::Asks`].
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 struct Asker {
     event: String,
@@ -174,7 +166,6 @@ impl BThread for Asker {
     }
 }
 
-/// See [`Role::Blocks`].
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 struct Blocker {
     set: EventSet,
@@ -228,7 +219,6 @@ impl BThread for Actor {
     }
 }
 
-/// See [`Role::Echoes`].
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 struct Echo {
     of: EventSet,
@@ -265,7 +255,6 @@ impl BThread for Echo {
     }
 }
 
-/// See [`Role::Alternates`].
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 struct Alternator {
     events: [String; 2],

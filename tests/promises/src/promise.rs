@@ -50,7 +50,6 @@ impl fmt::Display for Promise {
 /// A promise that was not kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Violation {
-    /// Which.
     pub promise: Promise,
     /// When, true time since the run began.
     pub at: Duration,

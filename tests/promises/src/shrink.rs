@@ -17,7 +17,6 @@ const TOLD: usize = 16;
 /// A story that breaks a promise, and nothing in it that is not needed for that.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shrunk {
-    /// The story.
     pub story: Story,
     /// What it breaks.
     pub violation: Violation,

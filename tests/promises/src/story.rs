@@ -15,7 +15,6 @@ use crate::programs::Role;
 pub struct Story {
     /// What every draw of the run comes from.
     pub seed: u64,
-    /// The nodes.
     pub casts: Vec<Cast>,
     /// The network's habits from some times on, in order of time.
     pub weather: Vec<Weather>,
@@ -34,9 +33,7 @@ pub struct Story {
 /// A node: its settings and what its b-threads do.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cast {
-    /// Its name.
     pub name: NodeName,
-    /// Its lease.
     pub lease: Duration,
     /// How many occurrences it keeps for those who missed them.
     pub history: usize,
@@ -74,7 +71,6 @@ pub struct Order {
     pub at: Duration,
     /// How much later each next node is told.
     pub spread: Duration,
-    /// What is ordered.
     pub what: Ordered,
 }
 
@@ -83,16 +79,13 @@ pub struct Order {
 pub enum Ordered {
     /// A new term of joint decisions.
     Roster {
-        /// Its number.
         term: u64,
-        /// Who decides.
         coordinator: usize,
         /// Without whom nothing is decided.
         members: Vec<usize>,
     },
     /// That a block is lifted which stays although its holder may be lost.
     Lift {
-        /// Whose.
         holder: usize,
         /// Of which of its b-threads.
         bthread: String,
@@ -113,7 +106,6 @@ pub struct Weather {
 pub enum Fault {
     /// Some nodes reach each other, but none of the others.
     Partition {
-        /// When.
         at: Duration,
         /// For how long.
         lasts: Duration,
@@ -122,11 +114,9 @@ pub enum Fault {
     },
     /// A process stands still, as under a debugger or without processor time.
     Pause {
-        /// When.
         at: Duration,
         /// For how long.
         lasts: Duration,
-        /// Whose.
         node: usize,
     },
     /// A process is killed and started again.
@@ -135,7 +125,6 @@ pub enum Fault {
         at: Duration,
         /// How long it is gone.
         lasts: Duration,
-        /// Whose.
         node: usize,
     },
 }
@@ -169,11 +158,9 @@ pub struct Faults {
     pub reordered: u64,
     /// Runs in which messages took up to 300 ms.
     pub delayed: u64,
-    /// Partitions.
     pub partitions: u64,
     /// Pauses of a process.
     pub pauses: u64,
-    /// Restarts.
     pub restarts: u64,
     /// Nodes that came late.
     pub late_joiners: u64,
@@ -210,7 +197,6 @@ impl AddAssign for Faults {
 }
 
 impl Story {
-    /// The names of all nodes.
     #[must_use]
     pub fn roster(&self) -> Vec<NodeName> {
         self.casts.iter().map(|cast| cast.name.clone()).collect()

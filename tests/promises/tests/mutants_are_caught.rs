@@ -1,7 +1,6 @@
 //! A node that breaks a promise on purpose is caught, and the story of it is short.
 
 #![cfg(feature = "mutants")]
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
 
 use skein_promises::{Campaign, Mutant, Settings, Story, campaign, run, shrink};
 

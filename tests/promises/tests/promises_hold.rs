@@ -1,7 +1,5 @@
 //! No promise is broken, over a fixed set of seeds in which every kind of fault occurs.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::time::Duration;
 
 use skein_promises::{Campaign, Report, Settings, Story, campaign, run};

@@ -22,7 +22,6 @@ pub enum HeightGridError {
     /// There are too few heights.
     #[error("`heights_m` has {rows} rows of {columns}: expected two or more of two or more")]
     TooFew {
-        /// Rows.
         rows: usize,
         /// Heights in the first.
         columns: usize,
@@ -32,7 +31,6 @@ pub enum HeightGridError {
     Ragged {
         /// Number of the row, from 1.
         row: usize,
-        /// Its heights.
         found: usize,
         /// Those of the first.
         expected: usize,

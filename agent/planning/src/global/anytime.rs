@@ -52,7 +52,6 @@ pub struct Route {
     pub cost: f64,
     /// It is proven to cost at most so many times the least.
     pub bound: f64,
-    /// Cells expanded.
     pub expanded: usize,
 }
 
@@ -61,14 +60,10 @@ pub struct Route {
 pub enum Unsolved {
     /// The goal cannot be reached.
     #[error("everything reachable from the start was searched ({expanded} cells)")]
-    Unreachable {
-        /// Cells expanded.
-        expanded: usize,
-    },
+    Unreachable { expanded: usize },
     /// The budget was spent first.
     #[error("no way was found within {expanded} expansions")]
     Spent {
-        /// Cells expanded.
         expanded: usize,
         /// The way to the cell reached that is nearest to the goal by the heuristic.
         partial: Vec<VoxelIndex>,

@@ -73,7 +73,6 @@ pub struct Plan {
     pub path: Path,
     /// Sum over the path's steps of length times cost per metre; metres if nothing but length costs.
     pub cost: f64,
-    /// Voxels expanded.
     pub expanded: usize,
 }
 
@@ -82,20 +81,13 @@ pub struct Plan {
 pub enum PlanError {
     /// The start is not in the map's window.
     #[error("start ({:.2}, {:.2}, {:.2}) is outside the map's window; recentre the map on the vehicle", .start.x, .start.y, .start.z)]
-    StartOutside {
-        /// The start.
-        start: Vector3<f64>,
-    },
+    StartOutside { start: Vector3<f64> },
     /// The goal is not in the map's window.
     #[error("goal ({:.2}, {:.2}, {:.2}) is outside the map's window; plan to a nearer one", .goal.x, .goal.y, .goal.z)]
-    GoalOutside {
-        /// The goal.
-        goal: Vector3<f64>,
-    },
+    GoalOutside { goal: Vector3<f64> },
     /// The goal is too near an obstacle, or in a disc.
     #[error("goal ({:.2}, {:.2}, {:.2}) has a clearance of {clearance_m:.2} m, expected {required_m:.2} m or more", .goal.x, .goal.y, .goal.z)]
     GoalBlocked {
-        /// The goal.
         goal: Vector3<f64>,
         /// Clearance there, metres.
         clearance_m: f64,
@@ -105,21 +97,16 @@ pub enum PlanError {
     /// The goal is in a place that is closed.
     #[error("goal ({:.2}, {:.2}, {:.2}) is in or next to a no-fly zone or a threat, or too low above the terrain, by {inside_m:.2} m", .goal.x, .goal.y, .goal.z)]
     GoalClosed {
-        /// The goal.
         goal: Vector3<f64>,
         /// How deep it is inside, metres.
         inside_m: f64,
     },
     /// No path exists in what is known.
     #[error("no path: everything reachable from the start was searched ({expanded} voxels)")]
-    Unreachable {
-        /// Voxels expanded.
-        expanded: usize,
-    },
+    Unreachable { expanded: usize },
     /// The budget was spent first.
     #[error("no path within the budget of {budget} expansions")]
     BudgetExhausted {
-        /// The budget.
         budget: usize,
         /// The way to the voxel nearest to the goal (by the heuristic) that was reached.
         partial: Path,
@@ -201,7 +188,6 @@ pub struct Astar {
 struct Extent {
     start: VoxelIndex,
     goal: VoxelIndex,
-    /// Lowest layer.
     low: usize,
     /// Number of layers; one in planar mode.
     layers: usize,

@@ -17,7 +17,6 @@ const SAME_LENGTH: f64 = 1e-9;
 /// Which detours do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Worth {
-    /// None.
     None,
     /// Those of one step.
     Direct,

@@ -80,7 +80,6 @@ const STRAIGHT: u32 = 0o020_252_020;
 pub struct Grid {
     /// Which cells are blocked.
     pub cells: OccupancyGrid,
-    /// What steps cost.
     pub costs: StepCosts,
 }
 

@@ -11,8 +11,8 @@ pub mod movingai;
 mod occupancy;
 
 pub use lattice::{Grid, Lattice, ReversibleLattice, StepCosts};
-pub use moves::{MOVES, Move, octile};
+pub use moves::{MOVES, Move, moved, octile};
 pub use occupancy::{OccupancyGrid, SizeError};
 
 pub(crate) use bricks::Bricks;
-pub(crate) use moves::{CENTRE, Packed, SQRT_3, moved, moves_to, unswept};
+pub(crate) use moves::{CENTRE, Packed, SQRT_3, moves_to, unswept};

@@ -94,7 +94,7 @@ pub(crate) fn moves_to(mut ends: u32) -> impl Iterator<Item = usize> {
 
 /// Where a move leads from a cell; below zero, to the far end of the integers, which is in no grid.
 #[inline]
-pub(crate) fn moved(cell: VoxelIndex, by: [i8; 3]) -> VoxelIndex {
+pub fn moved(cell: VoxelIndex, by: [i8; 3]) -> VoxelIndex {
     VoxelIndex {
         x: cell.x.wrapping_add_signed(by[0].into()),
         y: cell.y.wrapping_add_signed(by[1].into()),

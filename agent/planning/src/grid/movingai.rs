@@ -23,7 +23,6 @@ pub struct FormatError {
     pub line: usize,
     /// What stands there.
     pub found: String,
-    /// What should.
     pub expected: String,
 }
 

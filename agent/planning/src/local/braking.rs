@@ -36,7 +36,6 @@ impl Default for BrakingConfig {
     }
 }
 
-/// What limits the speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SpeedLimit {
     /// Nothing: cruise.

@@ -104,7 +104,6 @@ impl ClearanceMap {
         self.keep_out.as_ref().map_or(0.0, |keep_out| keep_out.inside_m(from, to))
     }
 
-    /// The evidence.
     #[must_use]
     pub fn voxels(&self) -> &VoxelMap {
         &self.voxels

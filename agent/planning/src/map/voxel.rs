@@ -96,7 +96,6 @@ pub enum MapError {
 /// What is known of a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VoxelState {
-    /// Never seen.
     Unknown,
     /// Seen through, and not blocked.
     Free,
@@ -117,9 +116,7 @@ pub struct RayEnd {
 /// A voxel of the window: counts from its lowest corner along east, north and up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct VoxelIndex {
-    /// East.
     pub x: usize,
-    /// North.
     pub y: usize,
     /// Up: the layer.
     pub z: usize,
@@ -128,7 +125,6 @@ pub struct VoxelIndex {
 /// A voxel that became, or ceased to be, [`VoxelState::Occupied`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Change {
-    /// The voxel.
     pub voxel: VoxelIndex,
     /// Whether it is occupied now.
     pub occupied: bool,

@@ -8,7 +8,6 @@ const EXTRAPOLATE_S: f64 = 0.5;
 /// Another vehicle: its state as last heard, and how old and how certain that is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbour {
-    /// Which vehicle.
     pub id: u32,
     /// Position then (ENU, metres).
     pub position: Vector3<f64>,

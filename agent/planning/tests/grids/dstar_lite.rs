@@ -5,7 +5,7 @@ use skein_planning::global::{DStarLite, Effort, Search, Unsolved, cost_of};
 use skein_planning::grid::{Grid, OccupancyGrid, StepCosts};
 use skein_planning::map::VoxelIndex;
 
-use crate::reference::{cell, cells, costs_to, problem};
+use crate::grids::reference::{cell, cells, costs_to, problem};
 
 /// What happens before a plan: cells that change, and where the vehicle goes, as shares of all cells.
 fn happenings() -> impl Strategy<Value = Vec<(Vec<f64>, Option<f64>)>> {

@@ -11,7 +11,7 @@ use skein_planning::grid::movingai::{self, Problem};
 use skein_planning::grid::{Grid, OccupancyGrid, StepCosts};
 use skein_planning::map::{ClearanceMap, VoxelIndex, VoxelMapConfig};
 
-use crate::reference::cells;
+use crate::grids::reference::cells;
 
 /// A map with its problems, or `None`, said aloud, where the data is absent.
 fn shared(map: &str, scenario: &str) -> Option<(Grid, Vec<Problem>)> {

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use skein_planning::global::{Effort, Search, Unsolved, cost_of};
 use skein_planning::grid::{Grid, OccupancyGrid, StepCosts};
 
-use crate::reference::{cell, costs_to, problem};
+use crate::grids::reference::{cell, costs_to, problem};
 
 proptest! {
     #[test]

@@ -45,7 +45,6 @@ pub(super) enum Step {
     },
     /// The beginning of a block that may take so long only.
     Open(usize),
-    /// Its end.
     Close(usize),
     /// The end of a loop's body.
     Again {

@@ -103,7 +103,6 @@ pub struct ScriptFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Assignment {
-    /// The script.
     pub script: ScriptFile,
     /// Values of its parameters.
     #[serde(default)]
@@ -118,7 +117,6 @@ pub struct Assignment {
 pub struct BoundScript {
     /// The name it runs under.
     pub name: String,
-    /// What it is for.
     pub about: String,
     /// The values of all its parameters.
     pub with: BTreeMap<String, Argument>,

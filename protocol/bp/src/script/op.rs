@@ -20,9 +20,7 @@ pub enum Op {
     Sync(Bid),
     /// Runs the body again and again.
     Repeat {
-        /// How often.
         times: Times,
-        /// What.
         body: Vec<Op>,
     },
     /// Runs the body until an event of `set` happens or so much time has passed, and goes on behind it.
@@ -31,7 +29,6 @@ pub enum Op {
         set: EventSet,
         /// How long it may take.
         within: Option<Duration>,
-        /// What.
         body: Vec<Op>,
     },
     /// Runs the ops filed under the name of the event that ended the last sync, if there are any.
@@ -46,7 +43,6 @@ pub enum Op {
     Daemon(bool),
     /// Says what to enqueue when interrupted, from here on.
     OnInterruptEnqueue(Vec<Reply>),
-    /// Ends.
     Stop,
 }
 
@@ -75,7 +71,6 @@ impl Op {
 /// How often a loop runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Times {
-    /// This often.
     Count(u32),
     /// Until the script ends from within.
     Forever,

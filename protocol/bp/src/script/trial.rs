@@ -30,7 +30,6 @@ pub enum TrialFault {
     /// It blocks something and cannot let go.
     #[error("it blocks `{event}` for ever{}; give it a `within_s`, or something to wait for that can happen", after(.trace))]
     NeverLetsGo {
-        /// What.
         event: Event,
         /// What happens before.
         trace: Vec<Event>,

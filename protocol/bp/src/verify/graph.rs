@@ -24,7 +24,6 @@ pub struct Graph {
     pub not_covered: Vec<Omission>,
 }
 
-/// One state.
 #[derive(Clone, Debug, Serialize)]
 pub struct GraphState {
     /// The b-threads that run and the proxies, each with its state as JSON, or as text when that has no JSON form. A
@@ -33,13 +32,11 @@ pub struct GraphState {
     /// The external queue.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub queue: Vec<Event>,
-    /// Who is hot.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hot: Vec<Arc<str>>,
     /// The failed assertion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// Whether it is a deadlock.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub deadlock: bool,
 }
@@ -49,7 +46,6 @@ pub struct GraphState {
 pub struct GraphEdge {
     /// Number of the state in which it may.
     pub from: u32,
-    /// The event.
     pub event: Event,
     /// Number of the state after it.
     pub to: u32,

@@ -25,7 +25,6 @@ pub(super) const ENDED: LocalId = 0;
 pub(super) enum Cause {
     /// An event, by number, that it requests, waits for or is interrupted by.
     Event(u32),
-    /// Its deadline.
     Deadline,
 }
 
@@ -132,7 +131,6 @@ impl Locals {
         self.get(id).map_or(u32::MAX, |local| local.slot)
     }
 
-    /// The name of a slot.
     pub(super) fn slot_name(&self, slot: u32) -> Option<&Arc<str>> {
         self.slots.get(slot).map(|(name, _)| name)
     }

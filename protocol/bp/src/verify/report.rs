@@ -37,22 +37,15 @@ impl Inspection {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ViolationKind {
-    /// See [`Inspection::Deadlock`].
     Deadlock,
-    /// See [`Inspection::FailedAssertion`].
     FailedAssertion {
         /// What the b-thread said.
         message: String,
     },
-    /// See [`Inspection::HotTermination`].
     HotTermination,
-    /// See [`Inspection::HotBThread`].
     HotBThread,
-    /// See [`Inspection::HotRun`].
     HotRun,
-    /// See [`Inspection::HotSystem`].
     HotSystem,
-    /// See [`Inspection::Unsettled`].
     Unsettled,
     /// From a state on, whatever happens, a goal is out of reach.
     OutOfReach {
@@ -61,7 +54,6 @@ pub enum ViolationKind {
     },
     /// A state breaks an invariant.
     Invariant {
-        /// Its name.
         invariant: String,
         /// What is wrong with the state.
         message: String,
@@ -71,7 +63,6 @@ pub enum ViolationKind {
 /// What is wrong with one state, and who is to blame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// What.
     pub kind: ViolationKind,
     /// The b-threads that are stuck, failed or hot, in the order of the program.
     pub violators: Vec<Arc<str>>,
@@ -101,23 +92,18 @@ pub enum Omission {
     },
     /// The search ended because it was given no more states.
     StateBound {
-        /// The bound.
         most_states: usize,
         /// States that were reached and not gone on from.
         unexplored: usize,
     },
     /// Longer runs were not looked at.
     DepthBound {
-        /// The bound.
         deepest: u32,
         /// Moves beyond it.
         moves: u64,
     },
     /// A model leaves out some behaviour of what it stands for.
-    NotModelled {
-        /// What.
-        what: String,
-    },
+    NotModelled { what: String },
 }
 
 /// How a verification went. Shown as text it says what was found, how much was looked at, and what was not.
@@ -143,7 +129,6 @@ pub struct Report {
 pub struct Progress {
     /// Distinct states reached.
     pub states: usize,
-    /// Moves followed.
     pub edges: u64,
     /// States that are reached and not yet gone on from.
     pub unexplored: usize,

@@ -23,7 +23,6 @@ pub enum Search {
 /// How a model is searched, and how far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// In which order.
     pub order: Search,
     /// How many states may be stored; each takes some tens of bytes.
     pub most_states: usize,

@@ -94,7 +94,6 @@ impl<'a> NetworkView<'a> {
         Self { programs }
     }
 
-    /// The program of one node.
     pub fn program(&self, node: &str) -> Option<&'a Program> {
         self.programs.get(node).copied()
     }

@@ -131,7 +131,6 @@ struct HotState {
     moves: Vec<(u32, Rc<[u32]>)>,
 }
 
-/// The model of a network.
 #[derive(Debug)]
 pub(super) struct NetworkModel {
     members: Vec<Member>,

@@ -22,13 +22,11 @@ pub struct Network {
     pub is_sound: bool,
     /// What may go wrong in it unless told otherwise: what its states can be counted with in reasonable time.
     pub faults: Faults,
-    /// Its nodes.
     pub members: Vec<Member>,
     /// What must hold in every state, besides that no b-thread's assertion fails.
     pub requirement: Option<(&'static str, Arc<Requirement>)>,
 }
 
-/// See [`NetworkVerifier::invariant`].
 pub type Requirement = dyn Fn(&NetworkView<'_>) -> Result<(), String> + Send + Sync;
 
 /// Why one of these networks could not be made: a mistake in this file.
@@ -441,7 +439,6 @@ struct Entrance {
 enum Place {
     /// Waits until its claim is confirmed.
     Outside,
-    /// May enter.
     Before,
     Inside,
 }

@@ -2,7 +2,6 @@
 
 use crate::parameter::ParameterValue;
 
-/// One parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
     /// Name, at most 16 bytes; PX4's where PX4 has it.
@@ -27,7 +26,6 @@ pub enum ParameterError {
     /// A fraction for a whole-number parameter.
     #[error("{name} takes whole numbers, not {value}")]
     NotWhole {
-        /// Its name.
         name: &'static str,
         /// The value offered.
         value: f64,
@@ -35,7 +33,6 @@ pub enum ParameterError {
     /// Outside its range.
     #[error("{name} takes {min} to {max}, not {value}")]
     OutOfRange {
-        /// Its name.
         name: &'static str,
         /// The value offered.
         value: f64,
@@ -69,7 +66,6 @@ impl ParameterTable {
         self.entries.is_empty()
     }
 
-    /// The parameter at an index.
     pub fn at(&self, index: usize) -> Option<&Parameter> {
         self.entries.get(index)
     }

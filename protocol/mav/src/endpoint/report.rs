@@ -39,7 +39,6 @@ pub struct VehicleState {
     pub attitude: UnitQuaternion<f64>,
     /// Angular rate, body FLU, rad/s.
     pub angular_rate: Vector3<f64>,
-    /// Battery.
     pub battery: Battery,
     /// Home, m; `None` until it has been set.
     pub home: Option<Vector3<f64>>,

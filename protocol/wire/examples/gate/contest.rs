@@ -29,7 +29,6 @@ pub enum Rule {
 /// What became of many runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Entries.
     pub entries: u32,
     /// Entries while another vehicle was inside.
     pub shared: u32,

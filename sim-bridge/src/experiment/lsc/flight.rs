@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use nalgebra::Vector3;
-use skein_planning::traffic::{Apart, Lattice, Roads, Traveller, TravellerConfig};
+use skein_swarm::traffic::{Apart, Lattice, Roads, Traveller, TravellerConfig};
 use skein_world::{
     Aabb, STEP, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup, WindConfig,
     vehicle::GpsModel,
@@ -53,7 +53,6 @@ const STEPS_PER_TRACK_POINT: u64 = 25;
 pub enum Space {
     /// At the height of their starts.
     Planar,
-    /// At any.
     Spatial,
 }
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use skein_mav::{Command, Companion, CompanionConfig, Datum, FlightMode, SetPoint};
-use skein_planning::traffic::{Move, Traveller};
+use skein_swarm::traffic::{Move, Traveller};
 
 use super::tracking::{Reference, Tracker};
 use crate::mission::LscAgent;

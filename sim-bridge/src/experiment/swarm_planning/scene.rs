@@ -4,8 +4,8 @@ use nalgebra::{Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use skein_planning::airspace::{Airspace, Mountain, ThreatZone};
-use skein_planning::assignment::assign;
-use skein_planning::route::arrival_slots;
+use skein_swarm::assignment::assign;
+use skein_swarm::route::arrival_slots;
 
 /// The targets, metres.
 const TARGETS: [[f64; 3]; 10] = [

@@ -64,7 +64,6 @@ struct Trust {
     baro_m: f64,
 }
 
-/// The filter.
 #[derive(Debug, Clone)]
 pub(super) struct Estimator {
     trust: Trust,

@@ -36,13 +36,11 @@ fn wished_speed(item: &MissionItem) -> Option<f64> {
 /// What a mission asks for now.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum MissionStep {
-    /// Fly on.
     Fly(Demand),
     /// From now on fly this fast, m/s.
     ChangeSpeed(f64),
     /// The item has been reached; the next one is under way.
     Reached,
-    /// Land here.
     Land,
     /// Fly home and land.
     Return,

@@ -54,7 +54,6 @@ enum Task {
     Manual,
 }
 
-/// The legs of a return.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ReturnLeg {
     Climb { over: Vector2<f64>, z: f64 },
@@ -83,7 +82,6 @@ enum Charge {
 /// What the motors are to do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Drive {
-    /// Disarmed.
     Stopped,
     /// Armed on the ground.
     Idle,

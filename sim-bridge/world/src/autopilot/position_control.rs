@@ -138,7 +138,6 @@ impl PositionControl {
         self.yaw_reference = None;
     }
 
-    /// One step.
     pub(super) fn step(
         &mut self,
         estimate: &Estimate,

@@ -1,0 +1,7 @@
+//! Searches of grids: optimal against a search without any cleverness, within their bounds, and as published.
+
+mod dstar_lite;
+mod published;
+mod reference;
+mod search;
+mod zhang;

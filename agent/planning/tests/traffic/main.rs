@@ -1,7 +1,0 @@
-//! Vehicles in forests and mazes, each with its own plan and a radio of 3 m: all arrive, and no two come near one another.
-
-#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
-
-mod arrivals;
-mod places;
-mod radio;

@@ -1,0 +1,229 @@
+//! What a route costs (P3).
+
+use nalgebra::Vector3;
+
+use super::traffic::{PARTS, Track, Traffic};
+use skein_planning::airspace::Airspace;
+
+/// Distance below which the repulsion grows no more, metres: it would be infinite where two vehicles meet.
+const CORE_M: f64 = 1.0;
+
+/// The weights of P3's cost, `f = sum_i (phi1 L_i + phi2 t_i + phi3 H_i)` over a route's legs, plus the repulsion between
+/// vehicles. P3 gives none of them. The cost is in metres: what it would cost to fly so much further.
+///
+/// * `L`: length.
+/// * `t`: time flown. P3's `t` is what is left of the endurance, which a cost must not reward spending. A leg takes as
+///   long as its length at cruise or its climb at the rate of climb, whichever is longer.
+/// * `H`: `max(0, 1 - c / c0)^2` summed along the route, with the clearance `c` above the terrain and the comfortable one,
+///   `c0`.
+/// * Repulsion: `1/2 eta (1/rho - 1/rho0)^2` for `rho <= rho0`, summed along the route, with the distance `rho` of each
+///   other vehicle at that time.
+/// * Endurance: nothing while more than the reserve is left, then a penalty that grows with the square of what is used of
+///   the reserve.
+/// * Violation: metres flown in threat or no-fly zones, too low, or too near another vehicle, and what is flown after the
+///   endurance is spent. A route without any is feasible.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RouteCost {
+    /// `phi1`.
+    pub length_weight: f64,
+    /// `phi2`, metres per second.
+    pub time_weight_m_s: f64,
+    /// `phi3`.
+    pub height_weight: f64,
+    /// Speed of cruise, m/s.
+    pub cruise_m_s: f64,
+    /// Rate of climb and descent, m/s.
+    pub climb_m_s: f64,
+    /// `c0`: clearance above the terrain from which height costs nothing, metres.
+    pub comfortable_clearance_m: f64,
+    /// Clearance above the terrain that is required, metres.
+    pub least_clearance_m: f64,
+    /// `eta`, metres squared.
+    pub repulsion_m2: f64,
+    /// `rho0`: where the repulsion begins, metres.
+    pub influence_m: f64,
+    /// Separation from other vehicles that is required, metres.
+    pub least_separation_m: f64,
+    /// How long a vehicle can fly, seconds.
+    pub endurance_s: f64,
+    /// Share of the endurance that is kept in reserve.
+    pub reserve: f64,
+    /// What it costs to use the whole reserve, metres.
+    pub reserve_weight_m: f64,
+    /// What a metre of violation costs, metres.
+    pub violation_weight: f64,
+    /// Distance of the samples at which the clearance is looked at, metres, where mountains are near.
+    pub sample_m: f64,
+}
+
+impl Default for RouteCost {
+    fn default() -> Self {
+        RouteCost {
+            length_weight: 1.0,
+            time_weight_m_s: 5.0,
+            height_weight: 4.0,
+            cruise_m_s: 20.0,
+            climb_m_s: 8.0,
+            comfortable_clearance_m: 100.0,
+            least_clearance_m: 30.0,
+            repulsion_m2: 1e4,
+            influence_m: 60.0,
+            least_separation_m: 20.0,
+            endurance_s: 600.0,
+            reserve: 0.2,
+            reserve_weight_m: 2000.0,
+            violation_weight: 10.0,
+            sample_m: 25.0,
+        }
+    }
+}
+
+/// A route's cost and its parts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Assessment {
+    /// Length, metres.
+    pub length_m: f64,
+    /// Time flown at cruise, seconds.
+    pub time_s: f64,
+    /// `H`, metres.
+    pub height_m: f64,
+    /// Repulsion, metres.
+    pub repulsion_m: f64,
+    /// Square of the share of the reserve that is used.
+    pub reserve_used: f64,
+    /// Violation, metres.
+    pub violation_m: f64,
+    /// The whole cost, metres.
+    pub cost_m: f64,
+}
+
+impl Assessment {
+    /// Whether the route violates nothing.
+    #[must_use]
+    pub fn is_feasible(&self) -> bool {
+        self.violation_m <= 0.0
+    }
+}
+
+impl RouteCost {
+    /// The cost of flying along these points (ENU, metres) among others. `O(legs (zones + samples) + PARTS vehicles)`.
+    #[must_use]
+    pub fn assess(&self, route: &[Vector3<f64>], airspace: &Airspace, traffic: &Traffic) -> Assessment {
+        self.assess_below(f64::INFINITY, route, airspace, traffic)
+    }
+
+    /// The same, as far as it is needed to know whether the cost is below a limit. All its parts only ever add to it, so what
+    /// has reached the limit is left there.
+    #[must_use]
+    pub(super) fn assess_below(
+        &self,
+        limit_m: f64,
+        route: &[Vector3<f64>],
+        airspace: &Airspace,
+        traffic: &Traffic,
+    ) -> Assessment {
+        let mut sum = Assessment::default();
+        for leg in route.windows(2) {
+            self.add_way(&(leg[1] - leg[0]), &mut sum);
+        }
+        self.add_endurance(&mut sum);
+        self.weigh(&mut sum);
+        for leg in route.windows(2) {
+            if sum.cost_m >= limit_m {
+                return sum;
+            }
+            self.add_surroundings(&leg[0], &leg[1], airspace, &mut sum);
+            self.weigh(&mut sum);
+        }
+        if sum.cost_m < limit_m {
+            self.add_encounters(&Track::along(route, self), traffic, &mut sum);
+            self.weigh(&mut sum);
+        }
+        sum
+    }
+
+    /// The cost of a leg by itself, without others and endurance.
+    #[must_use]
+    pub(super) fn assess_leg(
+        &self,
+        from: &Vector3<f64>,
+        to: &Vector3<f64>,
+        airspace: &Airspace,
+    ) -> Assessment {
+        let mut sum = Assessment::default();
+        self.add_way(&(to - from), &mut sum);
+        self.add_surroundings(from, to, airspace, &mut sum);
+        self.weigh(&mut sum);
+        sum
+    }
+
+    /// How long a leg takes, seconds.
+    pub(super) fn leg_s(&self, way: &Vector3<f64>) -> f64 {
+        (way.norm() / self.cruise_m_s).max(way.z.abs() / self.climb_m_s)
+    }
+
+    fn weigh(&self, sum: &mut Assessment) {
+        sum.cost_m = self.length_weight * sum.length_m
+            + self.time_weight_m_s * sum.time_s
+            + self.height_weight * sum.height_m
+            + sum.repulsion_m
+            + self.reserve_weight_m * sum.reserve_used
+            + self.violation_weight * sum.violation_m;
+    }
+
+    fn add_way(&self, way: &Vector3<f64>, sum: &mut Assessment) {
+        sum.length_m += way.norm();
+        sum.time_s += self.leg_s(way);
+    }
+
+    fn add_surroundings(
+        &self,
+        from: &Vector3<f64>,
+        to: &Vector3<f64>,
+        airspace: &Airspace,
+        sum: &mut Assessment,
+    ) {
+        sum.violation_m += airspace.intrusion_m(from, to);
+        let terrain_m = airspace.terrain_bound_m(from, to);
+        let high_m = self.comfortable_clearance_m.max(self.least_clearance_m) + terrain_m;
+        if from.z.min(to.z) >= high_m {
+            return;
+        }
+        let way = to - from;
+        let length_m = way.norm();
+        let samples = (length_m / self.sample_m).ceil().max(1.0);
+        let part_m = length_m / samples;
+        for k in 0..samples as usize {
+            let point = from + way * ((k as f64 + 0.5) / samples);
+            if point.z >= high_m {
+                continue;
+            }
+            let clearance_m = if terrain_m > 0.0 { airspace.clearance_m(&point) } else { point.z };
+            let lack = (1.0 - clearance_m / self.comfortable_clearance_m).max(0.0);
+            sum.height_m += lack * lack * part_m;
+            if clearance_m < self.least_clearance_m {
+                sum.violation_m += part_m;
+            }
+        }
+    }
+
+    fn add_encounters(&self, track: &Track, traffic: &Traffic, sum: &mut Assessment) {
+        let part_m = sum.length_m / PARTS as f64;
+        traffic.encounters(track, self.influence_m.max(self.least_separation_m), |distance_m| {
+            let closeness = (1.0 / distance_m.max(CORE_M) - 1.0 / self.influence_m).max(0.0);
+            sum.repulsion_m += 0.5 * self.repulsion_m2 * closeness * closeness * part_m;
+            if distance_m < self.least_separation_m {
+                sum.violation_m += part_m;
+            }
+        });
+    }
+
+    fn add_endurance(&self, sum: &mut Assessment) {
+        let beyond_s = sum.time_s - (1.0 - self.reserve) * self.endurance_s;
+        if beyond_s > 0.0 {
+            let used = beyond_s / (self.reserve * self.endurance_s);
+            sum.reserve_used = used * used;
+            sum.violation_m += (sum.time_s - self.endurance_s).max(0.0) * self.cruise_m_s;
+        }
+    }
+}

@@ -1,0 +1,8 @@
+//! The crate's tests, one file for each thing that is tested, in one program: it is linked once.
+
+#![allow(clippy::unwrap_used)] // A test fails by panicking.
+
+mod hostile_messages;
+mod restart_guard;
+mod sending_order;
+mod verify_networks;

@@ -1,0 +1,9 @@
+//! The crate's tests, one file for each thing that is tested, in one program: it is linked once.
+
+#![allow(clippy::panic, clippy::unwrap_used)] // A test fails by panicking.
+
+mod ardupilot;
+mod frames;
+mod geodesy;
+mod lossy_link;
+mod protocols;

@@ -1,0 +1,6 @@
+//! The crate's tests, one file for each thing that is tested, in one program: it is linked once.
+
+#![allow(clippy::unwrap_used)] // A test fails by panicking.
+
+mod joining;
+mod two_sessions;

@@ -1,0 +1,15 @@
+//! The crate's tests, one file for each thing that is tested, in one program: it is linked once.
+
+#![allow(clippy::expect_used, clippy::unwrap_used)] // A test fails by panicking.
+
+mod autopilot;
+mod closed_loop;
+mod cost;
+mod csv;
+mod flight;
+mod geometry;
+mod lidar;
+mod quadrotor;
+mod sdf;
+mod simulation;
+mod vehicle;

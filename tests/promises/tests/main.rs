@@ -1,0 +1,6 @@
+//! The crate's tests, in one program.
+
+#![allow(clippy::unwrap_used)] // A test fails by panicking.
+
+mod mutants_are_caught;
+mod promises_hold;

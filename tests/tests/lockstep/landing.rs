@@ -1,0 +1,147 @@
+//! A vehicle that is told to land does not come down upon another, or into a zone.
+
+use std::time::Duration;
+
+use nalgebra::Vector3;
+use skein_ground::{Destination, Order, Who};
+use skein_mav::dialect::{COMMAND_LONG_DATA, MavCmd};
+use skein_mav::{Address, FrameWriter};
+use skein_tests::Lockstep;
+
+/// Two vehicles 6 m apart: the first lands after 10 m, the second flies 40 m. And more of the scenario.
+fn two(more: &str) -> Lockstep {
+    Lockstep::from_text(&format!(
+        "name = \"over\"\ntime_limit_s = 200.0\n[bounds]\nmin_m = [-10.0, -10.0, -1.0]\nmax_m = [50.0, 20.0, 15.0]\n\
+         [[vehicle]]\nstart_m = [0.0, 0.0]\nwaypoints_m = [[10.0, 0.0, 3.0]]\n\
+         [[vehicle]]\nstart_m = [0.0, 6.0]\nwaypoints_m = [[40.0, 6.0, 3.0]]\n{more}"
+    ))
+}
+
+fn place(lockstep: &Lockstep, index: usize) -> Vector3<f64> {
+    lockstep.swarm.simulation().vehicle(index).unwrap().motion.position
+}
+
+fn is_airborne(lockstep: &Lockstep, index: usize) -> bool {
+    lockstep.swarm.simulation().vehicle(index).unwrap().airborne
+}
+
+fn step_until(lockstep: &mut Lockstep, what: &str, is_so: impl Fn(&Lockstep) -> bool) {
+    let deadline = lockstep.swarm.now() + Duration::from_secs(60);
+    while !is_so(lockstep) {
+        assert!(lockstep.swarm.now() < deadline, "{what}");
+        lockstep.step();
+    }
+}
+
+/// Has the second vehicle hover above a place, and then land there. Returns where it is then.
+fn land_above(lockstep: &mut Lockstep, [x, y]: [f64; 2]) -> Vector3<f64> {
+    let second = || Who::only(lockstep.nodes[1].clone());
+    let (go, land) = (Order::GoTo(second(), Destination { x, y, z: Some(3.0) }), Order::Land(second()));
+    lockstep.swarm.order(&go).unwrap();
+    let above = Vector3::new(x, y, 3.0);
+    step_until(lockstep, "it does not go there", |lockstep| {
+        let motion = lockstep.swarm.simulation().vehicle(1).unwrap().motion;
+        (motion.position - above).norm() < 0.5 && motion.velocity.norm() < 0.2
+    });
+    lockstep.swarm.order(&land).unwrap();
+    step_until(lockstep, "it does not land", |lockstep| !is_airborne(lockstep, 1));
+    place(lockstep, 1)
+}
+
+#[test]
+fn told_to_land_above_one_that_has_landed_it_comes_down_beside_it() {
+    let mut lockstep = two("");
+    step_until(&mut lockstep, "the first does not fly", |lockstep| place(lockstep, 0).x > 9.0);
+    step_until(&mut lockstep, "the first does not land", |lockstep| !is_airborne(lockstep, 0));
+    let first = place(&lockstep, 0);
+    let second = land_above(&mut lockstep, [first.x, first.y]);
+    assert_eq!(lockstep.swarm.truth().collisions_vehicle, 0);
+    let apart_m = (first - second).xy().norm();
+    assert!((0.7..2.0).contains(&apart_m), "{first} and {second} are {apart_m} m apart");
+}
+
+#[test]
+fn told_to_land_at_full_speed_it_does_not_come_to_a_stop_above_one_that_has_landed() {
+    for before_m in [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0] {
+        let mut lockstep = two("");
+        step_until(&mut lockstep, "the first does not fly", |lockstep| place(lockstep, 0).x > 9.0);
+        step_until(&mut lockstep, "the first does not land", |lockstep| !is_airborne(lockstep, 0));
+        let (first, second) = (place(&lockstep, 0), Who::only(lockstep.nodes[1].clone()));
+        // From where it hovers 12 m further on, back over the one that stands.
+        let go = |x| Order::GoTo(second.clone(), Destination { x, y: first.y, z: Some(3.0) });
+        lockstep.swarm.order(&go(first.x + 12.0)).unwrap();
+        step_until(&mut lockstep, "it does not go there", |lockstep| {
+            (place(lockstep, 1) - first).xy().norm() > 11.5 && place(lockstep, 1).x > first.x
+        });
+        lockstep.swarm.order(&go(first.x - 8.0)).unwrap();
+        step_until(&mut lockstep, "it does not come back", |lockstep| {
+            place(lockstep, 1).x < first.x + before_m
+        });
+        lockstep.swarm.order(&Order::Land(second)).unwrap();
+        step_until(&mut lockstep, "it does not land", |lockstep| !is_airborne(lockstep, 1));
+        let apart_m = (first - place(&lockstep, 1)).xy().norm();
+        assert_eq!(lockstep.swarm.truth().collisions_vehicle, 0, "told {before_m} m before");
+        assert!(apart_m > 0.6, "told {before_m} m before, it stands {apart_m} m away");
+    }
+}
+
+#[test]
+fn told_to_land_above_a_zone_it_comes_down_outside() {
+    let zone =
+        "[[airspace.no_fly]]\ncentre_m = [20.0, 6.0]\nradius_m = 1.5\nfloor_m = 0.0\nceiling_m = 1.5\n";
+    let mut lockstep = two(zone);
+    step_until(&mut lockstep, "the second does not fly", |lockstep| place(lockstep, 1).x > 9.0);
+    let second = land_above(&mut lockstep, [20.0, 6.0]);
+    let off_m = (second - Vector3::new(20.0, 6.0, 0.0)).xy().norm();
+    assert!((1.5..5.0).contains(&off_m), "it is {off_m} m from the middle");
+}
+
+#[test]
+fn over_free_ground_it_comes_down_where_it_is() {
+    let mut lockstep = two("");
+    step_until(&mut lockstep, "the second does not fly", |lockstep| place(lockstep, 1).x > 9.0);
+    let second = land_above(&mut lockstep, [20.0, 6.0]);
+    assert!((second - Vector3::new(20.0, 6.0, 0.0)).xy().norm() < 0.5, "{second}");
+}
+
+/// What a pilot's ground station says to take the vehicle over.
+fn pilot_takes_over(target_system: u8) -> Vec<u8> {
+    let mut writer = FrameWriter::new(Address { system_id: 255, component_id: 190 });
+    writer.write(&COMMAND_LONG_DATA {
+        command: MavCmd::MAV_CMD_DO_SET_MODE,
+        param1: 1.0,
+        param2: 3.0, // POSCTL
+        target_system,
+        target_component: 1,
+        ..Default::default()
+    });
+    writer.take()
+}
+
+#[test]
+fn a_pilot_who_takes_over_on_the_way_to_where_it_would_land_has_it() {
+    let mut lockstep = two("");
+    step_until(&mut lockstep, "the first does not fly", |lockstep| place(lockstep, 0).x > 9.0);
+    step_until(&mut lockstep, "the first does not land", |lockstep| !is_airborne(lockstep, 0));
+    let first = place(&lockstep, 0);
+    let second = || Who::only(lockstep.nodes[1].clone());
+    let above = Destination { x: first.x, y: first.y, z: Some(3.0) };
+    let (go, land) = (Order::GoTo(second(), above), Order::Land(second()));
+    lockstep.swarm.order(&go).unwrap();
+    let off_m = |lockstep: &Lockstep| (place(lockstep, 1) - first).xy().norm();
+    step_until(&mut lockstep, "it does not go there", |lockstep| off_m(lockstep) < 0.1);
+    lockstep.swarm.order(&land).unwrap();
+    step_until(&mut lockstep, "it does not go aside", |lockstep| off_m(lockstep) > 0.4);
+    assert!(place(&lockstep, 1).z > 2.5, "it does not come down yet");
+    lockstep.swarm.send_mavlink(1, &pilot_takes_over(2));
+    let commands = |lockstep: &Lockstep| lockstep.swarm.agents().nth(1).unwrap().set_points().commands;
+    let (taken, mut last) = (lockstep.swarm.now(), commands(&lockstep));
+    while lockstep.swarm.now() < taken + Duration::from_secs(25) {
+        lockstep.step();
+        if lockstep.swarm.now() < taken + Duration::from_secs(2) {
+            last = commands(&lockstep);
+        }
+    }
+    assert_eq!(commands(&lockstep), last, "the agent goes on commanding");
+    assert!(is_airborne(&lockstep, 1) && place(&lockstep, 1).z > 2.0, "{}", place(&lockstep, 1));
+}

@@ -1,0 +1,85 @@
+//! Tasks for a whole swarm, flown: an area is seen, a formation kept, targets reached together.
+
+use std::time::Duration;
+
+use skein_agent::Outcome;
+use skein_tests::Lockstep;
+
+type Point = [f64; 3];
+
+/// Where all vehicles are, ten times a second, until all have landed.
+fn flown(scenario: &str) -> (Lockstep, Vec<Vec<Point>>) {
+    let mut lockstep = Lockstep::new(scenario, None, 1);
+    let end = Duration::from_secs_f64(lockstep.scenario.time_limit_s);
+    let mut poses = Vec::new();
+    while lockstep.swarm.now() < end && !(lockstep.swarm.is_over() && lockstep.swarm.is_grounded()) {
+        for _ in 0..25 {
+            lockstep.step();
+        }
+        let world = lockstep.swarm.simulation();
+        let vehicles = (0..world.vehicle_count()).map(|k| world.vehicle(k).unwrap().motion.position.into());
+        poses.push(vehicles.collect());
+    }
+    let truth = lockstep.swarm.truth();
+    assert_eq!((truth.collisions_obstacle, truth.collisions_vehicle), (0, 0));
+    assert!(lockstep.swarm.outcomes().all(|outcome| outcome == Some(&Outcome::Complete)));
+    (lockstep, poses)
+}
+
+fn distance(one: &Point, other: &Point) -> f64 {
+    (0..3).map(|axis| (one[axis] - other[axis]).powi(2)).sum::<f64>().sqrt()
+}
+
+#[test]
+fn every_place_of_a_surveyed_field_is_seen() {
+    let (_, poses) = flown("survey");
+    for (x, y) in
+        (0..30).flat_map(|x| (0..15).map(move |y| (f64::from(x) * 2.0 + 1.0, f64::from(y) * 2.0 + 1.0)))
+    {
+        let nearest_m = poses
+            .iter()
+            .flatten()
+            .filter(|at| at[2] > 2.0)
+            .map(|at| distance(at, &[x, y, at[2]]))
+            .fold(f64::INFINITY, f64::min);
+        assert!(nearest_m < 3.0 + 0.5, "({x}, {y}) is seen from {nearest_m} m, half a swath is 3 m");
+    }
+}
+
+#[test]
+fn geese_keep_their_places_from_their_start_to_their_goals() {
+    let (lockstep, poses) = flown("geese");
+    let vehicles = &lockstep.scenario.vehicles;
+    let is_there =
+        |at: &[Point]| at.iter().zip(vehicles).any(|(at, plan)| distance(at, &plan.goal().into()) < 1.0);
+    let set_out = poses.iter().position(|at| at[0][0] > 1.0).unwrap();
+    let arrived = poses.iter().position(|at| is_there(at)).unwrap();
+    assert!(arrived > set_out + 100, "they are on their way for ten seconds and more");
+    for at in &poses[set_out..arrived] {
+        for (own, plan) in at.iter().zip(vehicles) {
+            let place = (0..3).map(|axis| at[0][axis] + plan.start[axis] - vehicles[0].start[axis]);
+            let place: Vec<f64> = place.collect();
+            let off_m = distance(own, &[place[0], place[1], place[2]]);
+            assert!(off_m < 1.0, "{off_m} m from its place");
+        }
+    }
+}
+
+#[test]
+fn targets_behind_threats_are_reached_together() {
+    let (lockstep, poses) = flown("valley");
+    let arrival_s = |vehicle: usize| {
+        let goal = lockstep.scenario.vehicles[vehicle].goal().into();
+        poses.iter().position(|at| distance(&at[vehicle], &goal) < 1.0).unwrap() as f64 / 10.0
+    };
+    let times_s: Vec<f64> = (0..lockstep.scenario.vehicles.len()).map(arrival_s).collect();
+    let first_s = times_s.iter().copied().fold(f64::INFINITY, f64::min);
+    let last_s = times_s.iter().copied().fold(0.0, f64::max);
+    assert!(last_s - first_s < 3.0, "{times_s:?}");
+    for at in poses.iter().flatten() {
+        for (x, y, radius_m) in [(50.0, 50.0, 20.0), (25.0, 60.0, 10.0)] {
+            assert!(distance(at, &[x, y, 0.0]) > radius_m, "{at:?} is in a threat zone");
+        }
+        assert!(distance(at, &[75.0, 25.0, at[2]]) > 10.0, "{at:?} is where nobody may fly");
+    }
+}

@@ -1,0 +1,7 @@
+//! Processes and clocks: what runs in real time, apart from what keeps the processor busy.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // A test fails by panicking.
+
+mod console;
+mod processes;
+mod real_clock;
