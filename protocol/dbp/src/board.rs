@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use skein_bp::{Bid, Event, EventSet, Value};
 
-use crate::NodeName;
+use crate::name::NodeName;
 
 /// What all b-threads bid at a node at one moment, those elsewhere that have a say here included.
 ///

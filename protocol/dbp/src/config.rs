@@ -5,7 +5,13 @@ use std::time::Duration;
 
 use skein_bp::EventSet;
 
-use crate::{Authority, Kept, NodeName, Roster};
+use crate::home::authority::Authority;
+use crate::joint::roster::Roster;
+use crate::kept::Kept;
+use crate::name::NodeName;
+
+/// The shortest lease.
+pub(crate) const LEAST_LEASE: Duration = Duration::from_millis(10);
 
 /// What a [`Node`](crate::Node) is told when it is made.
 #[derive(Clone, Debug)]
@@ -44,7 +50,7 @@ pub struct NodeConfig {
     pub settle_limit: usize,
     /// The promise that this node breaks on purpose.
     #[cfg(feature = "mutants")]
-    pub mutant: Option<crate::Mutant>,
+    pub mutant: Option<crate::mutant::Mutant>,
 }
 
 impl NodeConfig {
@@ -71,5 +77,20 @@ impl NodeConfig {
             #[cfg(feature = "mutants")]
             mutant: None,
         }
+    }
+
+    /// The same settings, brought into their ranges; the roster is of others only, in order.
+    pub(crate) fn in_range(mut self) -> Self {
+        let lease = u64::try_from(self.lease.max(LEAST_LEASE).as_millis()).unwrap_or(u64::MAX);
+        self.lease = Duration::from_millis(lease);
+        self.longest_lease = self.longest_lease.max(self.lease);
+        self.roster.retain(|member| *member != self.name);
+        self.roster.sort();
+        self.roster.dedup();
+        self
+    }
+
+    pub(crate) fn lease_ms(&self) -> u64 {
+        u64::try_from(self.lease.as_millis()).unwrap_or(u64::MAX)
     }
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use skein_bp::{Event, EventSet};
 
-use crate::NodeName;
+use crate::name::NodeName;
 
 /// Whom a message is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
