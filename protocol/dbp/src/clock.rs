@@ -5,9 +5,9 @@ use std::time::Duration;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Clock {
     now: Duration,
-    started: Option<Duration>,
+    pub(crate) started: Option<Duration>,
     /// The time that b-threads are shown, where a verifier holds it.
-    held: Option<Duration>,
+    pub(crate) held: Option<Duration>,
 }
 
 impl Clock {
@@ -19,10 +19,6 @@ impl Clock {
 
     pub(crate) fn now(&self) -> Duration {
         self.now
-    }
-
-    pub(crate) fn has_started(&self) -> bool {
-        self.started.is_some()
     }
 
     /// When the node started.
@@ -38,20 +34,5 @@ impl Clock {
     /// The time that b-threads are shown.
     pub(crate) fn of_bthreads(&self) -> Duration {
         self.held.unwrap_or(self.now)
-    }
-
-    /// Whether deadlines of b-threads pass only where a verifier lets them.
-    pub(crate) fn is_held(&self) -> bool {
-        self.held.is_some()
-    }
-
-    /// Holds the time of b-threads at the beginning of the run.
-    pub(crate) fn hold(&mut self) {
-        self.held = Some(Duration::ZERO);
-    }
-
-    /// Dates the start back to the beginning of the run.
-    pub(crate) fn date_start_back(&mut self) {
-        self.started = Some(Duration::ZERO);
     }
 }

@@ -52,13 +52,13 @@ pub struct Node {
     /// Its own program.
     run: Run,
     /// The events that it decides, on its own bids and those of others.
-    home: Home,
+    pub(crate) home: Home,
     /// Its bids for the events that others decide.
-    guest: Guest,
+    pub(crate) guest: Guest,
     /// The events that all decide together.
     joint: Joint,
     /// The others, and what is heard from and sent to them.
-    channel: Channel,
+    pub(crate) channel: Channel,
     stats: NodeStats,
 }
 
@@ -173,12 +173,12 @@ impl Node {
     /// When [`step`](Self::step) is due even if no message comes.
     #[must_use]
     pub fn next_deadline(&self) -> Duration {
-        if !self.clock.has_started() || self.run.has_news() {
+        if self.clock.started.is_none() || !self.run.news.is_empty() {
             return self.clock.now();
         }
         let lease = self.config.lease;
         [
-            self.run.program.next_deadline().filter(|_| !self.clock.is_held()),
+            self.run.program.next_deadline().filter(|_| self.clock.held.is_none()),
             self.home.next_deadline(&self.clock, &self.config),
             self.guest.next_deadline(lease),
             self.joint.next_deadline(&self.clock, lease),

@@ -12,9 +12,6 @@ use crate::guest::held_blocks::BlockNews;
 use crate::message::Occurrence;
 use crate::name::NodeName;
 
-/// Room for deliveries that is kept between steps.
-const DELIVERIES_KEPT: usize = 16;
-
 /// An event that has happened, here or elsewhere, in the order in which this node's b-threads saw it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Happened {
@@ -88,7 +85,7 @@ pub(crate) struct Run {
     pub(crate) program: Program,
     /// The node whose program it is: facts are told under its name.
     node: NodeName,
-    news: VecDeque<Delivery>,
+    pub(crate) news: VecDeque<Delivery>,
     pub(crate) selections: Vec<Happened>,
     /// The channel's changes on the board, where they are recorded.
     pub(crate) channel_moves: Option<Vec<ChannelMove>>,
@@ -110,38 +107,21 @@ impl Run {
 
     /// Tells a fact about the fleet.
     pub(crate) fn fact(&mut self, what: &str, data: impl FnOnce(Event) -> Event) {
-        self.deliver(Delivery::Fact(data(tell(&self.node, what))));
+        self.news.push_back(Delivery::Fact(data(tell(&self.node, what))));
     }
 
-    pub(crate) fn deliver(&mut self, delivery: Delivery) {
-        self.news.push_back(delivery);
-    }
-
-    /// Delivers what `listen` hears of the stream of `home`.
+    /// Delivers the occurrences and gaps that `listen` hears of the stream of `home`.
     pub(crate) fn hear(&mut self, home: &NodeName, listen: impl FnOnce(&mut VecDeque<Heard>)) {
         let mut heard = VecDeque::new();
         listen(&mut heard);
         for heard in heard {
             match heard {
-                Heard::Occurrence(occurrence) => self.deliver(Delivery::Occurrence(occurrence)),
+                Heard::Occurrence(occurrence) => self.news.push_back(Delivery::Occurrence(occurrence)),
                 Heard::Gap { from, to } => self.fact(facts::GAP, |fact| {
                     fact.with("home", home.as_str()).with("from", count(from)).with("to", count(to))
                 }),
             }
         }
-    }
-
-    pub(crate) fn has_news(&self) -> bool {
-        !self.news.is_empty()
-    }
-
-    pub(crate) fn next_delivery(&mut self) -> Option<Delivery> {
-        self.news.pop_front()
-    }
-
-    /// Gives memory back: when a fleet meets, hundreds of deliveries come at once, and never again.
-    pub(crate) fn shrink(&mut self) {
-        self.news.shrink_to(DELIVERIES_KEPT);
     }
 
     pub(crate) fn change_board(&mut self, change: BoardChange) {

@@ -5,9 +5,8 @@ use std::collections::VecDeque;
 
 use rustc_hash::FxHashMap;
 
-use super::model::{Model, Moves};
+use super::model::{Model, Moves, names};
 use super::report::{Inspection, Violation, ViolationKind};
-use super::search::names;
 use super::store::Store;
 
 /// The states in which someone is hot, and the moves among them. States are counted anew, in the order of the search.

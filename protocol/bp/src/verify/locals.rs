@@ -126,6 +126,11 @@ impl Locals {
         self.locals.get((id as usize).checked_sub(1)?)
     }
 
+    /// The local states of a product state.
+    pub(super) fn of<'a>(&'a self, state: &'a [u32]) -> impl Iterator<Item = &'a Local> + use<'a> {
+        state.iter().skip(1).filter_map(|id| self.get(*id))
+    }
+
     /// The slot of a local state. Earlier names have lower ones.
     pub(super) fn slot(&self, id: LocalId) -> u32 {
         self.get(id).map_or(u32::MAX, |local| local.slot)

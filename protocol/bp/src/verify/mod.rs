@@ -35,8 +35,11 @@
 //! limit on selections. Where [`ProgramConfig::externals_after`](crate::ProgramConfig::externals_after) is set, an external
 //! event may come at any time.
 
+mod bits;
 mod coverage;
 mod cycle;
+mod exploration;
+mod frontier;
 mod goals;
 mod graph;
 mod interner;
@@ -58,13 +61,15 @@ use crate::bid::Bid;
 use crate::event::Event;
 use crate::program::Program;
 pub use coverage::{BThreadCoverage, Coverage};
+pub use exploration::Limits;
+pub use frontier::Search;
 pub use graph::{Graph, GraphEdge, GraphState};
 pub use interner::Interner;
 pub use model::{Model, Moves};
 use product::Product;
 pub use report::{Fault, Inspection, Omission, Progress, Report, Violation, ViolationKind};
+pub use search::check;
 use search::check_by_two;
-pub use search::{Limits, Search, check};
 pub use view::View;
 
 /// What becomes of deadlines.

@@ -1,10 +1,10 @@
-//! What a search needs to know of a system: its states, its moves, and what is wrong with a state.
+//! A system to be searched: its states, its moves, and what is wrong with a state.
 
 use std::sync::Arc;
 
-use super::rows::{Rows, hash};
-use super::{Fault, Inspection};
 use crate::event::Event;
+use crate::verify::report::{Fault, Inspection};
+use crate::verify::rows::{Rows, hash};
 
 /// A system of states and moves.
 ///
@@ -58,6 +58,11 @@ pub trait Model {
 
     /// The event that a move of this label shows in a trace.
     fn event(&self, label: u32) -> Event;
+}
+
+/// The names of b-threads, given by number.
+pub(super) fn names<M: Model>(model: &M, numbers: &[u32]) -> Vec<Arc<str>> {
+    numbers.iter().map(|number| model.bthread(*number)).collect()
 }
 
 /// Moves: labels, and the states they lead to.

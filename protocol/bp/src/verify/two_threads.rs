@@ -4,10 +4,10 @@
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
+use super::exploration::{Exploration, Outcome};
 use super::model::{Model, Moves};
 use super::report::{Fault, Inspection, Progress};
 use super::rows::Rows;
-use super::search::{Exploration, Outcome};
 
 /// States that are handed over at once.
 const BATCH: usize = 256;

@@ -156,7 +156,7 @@ impl Guest {
     pub(crate) fn check_blocks(&mut self, now: Duration, lease: Duration, run: &mut Run) {
         let upheld =
             |home: &NodeName, bthread: &str, sync| upheld(&self.outboxes, home, bthread, sync, lease);
-        self.held.check(now, upheld).into_iter().for_each(|news| run.deliver(Delivery::Block(news)));
+        run.news.extend(self.held.check(now, upheld).into_iter().map(Delivery::Block));
     }
 
     /// The homes that the present block of `bthread` concerns, each with whether it surely keeps the block now.

@@ -38,7 +38,7 @@ pub(crate) struct Home {
     pub(crate) history: History,
     stalls: Stalls,
     /// Whether `guarded` events are kept back since the start.
-    guarding: bool,
+    pub(crate) guarding: bool,
 }
 
 impl Home {

@@ -51,11 +51,6 @@ impl Home {
         })
     }
 
-    /// Whether `guarded` events are kept back since the start.
-    pub(crate) fn is_guarding(&self) -> bool {
-        self.guarding
-    }
-
     /// The occurrences after number `seq` that this home still has.
     pub(crate) fn occurred_since(&self, seq: u64) -> Vec<Event> {
         let kept = self.history.after(seq).into_iter().flatten();

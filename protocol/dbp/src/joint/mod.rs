@@ -92,7 +92,7 @@ impl Joint {
                     choice: None,
                     at: Duration::ZERO,
                 };
-                run.deliver(Delivery::Recalled(decision.clone()));
+                run.news.push_back(Delivery::Recalled(decision.clone()));
                 term.decisions.push(decision);
             }
         }

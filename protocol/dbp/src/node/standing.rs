@@ -2,9 +2,6 @@
 
 use std::time::Duration;
 
-use skein_bp::Event;
-
-use crate::message::BidRecord;
 use crate::name::NodeName;
 use crate::node::Node;
 use crate::verify::row::{Family, Part, Row};
@@ -28,29 +25,9 @@ impl Node {
         self.run.sync_of(bthread)
     }
 
-    /// Whether what `home` has acknowledged surely holds there now.
+    /// Whether the bids that `home` has acknowledged surely holds there now.
     pub(crate) fn is_sure_of(&self, home: &NodeName) -> bool {
         self.guest.is_sure_of(home, self.clock.now(), self.config.lease)
-    }
-
-    /// Whether `node` counts as alive here.
-    pub(crate) fn hears(&self, node: &NodeName) -> bool {
-        self.channel.counts_as_alive(node)
-    }
-
-    /// Whether this copy of a record, or a newer record, has been taken in.
-    pub(crate) fn has_taken_in(&self, record: &BidRecord) -> bool {
-        self.home.has_taken_in(record)
-    }
-
-    /// Whether `guarded` events are kept back since the start.
-    pub(crate) fn is_guarding(&self) -> bool {
-        self.home.is_guarding()
-    }
-
-    /// The occurrences after number `seq` that this node, as their home, still has.
-    pub(crate) fn occurred_since(&self, seq: u64) -> Vec<Event> {
-        self.home.occurred_since(seq)
     }
 
     /// The number of the latest own occurrence.
@@ -68,25 +45,15 @@ impl Node {
         self.guest.let_copy_fall_due(home, Duration::ZERO);
     }
 
-    /// Whether bids of `node` stand here that its lease keeps.
-    pub(crate) fn holds_bids_of(&self, node: &NodeName) -> bool {
-        self.home.holds_bids_of(node)
-    }
-
-    /// Lets the lease pass of what `node` has stated here.
-    pub(crate) fn let_bids_lapse(&mut self, node: &NodeName) {
-        self.home.let_bids_lapse(node);
-    }
-
     /// Lets the lease pass of what `node` has stated here, and of its last sign of life.
     pub(crate) fn let_lease_lapse(&mut self, node: &NodeName) {
-        self.let_bids_lapse(node);
+        self.home.let_bids_lapse(node);
         self.channel.peers.silence(node);
     }
 
     /// Holds the clock of its b-threads at the start of the run, so that deadlines pass only where they are let.
     pub(crate) fn hold_clock(&mut self) {
-        self.clock.hold();
+        self.clock.held = Some(Duration::ZERO);
     }
 
     /// The b-threads with an open deadline.
@@ -102,7 +69,7 @@ impl Node {
 
     /// Lets the longest lease pass since the start.
     pub(crate) fn let_guard_end(&mut self) {
-        self.clock.date_start_back();
+        self.clock.started = Some(Duration::ZERO);
     }
 }
 
@@ -115,23 +82,8 @@ impl Node {
         self.home.overlook_idle_leases();
     }
 
-    /// Whether a block holds at `home` as long as this node is sure of it.
-    pub(crate) fn relies_on(&self, home: &NodeName) -> bool {
-        self.guest.relies_on(home)
-    }
-
-    /// Whether the lease of what `node` bids here runs.
-    pub(crate) fn keeps_lease_of(&self, node: &NodeName) -> bool {
-        self.home.keeps_lease_of(node)
-    }
-
     /// The epoch of the bids of which this node sends copies to `home`.
     pub(crate) fn states(&self, home: &NodeName) -> Option<u64> {
         self.guest.states(home, self.config.lease)
-    }
-
-    /// The number of the last occurrence of `home` that this node was told of.
-    pub(crate) fn applied(&self, home: &NodeName) -> u64 {
-        self.channel.applied(home)
     }
 }

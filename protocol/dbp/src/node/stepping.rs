@@ -17,6 +17,8 @@ use crate::run::Delivery;
 
 /// How often one step comes back to facts that its own selections have brought about.
 const MOST_ROUNDS: usize = 16;
+/// Room for news that is kept between steps.
+const NEWS_KEPT: usize = 16;
 
 impl Node {
     /// Goes on, with every selection made by `select`.
@@ -51,11 +53,12 @@ impl Node {
             outcome = outcome.and(self.state_bids());
             self.check_blocks();
             self.home.check_stalls(&mut self.run);
-            if !self.run.has_news() || outcome.is_err() {
+            if self.run.news.is_empty() || outcome.is_err() {
                 break;
             }
         }
-        self.run.shrink();
+        // When a fleet meets, hundreds come at once, and never again.
+        self.run.news.shrink_to(NEWS_KEPT);
         outcome
     }
 
@@ -76,7 +79,7 @@ impl Node {
         {
             self.publish(selection);
         }
-        while let Some(delivery) = self.run.next_delivery() {
+        while let Some(delivery) = self.run.news.pop_front() {
             match delivery {
                 Delivery::Fact(event) => self.tell_fact(event)?,
                 Delivery::Block(news) => {

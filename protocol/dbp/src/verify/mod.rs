@@ -19,20 +19,26 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod choices;
+mod model;
 mod network;
 pub mod programs;
 pub(crate) mod row;
+#[cfg(test)]
+mod runs;
+mod step;
 mod wire;
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use network::{NetworkModel, Step};
 use skein_bp::Program;
 use skein_bp::verify::{Inspection, Limits, Omission, Progress, Report, check};
 
-use crate::NodeConfig;
+use crate::config::NodeConfig;
+use crate::verify::model::NetworkModel;
+use crate::verify::step::Step;
 
 /// One node of a network under verification.
 #[derive(Clone, Debug)]

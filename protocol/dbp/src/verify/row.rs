@@ -8,7 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use skein_bp::verify::Interner;
 use skein_bp::{Event, EventSet, Program};
 
-use crate::{NodeName, Refusal, RemoteBid};
+use crate::message::{Refusal, RemoteBid};
+use crate::name::NodeName;
 
 /// Something that is equal or not.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
