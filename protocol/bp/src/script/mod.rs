@@ -22,10 +22,14 @@
 //! program should have.
 
 mod code;
+mod fault;
 mod file;
+mod filler;
 mod op;
 mod parameter;
+mod reading;
 mod samples;
+mod soundness;
 mod trial;
 
 use std::collections::BTreeMap;
@@ -39,15 +43,18 @@ use crate::bid::Bid;
 use crate::bthread::{BThread, Context};
 use crate::event::Event;
 use code::{Code, Step};
-pub use file::{Assignment, BoundScript, MAX_OPS, MAX_TEXT, ScriptFile, ScriptFileError};
+pub use fault::ScriptFileError;
+pub use file::{Assignment, BoundScript, ScriptFile};
+pub use filler::MAX_OPS;
 pub use op::{Op, Reply, ScriptSource, Spawn, Times};
 pub use parameter::{Argument, Parameter, ParameterKind};
+pub use reading::MAX_TEXT;
 pub use trial::{Trial, TrialFault};
 
-/// How many ops a script may run between two synchronisation points.
+/// The most ops that a script may run between two synchronisation points.
 const OPS_BETWEEN_SYNCS: usize = 100_000;
 
-/// Why a script was refused.
+/// The reason for which a script was refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScriptError {
