@@ -27,8 +27,8 @@ const RUNAWAY_LIMIT: usize = 1000;
 
 /// A behavioural program: b-threads, the events that wait to happen, and the rules by which they do.
 ///
-/// It has no clock: time comes in with each call, as time since the run began, and must not go backwards. Two programs are
-/// equal when their b-threads, proxies and queues are; how ties will be drawn does not count.
+/// It has no clock: time comes in with each call, as time since the run began, and must not go backwards. Two programs
+/// are equal when their b-threads, proxies and queues are; how ties will be drawn does not count.
 #[derive(Clone, Debug)]
 pub struct Program {
     config: ProgramConfig,
@@ -95,14 +95,14 @@ impl Program {
         self.occurrences.push_back(event.into());
     }
 
-    /// Limits what may be selected here to `home`; requests for other events stay open until they occur. All events unless
-    /// set.
+    /// Limits what may be selected here to `home`; requests for other events stay open until they occur. All events
+    /// unless set.
     pub fn set_home(&mut self, home: impl Into<EventSet>) {
         self.board.home = home.into();
     }
 
-    /// States the bid of a b-thread that runs elsewhere: its requests, blocks and priority count as if it ran here. When
-    /// one of its requests is selected the bid becomes empty until it is put again.
+    /// States the bid of a b-thread that runs elsewhere: its requests, blocks and priority count as if it ran here.
+    /// When one of its requests is selected the bid becomes empty until it is put again.
     pub fn put_proxy(&mut self, name: impl Into<Arc<str>>, bid: &Bid) {
         let name = name.into();
         let place = match self.board.proxy(&name) {
@@ -122,8 +122,8 @@ impl Program {
         removed.is_some()
     }
 
-    /// Takes back what a b-thread requests at its present synchronisation point: there it waits for the same events, should
-    /// others request them.
+    /// Takes back what a b-thread requests at its present synchronisation point: there it waits for the same events,
+    /// should others request them.
     pub fn withdraw_requests(&mut self, name: &str) {
         let Some(place) = self.board.bthread(name) else { return };
         let Some(entry) = self.board.get(place) else { return };
@@ -161,8 +161,8 @@ impl Program {
         }
     }
 
-    /// Selects one event and resumes those it concerns; `None` when nothing can be selected. An assertion that fails on the
-    /// way stops the program at the next call; see [`Program::failed`].
+    /// Selects one event and resumes those it concerns; `None` when nothing can be selected. An assertion that fails on
+    /// the way stops the program at the next call; see [`Program::failed`].
     ///
     /// # Errors
     /// [`ProgramError::Failed`] when an assertion had failed before the selection.
@@ -185,8 +185,8 @@ impl Program {
     /// Steps until nothing can be selected or an assertion fails.
     ///
     /// # Errors
-    /// [`ProgramError::Unsettled`] past the configured limit; [`ProgramError::Failed`] when an assertion had failed before
-    /// anything was selected.
+    /// [`ProgramError::Unsettled`] past the configured limit; [`ProgramError::Failed`] when an assertion had failed
+    /// before anything was selected.
     pub fn superstep(&mut self, now: Duration) -> Result<Vec<Selection>, ProgramError> {
         let mut selections = Vec::new();
         loop {

@@ -1,11 +1,11 @@
 //! Behavioural programming across nodes, without I/O.
 //!
-//! Each node runs its own b-program ([`skein_bp::Program`]). Every event has one *home*, the node named by its first two
-//! chunks: `uav/3/takeoff` is selected on `uav/3` and nowhere else. A b-thread that requests or blocks an event of
+//! Each node runs its own b-program ([`skein_bp::Program`]). Every event has one *home*, the node named by its first
+//! two chunks: `uav/3/takeoff` is selected on `uav/3` and nowhere else. A b-thread that requests or blocks an event of
 //! another node is represented there by a proxy, whose bid travels as state under a lease ([`BidRecord`]). What has
 //! occurred travels back as a numbered stream ([`Occurrence`]) and is told to b-threads before anything else.
 //!
-//! What holds under loss, delay, repetition, partition and crash:
+//! These promises hold under loss, delay, repetition, partition and crash:
 //! - order (G1): a home's occurrences are seen in order; a hole is repaired or becomes a `gap`;
 //! - cause (G2): an event occurs only while a bid in its home's table requests it;
 //! - confirmed block (G3): after `confirmed` a blocked event does not occur until the block is withdrawn, or its holder

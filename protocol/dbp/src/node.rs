@@ -29,7 +29,7 @@ use crate::name::NodeName;
 use crate::routes::{Route, Routes};
 use crate::run::{ChannelMove, Happened, Run};
 
-/// What a node has done so far.
+/// Counts of what a node has done so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NodeStats {
     /// Events that occurred here.
@@ -154,7 +154,8 @@ impl Node {
         self.joint.roster()
     }
 
-    /// The events that have happened since the last call, here and elsewhere, in the order in which the program saw them.
+    /// The events that have happened since the last call, here and elsewhere, in the order in which the program saw
+    /// them.
     pub fn take_selections(&mut self) -> Vec<Happened> {
         std::mem::take(&mut self.run.selections)
     }
@@ -226,8 +227,8 @@ impl Node {
         self.guest.kept_by(bthread, self.clock.now(), self.config.lease)
     }
 
-    /// The b-threads that request, block and wait for the events of a set, and behind each remote one its node and the age
-    /// of its lease: `node.explain("uav/3/takeoff")`.
+    /// The b-threads that request, block and wait for the events of a set, and behind each remote one its node and the
+    /// age of its lease: `node.explain("uav/3/takeoff")`.
     #[must_use]
     pub fn explain(&self, question: impl Into<EventSet>) -> NodeExplanation {
         let local = self.run.program.explain(question);

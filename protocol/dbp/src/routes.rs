@@ -6,7 +6,7 @@ use crate::channel::peers::Peers;
 use crate::joint::roster::{Roster, SWARM};
 use crate::name::{NodeName, first_two_chunks};
 
-/// Where an event is decided.
+/// The place at which an event is decided.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Route {
     Here,

@@ -34,7 +34,8 @@ pub struct Happened {
 /// A change that the channel has made on the program's board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ChannelMove {
-    /// How many of the selections that [`Node::take_selections`](crate::Node::take_selections) gives next came before it.
+    /// The number of selections before it, of those that [`Node::take_selections`](crate::Node::take_selections) gives
+    /// next.
     pub after: usize,
     pub change: BoardChange,
 }
@@ -158,8 +159,9 @@ impl Run {
         tell(&self.node, facts::CONFIRMED).with("bthread", bthread).with("sync", count(sync))
     }
 
-    /// The fact that a block is confirmed or has lapsed, if it still concerns the holder. One that has moved on has left the
-    /// synchronisation point that a confirmation is for, but a lapse concerns it for as long as it blocks anything.
+    /// The fact that a block is confirmed or has lapsed, if it still concerns the holder. One that has moved on has
+    /// left the synchronisation point that a confirmation is for, but a lapse concerns it for as long as it blocks
+    /// anything.
     pub(crate) fn block_fact(&self, news: BlockNews) -> Option<Event> {
         match news {
             BlockNews::Confirmed { bthread, sync } => {

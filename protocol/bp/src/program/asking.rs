@@ -14,8 +14,8 @@ use crate::explain::Explanation;
 use crate::program::Program;
 
 impl Program {
-    /// The b-threads that run, by name, with their bids and how many synchronisation points each has reached, the present
-    /// one included. A name that is used again goes on counting.
+    /// The b-threads that run, by name, with their bids and how many synchronisation points each has reached, the
+    /// present one included. A name that is used again goes on counting.
     pub fn bids(&self) -> impl Iterator<Item = (&str, &Bid, u64)> {
         self.board.bthreads().map(|(entry, _)| (&*entry.name, &entry.bid, entry.sync))
     }
@@ -52,8 +52,9 @@ impl Program {
         offers
     }
 
-    /// Whether a b-thread requests something here and the b-threads among themselves allow nothing at all. Time and other
-    /// nodes still help: while a deadline is open, or where only a proxy blocks, the program is stalled, not deadlocked.
+    /// Whether a b-thread requests something here and the b-threads among themselves allow nothing at all. Time and
+    /// other nodes still help: while a deadline is open, or where only a proxy blocks, the program is stalled, not
+    /// deadlocked.
     pub fn is_deadlocked(&self) -> bool {
         let stuck = |event: &Event| self.board.is_blocked_by_bthread(event);
         self.occurrences.is_empty()
@@ -73,8 +74,8 @@ impl Program {
         self.board.has_bthreads()
     }
 
-    /// Whether the program, when it has nothing to do, waits for external events. A driver that runs a program to its end
-    /// heeds it; the program itself does not.
+    /// Whether the program, when it has nothing to do, waits for external events. A driver that runs a program to its
+    /// end heeds it; the program itself does not.
     pub fn is_daemon(&self) -> bool {
         self.daemon
     }

@@ -6,8 +6,8 @@ use crate::strategy::Strategy;
 /// An event that lost so many ties goes first, unless configured.
 pub const PASSED_OVER_LIMIT: u32 = 16;
 
-/// The rules by which a program selects. The default is the literature's: simple strategy, external events only when nothing internal is
-/// selectable, no limits but fairness in ties.
+/// The rules by which a program selects. The default is the literature's: simple strategy, external events only when
+/// nothing internal is selectable, no limits but fairness in ties.
 #[derive(Clone, Debug)]
 pub struct ProgramConfig {
     /// The rule that says which requested events may be selected.
@@ -42,8 +42,8 @@ impl Default for ProgramConfig {
 }
 
 impl ProgramConfig {
-    /// The rules on vehicles: priorities of bids, external events after at most 16 internal ones, at most 1000 selections in a
-    /// superstep; four rivals are noted with each.
+    /// The rules on vehicles: priorities of bids, external events after at most 16 internal ones, at most 1000
+    /// selections in a superstep; four rivals are noted with each.
     pub fn vehicle(seed: u64) -> Self {
         Self {
             strategy: Strategy::SyncPriority,

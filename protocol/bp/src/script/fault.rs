@@ -10,7 +10,7 @@ pub struct ScriptFileError {
     pub line: Option<usize>,
     /// The field, such as `body[1].do[0].sync`; empty when it is about the whole.
     pub field: String,
-    /// What is wrong there.
+    /// The fault there.
     pub problem: String,
 }
 

@@ -85,8 +85,8 @@ pub struct BoundScript {
 }
 
 impl ScriptFile {
-    /// Reads a script; `file` is what errors call it, and ends in `.json` unless it is TOML. The body is tried with values
-    /// that fit its parameters.
+    /// Reads a script; `file` is what errors call it, and ends in `.json` unless it is TOML. The body is tried with
+    /// values that fit its parameters.
     ///
     /// # Errors
     /// [`ScriptFileError`] at the first thing that is not as expected.

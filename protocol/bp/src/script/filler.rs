@@ -88,8 +88,8 @@ impl Filler {
         Ok(filled)
     }
 
-    /// A text that is nothing but a name in braces becomes its value, whatever that is; inside a longer text it is written
-    /// out.
+    /// A text that is nothing but a name in braces becomes its value, whatever that is; inside a longer text it is
+    /// written out.
     fn fill_text(&self, text: &str, field: &str) -> Result<Value, Fault> {
         let mut filled = String::new();
         let mut rest = text;

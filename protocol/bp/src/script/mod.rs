@@ -15,11 +15,11 @@
 //! | `{"on_interrupt_enqueue": ["$event", ..]}` | from here on, enqueues these when interrupted; `$event` is what interrupts |
 //! | `{"stop": true}` | ends |
 //!
-//! Events and sets are written as in [`crate::notation`]. A datum `"$x"` of a requested event stands for the datum `x` of the
-//! event that ended the last sync; `timeout` is the event by which time ends a block.
+//! Events and sets are written as in [`crate::notation`]. A datum `"$x"` of a requested event stands for the datum `x`
+//! of the event that ended the last sync; `timeout` is the event by which time ends a block.
 //!
-//! A [`ScriptFile`] is a script for people: with a name, a purpose and parameters, and without the ops that only a whole
-//! program should have.
+//! A [`ScriptFile`] is a script for people: with a name, a purpose and parameters, and without the ops that only a
+//! whole program should have.
 
 mod code;
 mod fault;
@@ -144,8 +144,8 @@ impl Script {
         Self { code, library, at: 0, rounds, on_interrupt: None, deadlines, last: None }
     }
 
-    /// The bid of every synchronisation point, in the order in which they are written. What a bid takes from an event shows
-    /// as `$key`.
+    /// The bid of every synchronisation point, in the order in which they are written. What a bid takes from an event
+    /// shows as `$key`.
     pub fn bids(&self) -> impl Iterator<Item = &Bid> {
         self.code.steps.iter().filter_map(|step| match step {
             Step::Sync { bid, .. } => Some(bid),

@@ -47,7 +47,7 @@ fn check_length(file: &str, text: &str) -> Result<(), ScriptFileError> {
     Ok(())
 }
 
-/// Where an error is; empty for the whole.
+/// The field of an error; empty for the whole.
 fn path<E>(error: &serde_path_to_error::Error<E>) -> String {
     let path = error.path().to_string();
     if path == "." { String::new() } else { path }

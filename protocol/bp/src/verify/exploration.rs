@@ -7,7 +7,7 @@ use crate::verify::report::{Fault, Inspection, Omission, Progress};
 use crate::verify::rows::hash;
 use crate::verify::store::{Arrival, MOST_STATES, START, Store};
 
-/// How many states are looked at from one report of progress to the next.
+/// States that are looked at from one report of progress to the next.
 const PROGRESS_EVERY: usize = 1 << 15;
 
 /// The order and the bounds of a search.
@@ -33,7 +33,7 @@ pub(super) struct Exploration {
     pub(super) frontier: Frontier,
     pub(super) edges: u64,
     pub(super) depth: u32,
-    /// How many states were gone on from.
+    /// The number of states that were gone on from.
     explored: usize,
     /// Moves that lead to unseen states beyond the greatest depth.
     too_deep: u64,
@@ -116,7 +116,7 @@ impl Exploration {
         not_covered
     }
 
-    /// How many states were gone on from.
+    /// The number of states that were gone on from.
     pub(super) fn explored(&self) -> usize {
         self.explored
     }

@@ -19,7 +19,7 @@ pub struct Graph {
     pub states: Vec<GraphState>,
     /// By the state they leave, then in a fixed order.
     pub edges: Vec<GraphEdge>,
-    /// What is missing.
+    /// The missing parts.
     #[serde(skip)]
     pub not_covered: Vec<Omission>,
 }
@@ -97,8 +97,8 @@ impl Graph {
         dot
     }
 
-    /// The graph as JSON: `{"states": [..], "edges": [{"from": 0, "event": .., "to": 1}, ..]}`, with events written as in
-    /// [`crate::notation`].
+    /// The graph as JSON: `{"states": [..], "edges": [{"from": 0, "event": .., "to": 1}, ..]}`, with events written as
+    /// in [`crate::notation`].
     ///
     /// # Errors
     /// When an event's data has no JSON form, such as a key that is not a text.

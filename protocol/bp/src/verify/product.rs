@@ -52,7 +52,7 @@ struct OrderWatch {
     varies: bool,
 }
 
-/// What a product state holds beside local states.
+/// The part of a product state beside local states.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Beside {
     /// The external queue, as event numbers.
@@ -61,7 +61,7 @@ struct Beside {
     failure: Option<(Arc<str>, String)>,
     /// Whether the program takes what is left of the feed.
     daemon: bool,
-    /// How many events of the feed were taken.
+    /// The number of events of the feed that were taken.
     fed: usize,
 }
 
@@ -125,7 +125,7 @@ impl Product {
         }
     }
 
-    /// What of the program was met so far.
+    /// The parts of the program that were met so far.
     pub(super) fn coverage(&self) -> Coverage {
         let mut coverage = Coverage::default();
         for (local, causes) in self.locals.all() {
@@ -396,7 +396,7 @@ impl Model for Product {
     }
 
     fn meets(&self, goal: usize, state: &[u32]) -> bool {
-        self.goals.get(goal).is_none_or(|goal| (goal.is_met)(&self.view(state)))
+        self.goals.get(goal).is_none_or(|goal| (goal.holds)(&self.view(state)))
     }
 
     fn hot(&self, state: &[u32], bthreads: &mut Vec<u32>) {

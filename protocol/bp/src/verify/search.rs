@@ -9,7 +9,7 @@ use crate::verify::report::{Fault, Inspection, Progress, Report, Violation};
 use crate::verify::store::Store;
 use crate::verify::two_threads;
 
-/// How many states are looked at before a second thread is worth its while.
+/// States that are looked at before a second thread is worth its while.
 const ALONE: usize = 1 << 12;
 
 /// Looks at every state that `model` can reach, and at its cycles, until one is at fault or a bound is reached.

@@ -18,9 +18,9 @@ const UNDER_WAY: usize = 8;
 #[derive(Default)]
 struct Expanded {
     moves: Moves,
-    /// How many of the moves each state has; states after one at fault are left out.
+    /// The number of moves of each state; states after one at fault are left out.
     counts: Vec<usize>,
-    /// What is wrong with the last state.
+    /// The fault of the last state.
     fault: Option<Fault>,
 }
 

@@ -21,13 +21,13 @@ use crate::run::Run;
 
 /// A node whose name another process has is told so again after this long, while that goes on.
 const REPEAT_DOUBLE: Duration = Duration::from_secs(2);
-/// How many of its own last presences a node can tell from another's.
+/// Most of its own last presences that a node can tell from another's.
 const PRESENCES_KNOWN: usize = 16;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Channel {
     pub(crate) peers: Peers,
-    /// What is heard of each peer's occurrences.
+    /// The occurrences of each peer, as far as they are heard.
     streams: BTreeMap<NodeName, Stream>,
     presence_due: Duration,
     /// `up` of the last presences that were sent.

@@ -12,7 +12,7 @@ pub struct Peer {
     pub incarnation: Option<u64>,
     /// When it was last heard, on this node's clock.
     pub last_word: Option<Duration>,
-    /// How long it counts as alive without a word.
+    /// The time for which it counts as alive without a word.
     pub lease: Duration,
     /// Whether it counts as alive.
     pub alive: bool,
@@ -113,7 +113,7 @@ impl Peers {
 }
 
 impl Peer {
-    /// How long ago it was last heard.
+    /// The time since it was last heard.
     #[must_use]
     pub fn age(&self, now: Duration) -> Option<Duration> {
         self.last_word.map(|at| now.saturating_sub(at))

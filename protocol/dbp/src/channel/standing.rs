@@ -1,4 +1,4 @@
-//! Where the channel stands, for a verifier.
+//! The standing of the channel, for a verifier.
 
 use crate::channel::Channel;
 use crate::name::NodeName;

@@ -23,7 +23,7 @@ use crate::name::NodeName;
 use crate::routes::Routes;
 use crate::run::{BoardChange, Delivery, Run};
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Guest {
     /// The bids at each other home.
     outboxes: BTreeMap<NodeName, Outbox>,
@@ -31,8 +31,8 @@ pub(crate) struct Guest {
     held: HeldBlocks,
     /// The revision of the program whose bids are stated; none if they are to be stated anew.
     stated: Option<u64>,
-    /// For b-threads that request an event without a home, and for those that request at two homes, the synchronisation point
-    /// at which that was reported.
+    /// For b-threads that request an event without a home, and for those that request at two homes, the synchronisation
+    /// point at which that was reported.
     unroutable: BTreeMap<String, u64>,
     two_homed: BTreeMap<String, u64>,
 }
@@ -40,11 +40,8 @@ pub(crate) struct Guest {
 impl Guest {
     pub(crate) fn new(config: &NodeConfig) -> Self {
         Self {
-            outboxes: config.roster.iter().map(|home| (home.clone(), Outbox::new())).collect(),
-            held: HeldBlocks::default(),
-            stated: None,
-            unroutable: BTreeMap::new(),
-            two_homed: BTreeMap::new(),
+            outboxes: config.roster.iter().map(|home| (home.clone(), Outbox::default())).collect(),
+            ..Self::default()
         }
     }
 
@@ -106,8 +103,8 @@ impl Guest {
         Err(NodeError::TwoHomes { node: node.clone(), bthread: bid.bthread.clone(), homes })
     }
 
-    /// Addresses requests to the life of `home` that is heard from now on, and tells of those that its former life may have
-    /// served or not.
+    /// Addresses requests to the life of `home` that is heard from now on, and tells of those that its former life may
+    /// have served or not.
     pub(crate) fn address(&mut self, home: &NodeName, incarnation: u64, run: &mut Run) {
         let Some(outbox) = self.outboxes.get_mut(home) else { return };
         if outbox.home_incarnation == Some(incarnation) {
@@ -120,8 +117,8 @@ impl Guest {
         }
     }
 
-    /// Joint events are decided by `coordinator` from now on, or here. The requests at the `former` coordinator may have been
-    /// decided there or not: they are not asked for again.
+    /// Joint events are decided by `coordinator` from now on, or here. The requests at the `former` coordinator may
+    /// have been decided there or not: they are not asked for again.
     pub(crate) fn leave_unknown(&mut self, former: &NodeName, coordinator: Option<&NodeName>, run: &mut Run) {
         let asked = self.outboxes.get(former).map(Outbox::asked).unwrap_or_default();
         for (bthread, sync) in asked {
@@ -175,8 +172,8 @@ impl Guest {
         )
     }
 
-    /// Sends each home the copy of its record that is due. `term` is the term of joint events, and `decided` how many of its
-    /// decisions have been applied.
+    /// Sends each home the copy of its record that is due. `term` is the term of joint events, and `decided` how many
+    /// of its decisions have been applied.
     pub(crate) fn send_due(
         &mut self,
         now: Duration,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use crate::message::{BidAck, OnLoss, Refusal, RemoteBid};
 
 /// The newest record for one home, kept alive by renewals.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Outbox {
     /// The home's incarnation, once it is known.
     pub(crate) home_incarnation: Option<u64>,
@@ -63,20 +63,6 @@ impl Statement {
 }
 
 impl Outbox {
-    pub(crate) fn new() -> Self {
-        Self {
-            home_incarnation: None,
-            epoch: 0,
-            bids: Vec::new(),
-            blocks: BTreeMap::new(),
-            unknown: BTreeMap::new(),
-            refused: Vec::new(),
-            acked_epoch: 0,
-            acked_sent_at: Duration::ZERO,
-            sent_at: None,
-        }
-    }
-
     /// States these bids from now on.
     pub(crate) fn state(&mut self, mut bids: Vec<RemoteBid>) {
         self.unknown
@@ -102,8 +88,8 @@ impl Outbox {
 
     /// The statement of a block that goes on with this bid: it blocks what it blocked in the content before, or less.
     ///
-    /// The home keeps such a block whichever of the two contents it has. That a b-thread has moved on can be passed over only
-    /// if the home has taken in the block before that, for what is still on its way may be a refusal.
+    /// The home keeps such a block whichever of the two contents it has. That a b-thread has moved on can be passed
+    /// over only if the home has taken in the block before that, for what is still on its way may be a refusal.
     fn continued(&self, place: usize, bid: &RemoteBid) -> Option<Statement> {
         let before = self.bids.iter().find(|before| before.bthread == bid.bthread)?;
         let statement = *self.blocks.get(&bid.bthread)?;
@@ -144,7 +130,8 @@ impl Outbox {
         open.chain(self.unknown.iter().map(|(bthread, sync)| (bthread.clone(), *sync))).collect()
     }
 
-    /// The requests of `bthread` at its synchronisation point `sync` may have occurred elsewhere: they are not made here.
+    /// The requests of `bthread` at its synchronisation point `sync` may have occurred elsewhere: they are not made
+    /// here.
     pub(crate) fn leave_unknown(&mut self, bthread: &str, sync: u64) {
         self.unknown.insert(bthread.into(), sync);
     }
@@ -178,8 +165,8 @@ impl Outbox {
         self.refused.iter().filter(|refusal| !before.contains(refusal)).cloned().collect()
     }
 
-    /// The home's sure hold on the block of `bthread` at its synchronisation point `sync`; none if it is not known to have
-    /// taken the block in. Counts 0.9 lease from sending (G3).
+    /// The home's sure hold on the block of `bthread` at its synchronisation point `sync`; none if it is not known to
+    /// have taken the block in. Counts 0.9 lease from sending (G3).
     pub(crate) fn upheld(&self, bthread: &str, sync: u64, lease: Duration) -> Option<Upheld> {
         let statement = self.blocks.get(bthread).filter(|statement| statement.sync == sync)?;
         self.upheld_by(*statement, bthread).then(|| match statement.durable {

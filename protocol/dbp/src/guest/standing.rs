@@ -1,4 +1,4 @@
-//! Where the guest stands, for a verifier.
+//! The standing of the guest, for a verifier.
 
 use std::time::Duration;
 

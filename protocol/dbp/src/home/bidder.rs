@@ -31,7 +31,7 @@ pub(super) struct Bidder {
 }
 
 /// One bid, as far as it is honoured.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct TakenBid {
     pub(super) sync: u64,
     pub(super) requests: Vec<Event>,
@@ -86,24 +86,10 @@ impl Bidder {
 }
 
 impl TakenBid {
-    /// A block that is kept, and nothing else.
-    pub(super) fn kept() -> Self {
-        Self {
-            sync: 0,
-            requests: Vec::new(),
-            block: EventSet::None,
-            asked_block: EventSet::None,
-            priority: None,
-            open: false,
-            keep: true,
-            orphaned: false,
-        }
-    }
-
-    /// What stays of a bid whose holder is lost.
+    /// The rest of a bid whose holder is lost.
     pub(super) fn left_over(&self) -> Self {
         let (block, asked_block) = (self.block.clone(), self.asked_block.clone());
-        Self { sync: self.sync, block, asked_block, orphaned: self.orphaned, ..Self::kept() }
+        Self { sync: self.sync, block, asked_block, orphaned: self.orphaned, keep: true, ..Self::default() }
     }
 
     /// The bid of the proxy.

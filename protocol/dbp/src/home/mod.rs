@@ -94,21 +94,6 @@ impl Home {
         })
     }
 
-    /// `node` lives in a new incarnation: what it bid in another life is void.
-    pub(crate) fn drop_life(&mut self, node: &NodeName, incarnation: u64, run: &mut Run) {
-        run.change_proxies(self.table.drop_life(node, incarnation));
-    }
-
-    /// Lets go of the bids whose lease has run out.
-    pub(crate) fn expire(&mut self, now: Duration, run: &mut Run) {
-        run.change_proxies(self.table.expire(now));
-    }
-
-    /// An authority lifts a block that outlives its holder.
-    pub(crate) fn lift(&mut self, node: &NodeName, bthread: &str, run: &mut Run) {
-        run.change_proxies(self.table.lift(node, bthread));
-    }
-
     /// Tells that a node is lost, and which of its blocks here end or stay.
     pub(crate) fn tell_loss(&self, node: &NodeName, run: &mut Run) {
         let names = |bthreads: BTreeSet<String>| bthreads.into_iter().collect::<Vec<_>>().join(" ");
@@ -119,7 +104,8 @@ impl Home {
         });
     }
 
-    /// Lets `guarded` events happen once every peer's blocks are known, or the longest lease has passed since the start.
+    /// Lets `guarded` events happen once every peer's blocks are known, or the longest lease has passed since the
+    /// start.
     pub(crate) fn open_guard(&mut self, clock: &Clock, config: &NodeConfig, run: &mut Run) {
         if self.guarding
             && (clock.now() >= guard_ends(clock, config)

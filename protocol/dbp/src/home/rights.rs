@@ -26,8 +26,8 @@ pub(super) struct Rights {
     safety: EventSet,
     /// ... but for these, which may be requested.
     gateway: EventSet,
-    /// An operator's orders to the node itself. Nobody blocks them from afar: a block must not outlast the order that ends
-    /// it, nor keep a node in a term that is over.
+    /// An operator's orders to the node itself. Nobody blocks them from afar: a block must not outlast the order that
+    /// ends it, nor keep a node in a term that is over.
     orders: EventSet,
     /// The home's events without all of these: they may be blocked from afar.
     blockable: EventSet,

@@ -1,4 +1,4 @@
-//! Where the home stands, for a verifier.
+//! The standing of the home, for a verifier.
 
 use std::time::Duration;
 

@@ -77,7 +77,8 @@ impl BidTable {
         for KeptBlock { node, incarnation, bthread, sync, block } in kept {
             let bidder = bidders.entry(node).or_default();
             let (asked_block, orphaned) = (block.clone(), incarnation < bidder.incarnation);
-            bidder.bids.insert(bthread, TakenBid { sync, block, asked_block, orphaned, ..TakenBid::kept() });
+            let bid = TakenBid { sync, block, asked_block, keep: true, orphaned, ..TakenBid::default() };
+            bidder.bids.insert(bthread, bid);
         }
         let nothing = BTreeMap::new();
         let proxies =
@@ -177,8 +178,8 @@ impl BidTable {
         bidder.lifted.retain(|bthread, _| taken.contains_key(bthread));
         for (bthread, orphan) in bidder.bids.iter().filter(|(_, bid)| bid.orphaned) {
             let heir = taken.entry(bthread.clone()).or_insert_with(|| orphan.clone());
-            // The b-thread's new life takes the block over if it states all of it, and then may withdraw it. What this home
-            // honours of the two may differ, when it has become the coordinator between them, or is it no more.
+            // The b-thread's new life takes the block over if it states all of it, and then may withdraw it. What this
+            // home honours of the two may differ, when it has become the coordinator between them, or is it no more.
             if !(heir.keep && orphan.asked_block.is_within(&heir.asked_block)) {
                 heir.block = joined(&heir.block, &orphan.block);
                 heir.asked_block = joined(&heir.asked_block, &orphan.asked_block);

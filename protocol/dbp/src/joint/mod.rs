@@ -38,7 +38,7 @@ impl Joint {
         self.term.as_ref().map_or(0, Term::number)
     }
 
-    /// How many of the term's decisions this node has made or applied.
+    /// The number of the term's decisions that this node has made or applied.
     pub(crate) fn decided(&self) -> u64 {
         self.term.as_ref().map_or(0, Term::decided)
     }

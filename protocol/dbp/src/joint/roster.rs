@@ -22,7 +22,7 @@ pub const ROSTER: &str = "roster";
 pub struct Roster {
     /// From 1; a later term makes an earlier one void.
     pub term: u64,
-    /// Where joint events have their home.
+    /// The home of joint events.
     pub coordinator: NodeName,
     /// Every node without which nothing is decided, the coordinator among them.
     pub members: BTreeSet<NodeName>,

@@ -15,7 +15,7 @@ use crate::joint::roster::Roster;
 use crate::message::JointWord;
 use crate::name::NodeName;
 
-/// How many decisions a term may see; after them the operator begins a new one.
+/// The most decisions of a term; after them the operator begins a new one.
 const MOST_DECISIONS: usize = 4096;
 
 #[derive(Clone, Debug)]
@@ -66,7 +66,7 @@ impl Term {
         self.leads
     }
 
-    /// How many of the term's decisions this node has made or applied.
+    /// The number of the term's decisions that this node has made or applied.
     pub(super) fn decided(&self) -> u64 {
         if self.leads { self.decisions.latest_seq() } else { self.stream.applied() }
     }

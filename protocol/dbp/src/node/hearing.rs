@@ -36,7 +36,7 @@ impl Node {
                     self.home.tell_loss(node, &mut self.run);
                 }
                 self.joint.forget(node);
-                self.home.drop_life(node, incarnation, &mut self.run);
+                self.run.change_proxies(self.home.table.drop_life(node, incarnation));
                 self.channel.restart(node, incarnation, &mut self.run);
                 self.address_home(node, incarnation);
             }

@@ -17,7 +17,7 @@ impl Node {
             Some(LIFT) => {
                 let node = event.text("node").and_then(|node| NodeName::new(node).ok());
                 if let (Some(node), Some(bthread)) = (node, event.text("bthread")) {
-                    self.home.lift(&node, bthread, &mut self.run);
+                    self.run.change_proxies(self.home.table.lift(&node, bthread));
                 }
             }
             _ => {}

@@ -1,4 +1,4 @@
-//! Where a node stands, for a verifier: all that what it will do depends on, but times.
+//! The standing of a node, for a verifier: all that its further run depends on, but times.
 
 use std::time::Duration;
 

@@ -15,7 +15,7 @@ use crate::node::{Node, Select};
 use crate::routes::{Route, Routes};
 use crate::run::Delivery;
 
-/// How often one step comes back to facts that its own selections have brought about.
+/// Most rounds in which one step comes back to facts that its own selections have brought about.
 const MOST_ROUNDS: usize = 16;
 /// Room for news that is kept between steps.
 const NEWS_KEPT: usize = 16;
@@ -31,7 +31,7 @@ impl Node {
     }
 
     fn let_go_of_the_lapsed(&mut self) {
-        self.home.expire(self.clock.now(), &mut self.run);
+        self.run.change_proxies(self.home.table.expire(self.clock.now()));
         for node in self.channel.peers.take_lost(self.clock.now()) {
             self.joint.forget(&node);
             self.home.tell_loss(&node, &mut self.run);

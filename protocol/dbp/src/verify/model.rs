@@ -57,7 +57,7 @@ pub(super) struct NetworkModel {
     /// Whether a bound of the model, not of the search, was reached.
     pub(super) ways_cut: bool,
     pub(super) queue_cut: bool,
-    /// How many moves of each kind were made.
+    /// The number of moves of each kind that were made.
     pub(super) moves: MoveCounts,
 }
 
@@ -150,7 +150,7 @@ impl NetworkModel {
         Fault { kind: ViolationKind::FailedAssertion { message }, violators: vec![violator.into()] }
     }
 
-    /// Who is hot where nothing is due any more.
+    /// The b-threads that are hot where nothing is due any more.
     fn hot_at_rest(&self, network: &Network) -> Option<Fault> {
         let violators: Vec<Arc<str>> = if self.rests { network.hot_bthreads().collect() } else { Vec::new() };
         (!violators.is_empty()).then_some(Fault { kind: ViolationKind::HotTermination, violators })
@@ -255,7 +255,7 @@ mod tests {
     use super::*;
     use crate::verify::programs;
 
-    /// Where a network may come to from here. Labels show counters, so they may differ.
+    /// The states that a network may come to from here. Labels show counters, so they may differ.
     fn ways(model: &mut NetworkModel, network: &Network) -> Vec<Vec<u32>> {
         let mut ways = Vec::new();
         for step in network.steps() {

@@ -278,7 +278,8 @@ impl Network {
         }
     }
 
-    /// Two nodes of which the first has told a fact that is the next thing the other hears of it, and must hear at once.
+    /// Two nodes of which the first has told a fact that is the next thing the other hears of it, and must hear at
+    /// once.
     pub(super) fn next_fact(&self) -> Option<Pair> {
         let is_fact = |wire: &Wire, from: &NodeName| {
             wire.occurrences.front().is_some_and(|next| facts::all(from).contains(&next.event))

@@ -1,5 +1,5 @@
-//! Small networks that show the rules of b-programs across nodes at work: those by which the fleet flies, and beside some of
-//! them how it is not to be written.
+//! Small networks that show the rules of b-programs across nodes at work: those by which the fleet flies, and beside
+//! some of them how it is not to be written.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,16 +16,15 @@ use crate::verify::{Faults, Member, NetworkVerifier, NetworkView};
 /// A network and what must hold in it.
 #[derive(Clone)]
 pub struct Network {
-    /// What it is called.
     pub name: &'static str,
-    /// What happens in it, in one line.
+    /// The story, in one line.
     pub about: &'static str,
     /// Whether its requirement holds. Those that are not sound show that the verifier finds it.
     pub is_sound: bool,
-    /// What may go wrong in it unless told otherwise: what its states can be counted with in reasonable time.
+    /// The faults unless told otherwise, with which its states can be counted in reasonable time.
     pub faults: Faults,
     pub members: Vec<Member>,
-    /// What must hold in every state, besides that no b-thread's assertion fails.
+    /// The invariant, besides that no b-thread's assertion fails.
     pub requirement: Option<(&'static str, Arc<Requirement>)>,
 }
 
@@ -148,7 +147,8 @@ pub fn guarded_resource(count: usize) -> Result<Network, NetworkError> {
     })
 }
 
-/// The same place, where each blocks the others and enters without waiting to hear that the block holds. It is not safe.
+/// The same place, where each blocks the others and enters without waiting to hear that the block holds. It is not
+/// safe.
 pub fn naive_resource(count: usize) -> Result<Network, NetworkError> {
     let members = (1..=count).map(|number| {
         let (name, mut program) = vehicle(number)?;
@@ -286,8 +286,8 @@ pub fn held_launch() -> Result<Network, NetworkError> {
     })
 }
 
-/// The ground holds `uav/1`, whose leave to move is blocked for as long as the ground counts on it: the holder hears that
-/// its block lapses before the home lets go.
+/// The ground holds `uav/1`, whose leave to move is blocked for as long as the ground counts on it: the holder hears
+/// that its block lapses before the home lets go.
 pub fn hold() -> Result<Network, NetworkError> {
     holding("hold", "the ground holds a vehicle until its lease lapses, of which it hears first", false)
 }
@@ -433,7 +433,7 @@ struct Claim {
     stage: Stage,
     /// When its patience is at an end.
     until: Option<Duration>,
-    /// What it does then.
+    /// Whether it gives way then, or enters.
     gives_way: bool,
 }
 
@@ -447,7 +447,7 @@ enum Stage {
     Yielding,
 }
 
-/// How long it waits for confirmation, and before it tries again.
+/// The time it waits for confirmation, and before it tries again.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 impl BThread for Claim {

@@ -1,7 +1,7 @@
 //! Runs of real nodes, held against the model: wherever a run comes to, there the model comes too.
 //!
-//! Time runs in them: messages take it, are lost and repeated, leases are renewed or lapse, partitions begin and end. Only
-//! the clock of the b-threads is held, as the model has it, and their deadlines are let pass when they are due.
+//! Time runs in them: messages take it, are lost and repeated, leases are renewed or lapse, partitions begin and end.
+//! Only the clock of the b-threads is held, as the model has it, and their deadlines are let pass when they are due.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::rc::Rc;
@@ -18,9 +18,9 @@ use crate::verify::network::Network;
 use crate::verify::{Faults, programs};
 
 const MS: Duration = Duration::from_millis(1);
-/// How long a run takes.
+/// The length of a run.
 const LENGTH: Duration = Duration::from_secs(4);
-/// How much of a run is told when it leaves the model.
+/// The events of a run that are told when it leaves the model.
 const STORY: usize = 12;
 
 /// Every state that the model comes to, as far as a run can be compared with it.
@@ -42,8 +42,8 @@ fn reached_by(model: &mut NetworkModel) -> FxHashSet<Vec<u32>> {
     reached
 }
 
-/// A state without what a run does not share with the model: how much may still go wrong, what has lapsed of itself because
-/// there was nothing to renew, and signs of life, which come again and again.
+/// A state without what a run does not share with the model: how much may still go wrong, what has lapsed of itself
+/// because there was nothing to renew, and signs of life, which come again and again.
 fn comparable_row(model: &mut NetworkModel, network: &Network) -> Vec<u32> {
     let mut network = network.clone();
     network.faults = Faults { lapses: 0, restarts: 0, repeats: 0, partitions: 0, ..network.faults };
@@ -61,7 +61,7 @@ struct Underway {
     message: Message,
 }
 
-/// How a run ends.
+/// The end of a run.
 enum End {
     /// It was as long as it should be.
     Whole,
@@ -76,12 +76,12 @@ struct Run<'a> {
     network: Network,
     underway: Vec<Underway>,
     rng: ChaCha8Rng,
-    /// How likely a message is lost or comes twice, and how long it may take.
+    /// The probability that a message is lost or comes twice, and the longest time it takes.
     loss: f64,
     slowest: Duration,
     /// When each deadline of a b-thread passes, with the synchronisation point at which it was set.
     deadlines: BTreeMap<(NodeName, String), (u64, Duration)>,
-    /// What each node has stated last to each home.
+    /// The record that each node has stated last to each home.
     stated: BTreeMap<(NodeName, NodeName), BidRecord>,
     /// Who was sure of whom, who heard whom, and whose bids stood where.
     standing: BTreeMap<(NodeName, NodeName), [bool; 3]>,
@@ -89,7 +89,7 @@ struct Run<'a> {
     answers: bool,
     /// When two nodes are cut off from one another, and when they are joined again.
     cut: Option<(Duration, Duration)>,
-    /// How many leases have lapsed without a partition.
+    /// The number of leases that have lapsed without a partition.
     lapses: u32,
     /// The last things that happened, for people.
     story: VecDeque<String>,
@@ -195,8 +195,8 @@ impl<'a> Run<'a> {
 
     fn arrive(&mut self, underway: Underway) {
         let Underway { from, to, message, .. } = underway;
-        // The model does not have it that several occurrences are told at once, behind a hole that is filled; so what comes
-        // too early is lost.
+        // The model does not have it that several occurrences are told at once, behind a hole that is filled; so what
+        // comes too early is lost.
         let comes_early = matches!(&message, Message::Occurrence(occurrence)
             if occurrence.seq > self.network.nodes[&to].channel.applied(&from) + 1);
         if comes_early || self.network.are_cut_off(&from, &to) {

@@ -31,8 +31,8 @@ pub(super) enum Step {
     Restart(NodeName),
 }
 
-/// A message on a wire that may arrive next. With a record of bids or an acknowledgement at a place of the wire, those before
-/// it count no more.
+/// A message on a wire that may arrive next. With a record of bids or an acknowledgement at a place of the wire, those
+/// before it count no more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Cargo {
     Record(usize),
@@ -81,8 +81,8 @@ impl Step {
         }
     }
 
-    /// The move that was due and has come about with this one. Whatever stays on its way arrives, partitions end, and time
-    /// passes, sooner or later, unless something forestalls it.
+    /// The move that was due and has come about with this one. Whatever stays on its way arrives, partitions end, and
+    /// time passes, sooner or later, unless something forestalls it.
     pub(super) fn due(&self) -> Option<Self> {
         match self {
             Self::Arrival(pair, cargo) | Self::Twice(pair, cargo) => {

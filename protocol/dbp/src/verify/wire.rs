@@ -8,8 +8,9 @@ use crate::node::Node;
 use crate::verify::row::{Family, Part, Row};
 use crate::verify::step::Cargo;
 
-/// Messages from one node to another that have not arrived. Of records and of acknowledgements any may arrive next, and then
-/// older ones count no more; of presences only the newest counts; occurrences arrive in order, since holes are repaired.
+/// Messages from one node to another that have not arrived. Of records and of acknowledgements any may arrive next, and
+/// then older ones count no more; of presences only the newest counts; occurrences arrive in order, since holes are
+/// repaired.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Wire {
     pub(super) records: Vec<BidRecord>,
@@ -87,14 +88,14 @@ impl Wire {
                 self.acks.push(ack);
             }
             Message::Occurrence(occurrence) => self.occurrences.push_back(occurrence),
-            // Nothing that a wire holds is lost for good, so no wish to hear it again is needed, and a sign of life says
-            // nothing new but where it is put by hand.
+            // Nothing that a wire holds is lost for good, so no wish to hear it again is needed, and a sign of life
+            // says nothing new but where it is put by hand.
             Message::Presence(_) | Message::Repair(_) => {}
         }
     }
 
-    /// Puts a message that was taken off back on its way, as the wire was `before`: with those that it had overtaken, and
-    /// behind it those that were sent since.
+    /// Puts a message that was taken off back on its way, as the wire was `before`: with those that it had overtaken,
+    /// and behind it those that were sent since.
     pub(super) fn reload(&mut self, cargo: Cargo, before: &Self) {
         match cargo {
             Cargo::Record(_) => {
