@@ -11,10 +11,10 @@ use crate::event_set::EventSet;
 use crate::index::{Index, Place};
 use crate::strategy::Strategy;
 
-/// How many bids may stay in the indexes after they were replaced; an event has at most as many candidates too many.
+/// Most bids that stay in the indexes after they were replaced; an event has at most as many candidates too many.
 const BIDS_LEFT_FILED: usize = 16;
 
-/// Who states a bid.
+/// The owner of a bid.
 #[derive(Clone, Debug)]
 pub(crate) enum Owner {
     /// A b-thread that runs here.
@@ -247,15 +247,15 @@ impl Board {
     }
 }
 
-/// Where to find the bids that a question is about.
+/// An index of the bids that a question is about.
 ///
-/// A b-thread that goes round a loop states the same few bids again and again. So a replaced bid stays filed until others
-/// have been replaced after it, and is found there when it comes back. Who asks looks at the present bid itself.
+/// A b-thread that goes round a loop states the same few bids again and again. So a replaced bid stays filed until
+/// others have been replaced after it, and is found there when it comes back. Who asks looks at the present bid itself.
 #[derive(Clone, Debug, Default)]
 struct Indexes {
-    /// Who requests, waits for or is interrupted by an event.
+    /// The bids that request, wait for or are interrupted by an event.
     wakes: Index,
-    /// Who blocks an event.
+    /// The bids that block an event.
     blockers: Index,
     /// Replaced bids that are still filed, the one replaced first in front.
     left_filed: VecDeque<(Place, Bid)>,

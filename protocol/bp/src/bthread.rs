@@ -17,8 +17,8 @@ pub const DEFAULT_BTHREAD_PRIORITY: i32 = -1;
 
 /// A b-thread: a state machine that states a bid in each state and moves when an event it asked for happens.
 ///
-/// Usually an enum with one variant per synchronisation point. It is cloned, compared, hashed and serialised, because the
-/// verifier takes snapshots; so its state must be all there is to it.
+/// Usually an enum with one variant per synchronisation point. It is cloned, compared, hashed and serialised, because
+/// the verifier takes snapshots; so its state must be all there is to it.
 ///
 /// ```
 /// use serde::Serialize;
@@ -63,11 +63,11 @@ pub trait BThread: Clone + Eq + Hash + Debug + Serialize + Send + 'static {
     }
 }
 
-/// What a b-thread may know and do while it runs to its next synchronisation point.
+/// The means of a b-thread while it runs to its next synchronisation point.
 #[derive(Debug)]
 pub struct Context {
     now: Duration,
-    /// What the b-thread asked for; most ask for nothing.
+    /// The effects that the b-thread asked for; most ask for none.
     pub(crate) effects: Option<Box<Effects>>,
 }
 

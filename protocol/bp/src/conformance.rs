@@ -38,10 +38,7 @@ pub enum SuiteError {
     Syntax(#[from] serde_json::Error),
     /// The file is in a format that is not understood.
     #[error("`format` is `{found}`, expected `{FORMAT}`")]
-    Format {
-        /// What it says.
-        found: String,
-    },
+    Format { found: String },
 }
 
 /// A file of cases.
@@ -51,16 +48,16 @@ pub struct Suite {
     unsound: Vec<Finding>,
 }
 
-/// What was found about one case.
+/// The finding about one case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
     /// The case's name, or its position if it has none.
     pub case: String,
-    /// What differs from what was expected, or why the case cannot be understood.
+    /// The difference from what was expected, or the reason why the case cannot be understood.
     pub problem: String,
 }
 
-/// How a suite went; counts are of expectations.
+/// The outcome of a suite; counts are of expectations.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Report {
     /// Expectations that hold.
@@ -133,10 +130,10 @@ impl fmt::Display for Report {
 #[serde(deny_unknown_fields)]
 struct Case {
     name: String,
-    /// Where the case comes from, for readers.
+    /// The source of the case, for readers.
     #[serde(default, rename = "source")]
     _source: Option<String>,
-    /// What is special about it, for readers.
+    /// A remark, for readers.
     #[serde(default, rename = "note")]
     _note: Option<String>,
     #[serde(default)]
@@ -171,7 +168,7 @@ struct CaseBThread {
     template: bool,
 }
 
-/// What `spawn` may name, besides the case's b-threads: a list of scripts, or an object of bodies.
+/// The names for `spawn` besides the case's b-threads: a list of scripts, or an object of bodies.
 #[derive(Debug, Deserialize)]
 #[serde(untagged)]
 enum Templates {

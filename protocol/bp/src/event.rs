@@ -39,7 +39,7 @@ impl Event {
         Self(Arc::new(Body { name, keys, data: Vec::new() }))
     }
 
-    /// What a b-thread gets when the deadline of its bid passes; see [`Bid::deadline`](crate::Bid::deadline).
+    /// The event that a b-thread gets when the deadline of its bid passes; see [`Bid::deadline`](crate::Bid::deadline).
     pub fn timeout() -> Self {
         static TIMEOUT: LazyLock<Event> = LazyLock::new(|| Event::new("timeout"));
         TIMEOUT.clone()

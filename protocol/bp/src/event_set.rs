@@ -43,8 +43,8 @@ pub enum EventSet {
     },
     /// Events whose data has all of these.
     FieldIs(BTreeMap<Arc<str>, Value>),
-    /// Events whose fields `x`, `y`, `z` (metres, ENU) lie in a box, borders included; a missing `z` fits, a missing `x`
-    /// or `y` does not.
+    /// Events whose fields `x`, `y`, `z` (metres, ENU) lie in a box, borders included; a missing `z` fits, a missing
+    /// `x` or `y` does not.
     Region {
         /// The least corner.
         min: [Real; 3],
@@ -180,8 +180,8 @@ impl EventSet {
         overlap
     }
 
-    /// Whether the set may hold an event of this name, with whatever data. Errs towards yes, only where what data it needs
-    /// contradicts itself.
+    /// Whether the set may hold an event of this name, with whatever data. Errs towards yes, only where what data it
+    /// needs contradicts itself.
     pub fn may_hold_named(&self, name: &str) -> bool {
         match self {
             Self::None => false,

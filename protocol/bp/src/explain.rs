@@ -9,21 +9,21 @@ use crate::event_set::EventSet;
 
 /// Why the events of a set can or cannot happen at this moment. Proxies are named beside b-threads.
 ///
-/// When some of the events are requested or queued, blockers and waiters are those of these events; otherwise those whose
-/// sets may concern the question.
+/// When some of the events are requested or queued, blockers and waiters are those of these events; otherwise those
+/// whose sets may concern the question.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Explanation {
     /// The events asked about.
     pub question: EventSet,
-    /// Who requests which of them.
+    /// The b-threads that request any of them, each with the event.
     pub requested: Vec<(Arc<str>, Event)>,
-    /// Which of them are in the external queue, next one first.
+    /// Those in the external queue, next one first.
     pub queued: Vec<Event>,
-    /// Who blocks them, with the whole blocked set.
+    /// The b-threads that block them, with the whole blocked set.
     pub blocked: Vec<(Arc<str>, EventSet)>,
-    /// Who waits for them, with the whole awaited set.
+    /// The b-threads that wait for them, with the whole awaited set.
     pub waiting: Vec<(Arc<str>, EventSet)>,
-    /// Which of them could be selected now.
+    /// Those that could be selected now.
     pub selectable: Vec<Event>,
 }
 

@@ -1,4 +1,4 @@
-//! Who cares about an event: an index of b-threads by the names in their event sets.
+//! An index of b-threads by the names in their event sets: those that an event may concern.
 
 use std::collections::hash_map::Entry;
 

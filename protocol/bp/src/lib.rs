@@ -1,9 +1,10 @@
 //! Behavioural programming: many small b-threads that run as one program.
 //!
-//! A b-thread does not call other b-threads. At each synchronisation point it states a [`Bid`]: events it requests, waits
-//! for, blocks, and is interrupted by. The [`Program`] selects an [`Event`] that is requested by someone and blocked by no
-//! one; those who asked for it go on to their next synchronisation point, all others stay where they are. So a rule can be
-//! added to a program, or taken from it, without touching the rest (Harel, Marron, Weiss 2012; Wang 2023).
+//! A b-thread does not call other b-threads. At each synchronisation point it states a [`Bid`]: events it requests,
+//! waits for, blocks, and is interrupted by. The [`Program`] selects an [`Event`] that is requested by someone and
+//! blocked by no one; those who asked for it go on to their next synchronisation point, all others stay where they are.
+//! So a rule can be added to a program, or taken from it, without touching the rest (Harel, Marron, Weiss 2012; Wang
+//! 2023).
 //!
 //! The crate has no clock, no I/O and no global state: a program is a value that can be cloned, compared, hashed and
 //! replayed from its seed. [`EventSet`]s are data. A b-thread is a Rust type ([`BThread`]) or itself data

@@ -1,7 +1,7 @@
-//! How events and event sets are written in files.
+//! The notation of events and event sets in files.
 //!
-//! An event is its name, or `{"name": "goto", "data": {"x": 1.0}}`. A set is an event (exactly that one), a list (any of
-//! its sets), or an object; an object with several keys means all of them at once:
+//! An event is its name, or `{"name": "goto", "data": {"x": 1.0}}`. A set is an event (exactly that one), a list (any
+//! of its sets), or an object; an object with several keys means all of them at once:
 //!
 //! | key | the set of events |
 //! |---|---|
@@ -89,7 +89,7 @@ impl<'de> Visitor<'de> for EventVisitor {
     }
 }
 
-/// What has been read of an event in object form.
+/// An event in object form, as far as it has been read.
 #[derive(Default)]
 struct EventParts {
     name: Option<Arc<str>>,

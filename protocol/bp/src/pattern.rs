@@ -21,7 +21,7 @@ pub struct Pattern(Arc<Parsed>);
 struct Parsed {
     text: Arc<str>,
     wild: bool,
-    /// What the names that fit begin with, before the first star; all of a literal name.
+    /// The beginning of all names that fit, before the first star; all of a literal name.
     level: Level,
     fixed: usize,
     /// The hash of that.

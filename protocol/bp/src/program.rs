@@ -1,114 +1,34 @@
 //! Programs: b-threads that run together.
 
+mod asking;
+mod config;
+mod error;
+mod parts;
+
 use std::collections::{BTreeMap, VecDeque};
-use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
-
-use rustc_hash::FxHasher;
 
 use crate::bid::Bid;
 use crate::board::{Board, Entry, Owner};
 use crate::bthread::{AnyBThread, BThread, Context, Effects};
 use crate::event::Event;
 use crate::event_set::EventSet;
-use crate::explain::Explanation;
 use crate::index::Place;
 use crate::selection::{Names, Origin, Rival, Selection};
-use crate::strategy::Strategy;
 use crate::tie::TieBreak;
 
-/// How often an event may lose a tie before it goes first, unless configured.
-pub const PASSED_OVER_LIMIT: u32 = 16;
+pub use config::{PASSED_OVER_LIMIT, ProgramConfig};
+pub use error::ProgramError;
+pub(crate) use parts::Rest;
 
-/// How many b-threads one selection may spawn, and how often one step may fire deadlines, before that counts as endless.
+/// Spawns in one selection, or rounds of deadlines in one step, after which they count as endless.
 const RUNAWAY_LIMIT: usize = 1000;
-
-/// How a program selects. The default is the literature's: simple strategy, external events only when nothing internal is
-/// selectable, no limits but fairness in ties.
-#[derive(Clone, Debug)]
-pub struct ProgramConfig {
-    /// Which requested events may be selected.
-    pub strategy: Strategy,
-    /// Seed of the draws that break ties. The same program, inputs and seed give the same run.
-    pub seed: u64,
-    /// After this many internal selections an external event that waits gets its turn; `None`: only when nothing
-    /// internal is selectable.
-    pub externals_after: Option<u32>,
-    /// How many selections a superstep may take; `None`: any number.
-    pub settle_limit: Option<u32>,
-    /// An event that lost so many ties is taken next; `None`: ties are drawn and nothing else.
-    pub passed_over_limit: Option<u32>,
-    /// Events that proxies cannot block.
-    pub protected: EventSet,
-    /// How many requests that lost are noted with each selection, for people.
-    pub rivals: usize,
-}
-
-impl Default for ProgramConfig {
-    fn default() -> Self {
-        Self {
-            strategy: Strategy::Simple,
-            seed: 0,
-            externals_after: None,
-            settle_limit: None,
-            passed_over_limit: Some(PASSED_OVER_LIMIT),
-            protected: EventSet::None,
-            rivals: 0,
-        }
-    }
-}
-
-impl ProgramConfig {
-    /// What vehicles fly: priorities of bids, external events after at most 16 internal ones, at most 1000 selections in a
-    /// superstep; four rivals are noted with each.
-    pub fn vehicle(seed: u64) -> Self {
-        Self {
-            strategy: Strategy::SyncPriority,
-            seed,
-            externals_after: Some(16),
-            settle_limit: Some(1000),
-            rivals: 4,
-            ..Self::default()
-        }
-    }
-}
-
-/// Why a program cannot go on.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProgramError {
-    /// A superstep did not come to rest.
-    #[error("the superstep did not settle within {limit} selections; look at the b-threads that kept requesting: {}", .bthreads.join(", "))]
-    Unsettled {
-        /// The limit, from [`ProgramConfig::settle_limit`].
-        limit: u32,
-        /// Who requested the events of the superstep's second half.
-        bthreads: Vec<Arc<str>>,
-        /// What did happen.
-        selections: Vec<Selection>,
-    },
-    /// A b-thread's assertion failed; the program selects nothing more.
-    #[error("b-thread `{bthread}` failed: {message}")]
-    Failed {
-        bthread: Arc<str>,
-        /// What it said.
-        message: String,
-    },
-    /// [`Program::choose`] was asked for an event that may not be selected.
-    #[error("`{event}` is not selectable now; selectable are {selectable:?}")]
-    NotSelectable {
-        /// The event asked for.
-        event: Event,
-        /// What may be selected.
-        selectable: Vec<Event>,
-    },
-}
 
 /// A behavioural program: b-threads, the events that wait to happen, and the rules by which they do.
 ///
-/// It has no clock: time comes in with each call, as time since the run began, and must not go backwards. Two programs are
-/// equal when their b-threads, proxies and queues are; how ties will be drawn does not count.
+/// It has no clock: time comes in with each call, as time since the run began, and must not go backwards. Two programs
+/// are equal when their b-threads, proxies and queues are; how ties will be drawn does not count.
 #[derive(Clone, Debug)]
 pub struct Program {
     config: ProgramConfig,
@@ -130,15 +50,6 @@ pub struct Program {
     /// Kept between steps to save allocations.
     offers: Vec<Event>,
     listeners: Vec<Place>,
-}
-
-/// What a program holds beside its b-threads and proxies.
-#[derive(Clone, Debug)]
-pub(crate) struct Rest {
-    pub(crate) externals: VecDeque<Event>,
-    pub(crate) occurrences: VecDeque<Event>,
-    pub(crate) failure: Option<(Arc<str>, String)>,
-    pub(crate) daemon: bool,
 }
 
 /// Building and feeding a program.
@@ -184,14 +95,14 @@ impl Program {
         self.occurrences.push_back(event.into());
     }
 
-    /// Limits what may be selected here to `home`; requests for other events stay open until they occur. All events unless
-    /// set.
+    /// Limits what may be selected here to `home`; requests for other events stay open until they occur. All events
+    /// unless set.
     pub fn set_home(&mut self, home: impl Into<EventSet>) {
         self.board.home = home.into();
     }
 
-    /// States the bid of a b-thread that runs elsewhere: its requests, blocks and priority count as if it ran here. When
-    /// one of its requests is selected the bid becomes empty until it is put again.
+    /// States the bid of a b-thread that runs elsewhere: its requests, blocks and priority count as if it ran here.
+    /// When one of its requests is selected the bid becomes empty until it is put again.
     pub fn put_proxy(&mut self, name: impl Into<Arc<str>>, bid: &Bid) {
         let name = name.into();
         let place = match self.board.proxy(&name) {
@@ -211,8 +122,8 @@ impl Program {
         removed.is_some()
     }
 
-    /// Takes back what a b-thread requests at its present synchronisation point: there it waits for the same events, should
-    /// others request them.
+    /// Takes back what a b-thread requests at its present synchronisation point: there it waits for the same events,
+    /// should others request them.
     pub fn withdraw_requests(&mut self, name: &str) {
         let Some(place) = self.board.bthread(name) else { return };
         let Some(entry) = self.board.get(place) else { return };
@@ -250,8 +161,8 @@ impl Program {
         }
     }
 
-    /// Selects one event and resumes those it concerns; `None` when nothing can be selected. An assertion that fails on the
-    /// way stops the program at the next call; see [`Program::failed`].
+    /// Selects one event and resumes those it concerns; `None` when nothing can be selected. An assertion that fails on
+    /// the way stops the program at the next call; see [`Program::failed`].
     ///
     /// # Errors
     /// [`ProgramError::Failed`] when an assertion had failed before the selection.
@@ -274,8 +185,8 @@ impl Program {
     /// Steps until nothing can be selected or an assertion fails.
     ///
     /// # Errors
-    /// [`ProgramError::Unsettled`] past the configured limit; [`ProgramError::Failed`] when an assertion had failed before
-    /// anything was selected.
+    /// [`ProgramError::Unsettled`] past the configured limit; [`ProgramError::Failed`] when an assertion had failed
+    /// before anything was selected.
     pub fn superstep(&mut self, now: Duration) -> Result<Vec<Selection>, ProgramError> {
         let mut selections = Vec::new();
         loop {
@@ -383,7 +294,7 @@ impl Program {
         Selection { event, origin, requested_by, resumed, interrupted, tied_with, priority, rivals }
     }
 
-    /// What else is requested while `event` is selected.
+    /// The other requests while `event` is selected.
     fn rivals(&self, event: &Event) -> Vec<Rival> {
         let others = self.board.requests().filter(|(_, requested)| *requested != event);
         let rival = |(entry, requested): (&Entry, &Event)| Rival {
@@ -545,203 +456,7 @@ impl Program {
     }
 }
 
-/// Taking a program apart, and putting another of the same settings together: what a verifier does.
-impl Program {
-    pub(crate) fn config(&self) -> &ProgramConfig {
-        &self.config
-    }
-
-    pub(crate) fn home(&self) -> &EventSet {
-        &self.board.home
-    }
-
-    /// B-threads and proxies in the order they came.
-    pub(crate) fn entries(&self) -> impl Iterator<Item = &Entry> {
-        self.board.entries()
-    }
-
-    pub(crate) fn rest(&self) -> Rest {
-        Rest {
-            externals: self.externals.clone(),
-            occurrences: self.occurrences.clone(),
-            failure: self.failure.clone(),
-            daemon: self.daemon,
-        }
-    }
-
-    /// A program whose b-threads and proxies are at these synchronisation points.
-    pub(crate) fn assemble(&self, seats: impl Iterator<Item = (Arc<str>, Owner, Bid)>, rest: Rest) -> Self {
-        let mut program = Self::new(self.config.clone());
-        program.set_home(&self.board.home);
-        for (name, owner, bid) in seats {
-            let place = program.board.add(name, owner, 0);
-            program.board.restate(place, bid);
-        }
-        let Rest { externals, occurrences, failure, daemon } = rest;
-        Self { externals, occurrences, failure, daemon, ..program }
-    }
-
-    /// Lets an event happen that may be selected: an internal one, or the external one at a position in the queue.
-    pub(crate) fn select(&mut self, event: Event, external: Option<usize>) {
-        let origin = match external {
-            Some(at) => {
-                self.externals.remove(at);
-                Origin::External
-            }
-            None => Origin::Internal,
-        };
-        self.deliver(event, origin, 0, Duration::ZERO);
-    }
-
-    /// Resumes a b-thread as if its deadline had passed: what one does who explores all runs, for whom time has no length.
-    pub fn fire_deadline(&mut self, bthread: &str, now: Duration) {
-        let Some(place) = self.board.bthread(bthread) else { return };
-        self.resume(place, &Event::timeout(), now);
-        self.start_added(now);
-        self.compact();
-    }
-}
-
-/// Asking a program.
-impl Program {
-    /// The b-threads that run, by name, with their bids and how many synchronisation points each has reached, the present
-    /// one included. A name that is used again goes on counting.
-    pub fn bids(&self) -> impl Iterator<Item = (&str, &Bid, u64)> {
-        self.board.bthreads().map(|(entry, _)| (&*entry.name, &entry.bid, entry.sync))
-    }
-
-    /// The bid of one b-thread that runs.
-    pub fn bid(&self, name: &str) -> Option<&Bid> {
-        self.board.get(self.board.bthread(name)?).map(|entry| &entry.bid)
-    }
-
-    /// The proxies by name, with what is left of their bids.
-    pub fn proxies(&self) -> impl Iterator<Item = (&str, &Bid)> {
-        self.board.proxies().map(|entry| (&*entry.name, &entry.bid))
-    }
-
-    /// A number that changes whenever a b-thread states a bid or ends.
-    pub fn revision(&self) -> u64 {
-        self.revision
-    }
-
-    /// When the next deadline passes.
-    pub fn next_deadline(&self) -> Option<Duration> {
-        self.board.next_deadline()
-    }
-
-    /// What may be selected: the internal events that tie, or else the external event whose turn it is.
-    pub fn selectable(&self) -> Vec<Event> {
-        let mut offers = Vec::new();
-        if !self.external_has_turn() || self.next_external().is_none() {
-            self.board.offers(&mut offers);
-        }
-        if offers.is_empty() {
-            offers.extend(self.next_external().and_then(|at| self.externals.get(at)).cloned());
-        }
-        offers
-    }
-
-    /// Whether a b-thread requests something here and the b-threads among themselves allow nothing at all. Time and other
-    /// nodes still help: while a deadline is open, or where only a proxy blocks, the program is stalled, not deadlocked.
-    pub fn is_deadlocked(&self) -> bool {
-        let stuck = |event: &Event| self.board.is_blocked_by_bthread(event);
-        self.occurrences.is_empty()
-            && self.board.next_deadline().is_none()
-            && self.board.requests().any(|(entry, _)| !entry.is_proxy())
-            && self.board.requests().all(|(_, event)| stuck(event))
-            && self.externals.iter().filter(|event| self.board.is_home(event)).all(stuck)
-    }
-
-    /// The b-thread whose assertion failed first, and what it said.
-    pub fn failed(&self) -> Option<(&str, &str)> {
-        self.failure.as_ref().map(|(bthread, message)| (&**bthread, &**message))
-    }
-
-    /// Whether the program has b-threads.
-    pub fn has_bthreads(&self) -> bool {
-        self.board.has_bthreads()
-    }
-
-    /// Whether the program, when it has nothing to do, waits for external events. A driver that runs a program to its end
-    /// heeds it; the program itself does not.
-    pub fn is_daemon(&self) -> bool {
-        self.daemon
-    }
-
-    /// Events that wait for their turn, next one first.
-    pub fn external_queue(&self) -> impl ExactSizeIterator<Item = &Event> {
-        self.externals.iter()
-    }
-
-    /// Who requests, blocks and waits for the events of a set: `program.explain("uav/3/takeoff")`.
-    pub fn explain(&self, question: impl Into<EventSet>) -> Explanation {
-        Explanation::of(question.into(), &self.board, self.externals.iter(), self.selectable())
-    }
-
-    /// Who blocks `event` now, b-threads and proxies, in the order they came.
-    pub fn blockers(&self, event: &Event) -> impl Iterator<Item = &str> {
-        self.board.entries().filter(move |entry| self.board.blocks(entry, event)).map(|entry| &*entry.name)
-    }
-
-    /// The state of one b-thread, if it runs and is a `T`.
-    pub fn state_of<T: BThread>(&self, name: &str) -> Option<&T> {
-        match &self.board.get(self.board.bthread(name)?)?.owner {
-            Owner::BThread(bthread) => bthread.as_any().downcast_ref(),
-            Owner::Proxy => None,
-        }
-    }
-
-    /// The states of all b-threads, by name, to be shown or recorded.
-    ///
-    /// # Errors
-    /// When a state has no JSON form, such as a map whose keys are not texts.
-    pub fn states_json(&self) -> Result<serde_json::Value, serde_json::Error> {
-        let states =
-            self.board.bthreads().map(|(entry, bthread)| Ok((entry.name.to_string(), bthread.to_json()?)));
-        states.collect::<Result<serde_json::Map<_, _>, _>>().map(serde_json::Value::Object)
-    }
-
-    /// A hash of all that equality compares. The same in every run of the same build.
-    pub fn state_digest(&self) -> u64 {
-        let mut hasher = FxHasher::default();
-        self.hash(&mut hasher);
-        hasher.finish()
-    }
-}
-
-impl PartialEq for Program {
-    fn eq(&self, other: &Self) -> bool {
-        let same_bthread =
-            |((a, state), (b, other)): ((&Entry, &dyn AnyBThread), (&Entry, &dyn AnyBThread))| {
-                a.name == b.name && state.equals(other)
-            };
-        self.externals == other.externals
-            && self.occurrences == other.occurrences
-            && self.failure == other.failure
-            && self.board.bthreads().count() == other.board.bthreads().count()
-            && self.board.bthreads().zip(other.board.bthreads()).all(same_bthread)
-            && self.proxies().eq(other.proxies())
-    }
-}
-
-impl Eq for Program {}
-
-impl Hash for Program {
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        self.externals.hash(state);
-        self.occurrences.hash(state);
-        for (entry, bthread) in self.board.bthreads() {
-            entry.name.hash(state);
-            bthread.hash_into(state);
-        }
-        for proxy in self.proxies() {
-            proxy.hash(state);
-        }
-    }
-}
-
-/// Who requested the events in the second half of a superstep: those that keep it going.
+/// The b-threads that requested the events in the second half of a superstep: those that keep it going.
 fn busy_bthreads(selections: &[Selection]) -> Vec<Arc<str>> {
     let recent = selections.get(selections.len() / 2..).unwrap_or_default();
     let mut bthreads: Vec<Arc<str>> =

@@ -3,7 +3,7 @@
 //! A scope is a claim about names only. It indexes waiters and blockers, tells which homes a set may concern, and finds
 //! what `explain` should show. A set's scopes may claim too much, never too little.
 
-/// How much of an event's name a scope fixes.
+/// The part of an event's name that a scope fixes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Level {
     /// Nothing: any event.

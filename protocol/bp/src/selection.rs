@@ -11,7 +11,7 @@ use crate::event::Event;
 /// Names of b-threads. Most events move one or two, which need no allocation.
 pub type Names = SmallVec<[Arc<str>; 2]>;
 
-/// Where a selected event came from.
+/// The source of a selected event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Origin {
@@ -37,7 +37,6 @@ impl fmt::Display for Origin {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Selection {
     pub event: Event,
-    /// Where it came from.
     pub origin: Origin,
     /// B-threads and proxies that requested it. The proxies among them are served: their bids are now empty.
     pub requested_by: Names,
@@ -45,11 +44,11 @@ pub struct Selection {
     pub resumed: Names,
     /// B-threads that it ended.
     pub interrupted: Names,
-    /// How many other events could have been selected in its place.
+    /// The number of other events that could have been selected in its place.
     pub tied_with: usize,
     /// The highest priority at which it was requested.
     pub priority: Option<i32>,
-    /// What else was requested, as far as [`ProgramConfig::rivals`](crate::ProgramConfig::rivals) allows; of an internal
+    /// The other requests, as far as [`ProgramConfig::rivals`](crate::ProgramConfig::rivals) allows; of an internal
     /// event only.
     pub rivals: Vec<Rival>,
 }

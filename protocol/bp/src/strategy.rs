@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How a program chooses among requested and unblocked events.
+/// The rule by which a program chooses among requested and unblocked events.
 ///
 /// Whatever the strategy, equal events merge, and what is left undecided is a tie, drawn from the run's seed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]

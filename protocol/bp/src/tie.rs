@@ -10,7 +10,7 @@ pub(crate) struct TieBreak {
     seed: u64,
     draws: u64,
     passed_over_limit: Option<u32>,
-    /// How often each event has lost a tie since it was last selected or first requested.
+    /// The ties that each event has lost since it was last selected or first requested.
     passed_over: FxHashMap<Event, u32>,
 }
 

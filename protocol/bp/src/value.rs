@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 
 /// A 64-bit float that can be compared and hashed.
 ///
-/// Numbers compare as numbers, so `-0.0` is `0.0`. A NaN equals itself; NaNs stand at the ends, as in [`f64::total_cmp`].
+/// Numbers compare as numbers, so `-0.0` is `0.0`. A NaN equals itself; NaNs stand at the ends, as in
+/// [`f64::total_cmp`].
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Real(f64);

@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use skein_bp::{Bid, Event, EventSet, Value};
 
-use crate::NodeName;
+use crate::name::NodeName;
 
-/// What all b-threads bid at a node at one moment, those elsewhere that have a say here included.
+/// The bids of all b-threads at a node at one moment, those elsewhere that have a say here included.
 ///
-/// It is for people, and for programs that explain to people: nothing is decided by it. So that it stays small it is cut
-/// to the quotas below, and says so.
+/// It is for people, and for programs that explain to people: nothing is decided by it. So that it stays small it is
+/// cut to the quotas below, and says so.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Board {
     pub node: NodeName,
@@ -18,21 +18,21 @@ pub struct Board {
     pub at: Duration,
     /// The node's own b-threads by name, then those elsewhere.
     pub rows: Vec<BoardRow>,
-    /// How many rows there was no room for.
+    /// The number of rows for which there was no room.
     pub left_out: u32,
 }
 
-/// What one b-thread bids.
+/// The bid of one b-thread.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardRow {
     /// The b-thread: `navigation`, or `ground/main#hold` for one elsewhere.
     pub bthread: String,
-    /// What it requests, and who blocks that.
+    /// Its requests, and who blocks them.
     pub requests: Vec<BoardRequest>,
-    /// What it waits for; not known of b-threads elsewhere.
+    /// The events it waits for; not known of b-threads elsewhere.
     pub waits: EventSet,
     pub blocks: EventSet,
-    /// What ends it; not known of b-threads elsewhere.
+    /// The events that end it; not known of b-threads elsewhere.
     pub interrupts: EventSet,
     /// The priority of its requests.
     pub priority: Option<i32>,
@@ -47,14 +47,14 @@ pub struct BoardRow {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardRequest {
     pub event: Event,
-    /// Who blocks it here, by name. An event of this home that nobody blocks may be selected.
+    /// The b-threads that block it here. An event of this home that nobody blocks may be selected.
     pub blocked_by: Vec<String>,
 }
 
 /// The lease of a remote bid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoardLease {
-    /// How long ago the bid was renewed.
+    /// The time since the bid was renewed.
     pub age: Duration,
     /// After what age it lapses.
     pub length: Duration,
@@ -85,7 +85,7 @@ impl Board {
         Self { node, incarnation, at, rows, left_out }
     }
 
-    /// What a b-thread of this name bids here.
+    /// The bid of a b-thread of this name here.
     #[must_use]
     pub fn row(&self, bthread: &str) -> Option<&BoardRow> {
         self.rows.iter().find(|row| row.bthread == bthread)

@@ -1,13 +1,19 @@
-//! What a node is told about itself and the fleet.
+//! The settings of a node.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use skein_bp::EventSet;
 
-use crate::{Authority, Kept, NodeName, Roster};
+use crate::home::authority::Authority;
+use crate::joint::roster::Roster;
+use crate::kept::Kept;
+use crate::name::NodeName;
 
-/// What a [`Node`](crate::Node) is told when it is made.
+/// The shortest lease.
+pub(crate) const LEAST_LEASE: Duration = Duration::from_millis(10);
+
+/// The settings of a [`Node`](crate::Node): itself and the fleet.
 #[derive(Clone, Debug)]
 pub struct NodeConfig {
     /// Its own name.
@@ -16,7 +22,8 @@ pub struct NodeConfig {
     pub incarnation: u64,
     /// Every member of the fleet; its own name may be among them or not. Others are not listened to.
     pub roster: Vec<NodeName>,
-    /// How long this node's bids hold, and it counts as alive, without renewal; 1 s unless set, at least 10 ms.
+    /// The time for which this node's bids hold, and it counts as alive, without renewal; 1 s unless set, at least 10
+    /// ms.
     pub lease: Duration,
     /// The longest lease granted to others. As long, a restarted home keeps its `guarded` events back.
     pub longest_lease: Duration,
@@ -24,27 +31,27 @@ pub struct NodeConfig {
     pub safety: EventSet,
     /// Events that others may request and nobody from afar can block: `<name>/order` unless set.
     pub gateway: EventSet,
-    /// Who of the others may request and block what here (G7): everybody everything unless set.
+    /// The rights of the others to request and block events here (G7): everybody may do everything unless set.
     pub authority: Authority,
     /// Events that this home selects, after a start, only once it knows every member's blocks: from their records,
     /// or because the longest lease has passed.
     pub guarded: EventSet,
-    /// Who decides on `swarm/...` events in the first term (G8); none: there are no such events.
+    /// The nodes that decide on `swarm/...` events in the first term (G8); none: there are no such events.
     pub joint: Option<Roster>,
     /// Whether the driver saves what must be kept before it sends: without that, blocks that are to outlive their
     /// holders are refused.
     pub durable: bool,
-    /// What a former life of this node has kept.
+    /// The promises of a former life of this node.
     pub kept: Kept,
     /// The band that priorities of remote bids are brought into.
     pub remote_priority: RangeInclusive<i32>,
-    /// How many occurrences are kept for those who missed them; at least 1.
+    /// The number of occurrences that are kept for those who missed them; at least 1.
     pub history: usize,
     /// Selections in one step after which the program counts as unsettled.
     pub settle_limit: usize,
     /// The promise that this node breaks on purpose.
     #[cfg(feature = "mutants")]
-    pub mutant: Option<crate::Mutant>,
+    pub mutant: Option<crate::mutant::Mutant>,
 }
 
 impl NodeConfig {
@@ -71,5 +78,20 @@ impl NodeConfig {
             #[cfg(feature = "mutants")]
             mutant: None,
         }
+    }
+
+    /// The same settings, brought into their ranges; the roster is of others only, in order.
+    pub(crate) fn in_range(mut self) -> Self {
+        let lease = u64::try_from(self.lease.max(LEAST_LEASE).as_millis()).unwrap_or(u64::MAX);
+        self.lease = Duration::from_millis(lease);
+        self.longest_lease = self.longest_lease.max(self.lease);
+        self.roster.retain(|member| *member != self.name);
+        self.roster.sort();
+        self.roster.dedup();
+        self
+    }
+
+    pub(crate) fn lease_ms(&self) -> u64 {
+        u64::try_from(self.lease.as_millis()).unwrap_or(u64::MAX)
     }
 }

@@ -1,15 +1,15 @@
-//! Why something can or cannot happen here, remote b-threads included.
+//! The explanation why something can or cannot happen at a node, remote b-threads included.
 
 use std::fmt;
 
 use skein_bp::Explanation;
 
-use crate::RemoteParty;
+use crate::home::table::RemoteParty;
 
-/// The program's explanation, and who stands behind the proxies in it.
+/// The program's explanation, and the remote b-threads behind the proxies in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeExplanation {
-    /// Who requests, blocks and waits for the events asked about; remote b-threads as `node#bthread`.
+    /// The b-threads that request, block and wait for the events asked about; remote ones as `node#bthread`.
     pub local: Explanation,
     /// The remote b-threads among them.
     pub remote: Vec<RemoteParty>,

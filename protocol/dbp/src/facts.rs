@@ -5,7 +5,7 @@
 
 use skein_bp::{Event, EventSet};
 
-use crate::NodeName;
+use crate::name::NodeName;
 
 /// The block of `bthread` at its synchronisation point `sync` is acknowledged by every home it concerns (G3).
 ///

@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use crate::Occurrence;
+use crate::channel::stream::REPAIR_CHUNK;
+use crate::message::Occurrence;
 
 /// The latest occurrences of a home, in order.
 #[derive(Clone, Debug)]
@@ -46,8 +47,9 @@ impl History {
         Some(self.kept.iter().skip(usize::try_from(skipped).unwrap_or(usize::MAX)))
     }
 
-    /// Those kept of the numbers `from..=to`.
-    pub(crate) fn range(&self, from: u64, to: u64) -> impl Iterator<Item = &Occurrence> {
+    /// The occurrences kept of the numbers `from..=to`, as many as are repeated at once.
+    pub(crate) fn repeat(&self, from: u64, to: u64) -> impl Iterator<Item = &Occurrence> {
+        let to = to.min(from.saturating_add(REPAIR_CHUNK - 1));
         self.kept.iter().filter(move |occurrence| (from..=to).contains(&occurrence.seq))
     }
 }

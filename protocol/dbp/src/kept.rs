@@ -1,11 +1,15 @@
-//! What a node must not forget when it restarts.
+//! The promises of a node that outlive it.
 
 use serde::{Deserialize, Serialize};
 use skein_bp::{Event, EventSet};
 
-use crate::{NodeName, Roster};
+use crate::joint::roster::Roster;
+use crate::name::NodeName;
 
-/// What a node has promised and must keep on disk.
+/// Last chunk of the event by which an authority lifts a block that outlives its holder: data `node` and `bthread`.
+pub const LIFT: &str = "lift";
+
+/// The promises that a node must keep on disk.
 ///
 /// A driver saves what [`Node::take_unsaved`](crate::Node::take_unsaved) gives *before* it sends
 /// [`Node::take_outgoing`](crate::Node::take_outgoing), and hands the saved value to the node's next life in

@@ -1,11 +1,11 @@
 //! Behavioural programming across nodes, without I/O.
 //!
-//! Each node runs its own b-program ([`skein_bp::Program`]). Every event has one *home*, the node named by its first two
-//! chunks: `uav/3/takeoff` is selected on `uav/3` and nowhere else. A b-thread that requests or blocks an event of
+//! Each node runs its own b-program ([`skein_bp::Program`]). Every event has one *home*, the node named by its first
+//! two chunks: `uav/3/takeoff` is selected on `uav/3` and nowhere else. A b-thread that requests or blocks an event of
 //! another node is represented there by a proxy, whose bid travels as state under a lease ([`BidRecord`]). What has
 //! occurred travels back as a numbered stream ([`Occurrence`]) and is told to b-threads before anything else.
 //!
-//! What holds under loss, delay, repetition, partition and crash:
+//! These promises hold under loss, delay, repetition, partition and crash:
 //! - order (G1): a home's occurrences are seen in order; a hole is repaired or becomes a `gap`;
 //! - cause (G2): an event occurs only while a bid in its home's table requests it;
 //! - confirmed block (G3): after `confirmed` a blocked event does not occur until the block is withdrawn, or its holder
@@ -44,13 +44,16 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod authority;
 mod board;
+mod channel;
+mod clock;
 mod config;
+mod error;
 mod explain;
 pub mod facts;
-mod held_blocks;
+mod guest;
 mod history;
+mod home;
 mod joint;
 mod kept;
 mod message;
@@ -58,19 +61,19 @@ mod message;
 mod mutant;
 mod name;
 mod node;
-mod outbox;
-mod peers;
-mod roster;
-mod stalls;
-mod stream;
-mod table;
+mod routes;
+mod run;
 pub mod verify;
 
-pub use authority::{Authority, Grant, Role, SCRIPT};
 pub use board::{Board, BoardLease, BoardRequest, BoardRow};
+pub use channel::peers::Peer;
 pub use config::NodeConfig;
+pub use error::NodeError;
 pub use explain::NodeExplanation;
-pub use kept::{Kept, KeptBlock};
+pub use home::authority::{Authority, Grant, Role, SCRIPT};
+pub use home::table::RemoteParty;
+pub use joint::roster::{ROSTER, Roster, RosterError, SWARM};
+pub use kept::{Kept, KeptBlock, LIFT};
 pub use message::{
     BidAck, BidRecord, JointWord, Message, Occurrence, OnLoss, Presence, Recipient, Refusal, RefusalReason,
     RemoteBid, Repair, ServedRequest,
@@ -78,7 +81,5 @@ pub use message::{
 #[cfg(feature = "mutants")]
 pub use mutant::Mutant;
 pub use name::{NodeName, NodeNameError, first_two_chunks, is_chunk};
-pub use node::{BoardChange, ChannelMove, Happened, LIFT, Node, NodeError, NodeStats};
-pub use peers::Peer;
-pub use roster::{ROSTER, Roster, RosterError, SWARM};
-pub use table::RemoteParty;
+pub use node::{Node, NodeStats};
+pub use run::{BoardChange, ChannelMove, Happened};

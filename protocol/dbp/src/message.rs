@@ -1,4 +1,4 @@
-//! What nodes say to one another.
+//! The messages between nodes.
 //!
 //! Bids travel as *state*: a lost, repeated or overtaken record does no harm, because the newest one says all.
 //! Occurrences travel as a numbered *stream* with a history behind it.
@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use skein_bp::{Event, EventSet};
 
-use crate::NodeName;
+use crate::name::NodeName;
 
 /// Whom a message is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,7 +21,7 @@ pub enum Recipient {
 /// Any message between nodes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Message {
-    /// What a node's b-threads bid for events of one home; to that home.
+    /// The bids of a node's b-threads for events of one home; to that home.
     Bid(BidRecord),
     /// A home has taken in a record; to its sender.
     Ack(BidAck),
@@ -69,7 +69,7 @@ pub struct BidRecord {
     pub term: u64,
     /// Highest number of that term's decisions that the bidder had applied.
     pub decided: u64,
-    /// How long the bids hold without renewal, in milliseconds.
+    /// The time for which the bids hold without renewal, in milliseconds.
     pub lease_ms: u64,
     /// One bid for each b-thread that requests or blocks something there.
     pub bids: Vec<RemoteBid>,
@@ -83,21 +83,21 @@ pub struct RemoteBid {
     pub sync: u64,
     /// The events it requests, all of this home.
     pub requests: Vec<Event>,
-    /// What it blocks; only the home's own events count.
+    /// The events that it blocks; only the home's own count.
     pub block: EventSet,
-    /// The synchronisation point since which it has blocked no less than that: `sync` or an earlier one. What an authority
-    /// lifts stays lifted while the b-thread moves on with it.
+    /// The synchronisation point since which it has blocked no less than that: `sync` or an earlier one. What an
+    /// authority lifts stays lifted while the b-thread moves on with it.
     pub block_since: u64,
     /// Its priority under the `sync_priority` strategy.
     pub priority: Option<i32>,
-    /// What becomes of the block when the bidder is lost.
+    /// The fate of the block when the bidder is lost.
     pub on_loss: OnLoss,
 }
 
 impl RemoteBid {
-    /// How many bids one node may have at a home.
+    /// The most bids of one node at a home.
     const MOST_BIDS: usize = 256;
-    /// How many events one bid may request.
+    /// The most events that one bid may request.
     const MOST_REQUESTS: usize = 64;
 
     /// Whether a home takes it in at this place, counted from 0, among its sender's bids there.
@@ -107,7 +107,7 @@ impl RemoteBid {
     }
 }
 
-/// What becomes of a block when its holder is lost.
+/// The fate of a block when its holder is lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnLoss {
     /// It lapses with the lease.
@@ -224,7 +224,8 @@ pub struct Occurrence {
     pub incarnation: u64,
     /// Its number there: 1, 2, 3, ... without holes.
     pub seq: u64,
-    /// For a joint event the term in which it was decided, and then the number counts the term's decisions (G8); else 0.
+    /// For a joint event the term in which it was decided, and then the number counts the term's decisions (G8); else
+    /// 0.
     pub term: u64,
     pub event: Event,
     /// The remote requests it served.
@@ -257,7 +258,7 @@ pub struct Repair {
 pub struct Presence {
     pub node: NodeName,
     pub incarnation: u64,
-    /// How long it has been up. Who was there before it wants its stream from the start.
+    /// The time for which it has been up. A node that was there before wants its stream from the start.
     pub up: Duration,
     /// The number of its latest occurrence, 0 before the first.
     pub latest_seq: u64,
@@ -265,11 +266,11 @@ pub struct Presence {
     pub oldest_seq: u64,
     /// Without a word for so long, it counts as lost; in milliseconds.
     pub lease_ms: u64,
-    /// Where it stands with joint events; none if it takes part in none.
+    /// Its word on joint events; none if it takes part in none.
     pub joint: Option<JointWord>,
 }
 
-/// What a sign of life says about joint events (G8).
+/// A node's word on joint events, in its sign of life (G8).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JointWord {
     /// The term that the node is in.

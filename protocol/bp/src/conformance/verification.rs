@@ -1,4 +1,4 @@
-//! What a verifier must find in a case's program.
+//! The verdicts that a verifier must reach about a case's program.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

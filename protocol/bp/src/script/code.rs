@@ -27,9 +27,9 @@ pub(super) struct Code {
 pub(super) struct Scope {
     pub(super) set: EventSet,
     pub(super) within: Option<Duration>,
-    /// Where the script goes on behind it.
+    /// The step behind it.
     pub(super) end: usize,
-    /// How many loops it stands in.
+    /// The number of loops it stands in.
     pub(super) loop_depth: usize,
 }
 
@@ -209,7 +209,8 @@ pub(super) fn reference(value: &Value) -> Option<&str> {
     }
 }
 
-/// A request in which each `$key` is replaced by what the event `last` has under `key`, or left out where it has nothing.
+/// A request in which each `$key` is replaced by what the event `last` has under `key`, or left out where it has
+/// nothing.
 pub(super) fn refer(request: &Event, last: Option<&Event>) -> Event {
     let data = request.data().filter_map(|(key, value)| match reference(value) {
         Some(wanted) => Some((key, last?.get(wanted)?)),

@@ -15,17 +15,21 @@
 //! | `{"on_interrupt_enqueue": ["$event", ..]}` | from here on, enqueues these when interrupted; `$event` is what interrupts |
 //! | `{"stop": true}` | ends |
 //!
-//! Events and sets are written as in [`crate::notation`]. A datum `"$x"` of a requested event stands for the datum `x` of the
-//! event that ended the last sync; `timeout` is the event by which time ends a block.
+//! Events and sets are written as in [`crate::notation`]. A datum `"$x"` of a requested event stands for the datum `x`
+//! of the event that ended the last sync; `timeout` is the event by which time ends a block.
 //!
-//! A [`ScriptFile`] is a script for people: with a name, a purpose and parameters, and without the ops that only a whole
-//! program should have.
+//! A [`ScriptFile`] is a script for people: with a name, a purpose and parameters, and without the ops that only a
+//! whole program should have.
 
 mod code;
+mod fault;
 mod file;
+mod filler;
 mod op;
 mod parameter;
+mod reading;
 mod samples;
+mod soundness;
 mod trial;
 
 use std::collections::BTreeMap;
@@ -39,15 +43,18 @@ use crate::bid::Bid;
 use crate::bthread::{BThread, Context};
 use crate::event::Event;
 use code::{Code, Step};
-pub use file::{Assignment, BoundScript, MAX_OPS, MAX_TEXT, ScriptFile, ScriptFileError};
+pub use fault::ScriptFileError;
+pub use file::{Assignment, BoundScript, ScriptFile};
+pub use filler::MAX_OPS;
 pub use op::{Op, Reply, ScriptSource, Spawn, Times};
 pub use parameter::{Argument, Parameter, ParameterKind};
+pub use reading::MAX_TEXT;
 pub use trial::{Trial, TrialFault};
 
-/// How many ops a script may run between two synchronisation points.
+/// The most ops that a script may run between two synchronisation points.
 const OPS_BETWEEN_SYNCS: usize = 100_000;
 
-/// Why a script was refused.
+/// The reason for which a script was refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScriptError {
@@ -137,8 +144,8 @@ impl Script {
         Self { code, library, at: 0, rounds, on_interrupt: None, deadlines, last: None }
     }
 
-    /// The bid of every synchronisation point, in the order in which they are written. What a bid takes from an event shows
-    /// as `$key`.
+    /// The bid of every synchronisation point, in the order in which they are written. What a bid takes from an event
+    /// shows as `$key`.
     pub fn bids(&self) -> impl Iterator<Item = &Bid> {
         self.code.steps.iter().filter_map(|step| match step {
             Step::Sync { bid, .. } => Some(bid),

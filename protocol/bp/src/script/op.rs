@@ -25,9 +25,9 @@ pub enum Op {
     },
     /// Runs the body until an event of `set` happens or so much time has passed, and goes on behind it.
     Until {
-        /// What ends it at any synchronisation point inside.
+        /// The events that end it at any synchronisation point inside.
         set: EventSet,
-        /// How long it may take.
+        /// The time it may take.
         within: Option<Duration>,
         body: Vec<Op>,
     },
@@ -68,7 +68,7 @@ impl Op {
     }
 }
 
-/// How often a loop runs.
+/// The number of rounds of a loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Times {
     Count(u32),
@@ -76,7 +76,7 @@ pub enum Times {
     Forever,
 }
 
-/// What `spawn` adds.
+/// The b-thread that `spawn` adds.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Spawn {
@@ -92,7 +92,6 @@ pub enum Spawn {
 pub struct ScriptSource {
     /// Name of the b-thread.
     pub name: String,
-    /// What it does.
     pub body: Vec<Op>,
     /// Priority under [`Strategy::BThreadPriority`](crate::Strategy::BThreadPriority).
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -256,7 +255,7 @@ impl<'de> Visitor<'de> for OpVisitor {
     }
 }
 
-/// What has been read of an op that has a body.
+/// An op that has a body, as far as it has been read.
 #[derive(Default)]
 struct Block {
     times: Option<Times>,

@@ -1,14 +1,14 @@
-//! What a script leaves open until it is used.
+//! Parameters: the parts of a script that are left open until it is used.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// How many points a route may have.
+/// The most points of a route.
 const MOST_POINTS: usize = 32;
 
-/// What a parameter may be.
+/// The kind of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ParameterKind {
@@ -75,15 +75,14 @@ impl fmt::Display for Argument {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
-    /// What it is for, in one line.
+    /// Its purpose, in one line.
     pub about: String,
-    /// What it may be.
     #[serde(rename = "type")]
     pub kind: ParameterKind,
     /// The unit of a number, such as `s` or `%`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// What it is unless given; without a default it must be given.
+    /// Its value unless given; without a default it must be given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub default: Option<Argument>,
     /// The least number.
@@ -95,7 +94,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// What is wrong with the declaration itself.
+    /// The fault of the declaration itself.
     pub(super) fn fault(&self) -> Option<String> {
         let is_number = matches!(self.kind, ParameterKind::Number | ParameterKind::Integer);
         if !is_number && (self.min.is_some() || self.max.is_some() || self.unit.is_some()) {

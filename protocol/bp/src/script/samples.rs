@@ -6,11 +6,11 @@ use crate::event::Event;
 use crate::event_set::EventSet;
 use crate::value::{Real, Value};
 
-/// How many events one set may give.
+/// Most events that one set gives.
 const MOST_PER_SET: usize = 64;
-/// What stands for a chunk, a text or a name that is left open.
+/// Stands for a chunk, a text or a name that is left open.
 const ANY: &str = "any";
-/// How far beside a bound a number is tried.
+/// The distance beside a bound at which a number is tried.
 const BESIDE: f64 = 1.0;
 
 /// Events in and beside the sets.
@@ -30,7 +30,7 @@ fn branches(set: &EventSet) -> Vec<&EventSet> {
     }
 }
 
-/// What a set distinguishes events by.
+/// The marks by which a set distinguishes events.
 #[derive(Default)]
 struct Facets {
     whole: Vec<Event>,

@@ -1,7 +1,7 @@
 //! Tries a script before it runs: alone, in a world where everything that it waits for may happen at any time.
 //!
-//! What the script shall not do there is keep something from ever happening again, or go round by itself without waiting
-//! for anybody. Blocks inside one another that end in time are tried with the innermost ending first.
+//! What the script shall not do there is keep something from ever happening again, or go round by itself without
+//! waiting for anybody. Blocks inside one another that end in time are tried with the innermost ending first.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,16 +14,16 @@ use crate::event_set::EventSet;
 use crate::program::{Program, ProgramConfig};
 use crate::verify::{Graph, GraphEdge, Timers, Verifier};
 
-/// What a trial has found out.
+/// The findings of a trial.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trial {
-    /// How many states the script and its world have, as far as they were looked at.
+    /// The number of states of the script and its world, as far as they were looked at.
     pub states: usize,
     /// Whether all were looked at.
     pub is_complete: bool,
 }
 
-/// What is wrong with a script, and the shortest way there.
+/// A fault of a script, and the shortest way there.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrialFault {
@@ -31,15 +31,15 @@ pub enum TrialFault {
     #[error("it blocks `{event}` for ever{}; give it a `within_s`, or something to wait for that can happen", after(.trace))]
     NeverLetsGo {
         event: Event,
-        /// What happens before.
+        /// The events before.
         trace: Vec<Event>,
     },
     /// It goes round on its own requests.
     #[error("it goes round without waiting for anything: {}{}", list(.cycle), after(.trace))]
     Spins {
-        /// What it requests again and again.
+        /// The events that it requests again and again.
         cycle: Vec<Event>,
-        /// What happens before.
+        /// The events before.
         trace: Vec<Event>,
     },
 }
@@ -175,7 +175,7 @@ impl<'a> Paths<'a> {
     }
 }
 
-/// What happens on the way from `start` to `goal`, of which each state knows the edge that led to it.
+/// The events on the way from `start` to `goal`, of which each state knows the edge that led to it.
 fn walk_back(came: &BTreeMap<u32, &GraphEdge>, start: u32, goal: u32) -> Vec<Event> {
     let mut events = Vec::new();
     let mut state = goal;

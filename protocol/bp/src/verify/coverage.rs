@@ -1,4 +1,4 @@
-//! What of a program a verification has met.
+//! The parts of a program that a verification has met.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::bid::Bid;
 use crate::event::Event;
 
-/// What was met in the states that were looked at.
+/// The b-threads and events that were met in the states that were looked at.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Coverage {
     /// The b-threads, by name.
@@ -15,10 +15,10 @@ pub struct Coverage {
     pub happened: BTreeSet<Event>,
 }
 
-/// What was met of one b-thread.
+/// The states and bids of one b-thread that were met.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BThreadCoverage {
-    /// How many states it was in.
+    /// The number of states it was in.
     pub states: usize,
     /// The bids that it stated, each once, in the order in which they were met.
     pub bids: Vec<Bid>,

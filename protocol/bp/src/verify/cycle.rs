@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 
 use rustc_hash::FxHashMap;
 
-use super::model::{Model, Moves};
+use super::model::{Model, Moves, names};
 use super::report::{Inspection, Violation, ViolationKind};
-use super::search::names;
+use super::rows::Rows;
 use super::store::Store;
 
 /// The states in which someone is hot, and the moves among them. States are counted anew, in the order of the search.
@@ -15,43 +15,19 @@ use super::store::Store;
 pub(super) struct HotGraph {
     /// Numbers in the search.
     states: Vec<u32>,
-    /// Who is hot in each, by number, sorted.
+    /// The hot b-threads of each, by number, sorted.
     hot: Rows<u32>,
     /// Labels and targets.
     moves: Rows<(u32, u32)>,
-    /// What is due in each, and may not be so for ever along a cycle.
+    /// The things that are due in each, and may not be so for ever along a cycle.
     due: Rows<u32>,
-    /// What moves of a label bring about of it, for labels of those that bring about anything.
+    /// Those of them that moves of a label bring about, for labels of moves that bring about any.
     brought_about: FxHashMap<u32, Vec<u32>>,
 }
 
-/// How many moves may be looked at to find a shorter cycle than the first.
+/// Most moves that are looked at to find a shorter cycle than the first.
 const EFFORT: usize = 20_000_000;
 const UNSEEN: u32 = u32::MAX;
-
-/// Lists of different lengths in one.
-#[derive(Debug)]
-struct Rows<T> {
-    ends: Vec<usize>,
-    items: Vec<T>,
-}
-
-impl<T> Rows<T> {
-    fn new() -> Self {
-        Self { ends: Vec::new(), items: Vec::new() }
-    }
-
-    fn close(&mut self) {
-        self.ends.push(self.items.len());
-    }
-
-    fn get(&self, row: u32) -> &[T] {
-        let at = row as usize;
-        let start = at.checked_sub(1).and_then(|before| self.ends.get(before)).copied().unwrap_or(0);
-        let end = self.ends.get(at).copied().unwrap_or(start);
-        self.items.get(start..end).unwrap_or_default()
-    }
-}
 
 impl HotGraph {
     /// Of the states in which somebody must not stay for ever.
@@ -67,9 +43,9 @@ impl HotGraph {
     fn of<M: Model>(model: &mut M, store: &Store, is_hot: impl Fn(&mut M, &[u32], &mut Vec<u32>)) -> Self {
         let mut graph = Self {
             states: Vec::new(),
-            hot: Rows::new(),
-            moves: Rows::new(),
-            due: Rows::new(),
+            hot: Rows::default(),
+            moves: Rows::default(),
+            due: Rows::default(),
             brought_about: FxHashMap::default(),
         };
         let mut place = vec![UNSEEN; store.len()];
@@ -81,9 +57,9 @@ impl HotGraph {
                 hot.sort_unstable();
                 *place = graph.states.len() as u32;
                 graph.states.push(number);
-                graph.hot.items.append(&mut hot);
+                graph.hot.words.append(&mut hot);
                 graph.hot.close();
-                model.due(store.state(number), &mut graph.due.items);
+                model.due(store.state(number), &mut graph.due.words);
                 graph.due.close();
             }
         }
@@ -95,7 +71,7 @@ impl HotGraph {
                 // States beyond a bound are not in the store.
                 let target = store.find(target).and_then(|number| place.get(number as usize)).copied();
                 let Some(place) = target.filter(|place| *place != UNSEEN) else { continue };
-                graph.moves.items.push((label, place));
+                graph.moves.words.push((label, place));
                 let brings_about = model.brings_about(label);
                 if !brings_about.is_empty() {
                     graph.brought_about.entry(label).or_insert_with(|| brings_about.to_vec());
@@ -117,7 +93,7 @@ impl HotGraph {
             Inspection::HotSystem | Inspection::Unsettled => {
                 let lasso = self.lasso(store, |_| true)?;
                 let mut hot: Vec<u32> =
-                    lasso.states.iter().flat_map(|state| self.hot.get(*state)).copied().collect();
+                    lasso.states.iter().flat_map(|state| self.hot.get(*state as usize)).copied().collect();
                 hot.sort_unstable();
                 hot.dedup();
                 let kind = match inspection {
@@ -127,7 +103,7 @@ impl HotGraph {
                 Some(lasso.violation(model, store, self, kind, &hot))
             }
             Inspection::HotRun(group) => {
-                let mut members: Vec<u32> = self.hot.items.clone();
+                let mut members: Vec<u32> = self.hot.words.clone();
                 members.sort_unstable();
                 members.dedup();
                 members.retain(|number| group.contains(&model.bthread(*number)));
@@ -138,13 +114,14 @@ impl HotGraph {
                 Some(violation)
             }
             Inspection::HotBThread => {
-                let mut bthreads = self.hot.items.clone();
+                let mut bthreads = self.hot.words.clone();
                 bthreads.sort_unstable();
                 bthreads.dedup();
                 let lassos = bthreads.iter().filter_map(|one| self.lasso(store, |hot| hot.contains(one)));
                 let lasso = lassos.min_by_key(|lasso| lasso.stem + lasso.labels.len())?;
-                let always =
-                    |number: &&u32| lasso.states.iter().all(|state| self.hot.get(*state).contains(number));
+                let always = |number: &&u32| {
+                    lasso.states.iter().all(|state| self.hot.get(*state as usize).contains(number))
+                };
                 let hot: Vec<u32> = bthreads.iter().filter(always).copied().collect();
                 Some(lasso.violation(model, store, self, ViolationKind::HotBThread, &hot))
             }
@@ -159,7 +136,7 @@ impl HotGraph {
         for root in 0..self.states.len() as u32 {
             path.push(root);
             while let Some(state) = path.last().copied() {
-                let targets = || self.moves.get(state).iter().map(|(_, target)| *target);
+                let targets = || self.moves.get(state as usize).iter().map(|(_, target)| *target);
                 let before = path.len();
                 path.extend(targets().filter(|target| get(&longest, *target as usize) == UNSEEN));
                 if path.len() == before {
@@ -175,7 +152,7 @@ impl HotGraph {
     /// The shortest way into and round a cycle all of whose states are hot in the sense of `is_hot`.
     fn lasso(&self, store: &Store, is_hot: impl Fn(&[u32]) -> bool) -> Option<Lasso> {
         let count = self.states.len() as u32;
-        let within: Vec<bool> = (0..count).map(|state| is_hot(self.hot.get(state))).collect();
+        let within: Vec<bool> = (0..count).map(|state| is_hot(self.hot.get(state as usize))).collect();
         let mut component = self.components(&within);
         self.leave_out_unjust(&mut component);
         let mut best: Option<Lasso> = None;
@@ -219,7 +196,7 @@ impl HotGraph {
                     next += 1;
                     stack.push(state);
                 }
-                let target = self.moves.get(state).iter().skip(move_at).map(|(_, target)| *target);
+                let target = self.moves.get(state as usize).iter().skip(move_at).map(|(_, target)| *target);
                 let mut descended = false;
                 for (skipped, target) in target.enumerate() {
                     let to = target as usize;
@@ -244,8 +221,8 @@ impl HotGraph {
                 if get(&low, at) == get(&index, at) {
                     let root_at = stack.iter().rposition(|other| *other == state).unwrap_or(0);
                     let members = stack.split_off(root_at);
-                    let cyclic =
-                        members.len() > 1 || self.moves.get(state).iter().any(|(_, target)| *target == state);
+                    let cyclic = members.len() > 1
+                        || self.moves.get(state as usize).iter().any(|(_, target)| *target == state);
                     for member in members {
                         set(&mut on_stack, member as usize, false);
                         if cyclic {
@@ -262,10 +239,11 @@ impl HotGraph {
         component
     }
 
-    /// Leaves out the components in which something is due everywhere and never comes about: so it is along each of their
-    /// cycles too. Of any other component all states and moves together make a cycle in which nothing is due for ever.
+    /// Leaves out the components in which something is due everywhere and never comes about: so it is along each of
+    /// their cycles too. Of any other component all states and moves together make a cycle in which nothing is due for
+    /// ever.
     fn leave_out_unjust(&self, component: &mut [u32]) {
-        if self.due.items.is_empty() {
+        if self.due.words.is_empty() {
             return;
         }
         let mut sizes: FxHashMap<u32, usize> = FxHashMap::default();
@@ -273,11 +251,12 @@ impl HotGraph {
         let states = || (0_u32..).zip(component.iter().copied()).filter(|(_, own)| *own != UNSEEN);
         for (state, own) in states() {
             *sizes.entry(own).or_default() += 1;
-            self.due.get(state).iter().for_each(|one| *due.entry((own, *one)).or_default() += 1);
+            self.due.get(state as usize).iter().for_each(|one| *due.entry((own, *one)).or_default() += 1);
         }
         due.retain(|(own, _), count| sizes.get(own) == Some(count));
         for (state, own) in states() {
-            let inside = self.moves.get(state).iter().filter(|(_, to)| get(component, *to as usize) == own);
+            let inside =
+                self.moves.get(state as usize).iter().filter(|(_, to)| get(component, *to as usize) == own);
             let brought_about = inside.filter_map(|(label, _)| self.brought_about.get(label)).flatten();
             for one in brought_about {
                 due.remove(&(own, *one));
@@ -287,15 +266,15 @@ impl HotGraph {
         component.iter_mut().filter(|own| unjust.contains(own)).for_each(|own| *own = UNSEEN);
     }
 
-    /// What is still due of `pending` after a move of this label to `target`.
+    /// The part of `pending` that is still due after a move of this label to `target`.
     fn still_due(&self, pending: &[u32], label: u32, target: u32) -> Vec<u32> {
         let brought_about = self.brought_about.get(&label).map_or(&[][..], Vec::as_slice);
-        let there = self.due.get(target);
+        let there = self.due.get(target as usize);
         pending.iter().copied().filter(|one| there.contains(one) && !brought_about.contains(one)).collect()
     }
 
-    /// The shortest way of less than `room` moves from `entry` back to it, within its component, along which all that is
-    /// due at `entry` comes about, is forestalled or is at some state not due.
+    /// The shortest way of less than `room` moves from `entry` back to it, within its component, along which all that
+    /// is due at `entry` comes about, is forestalled or is at some state not due.
     fn round(
         &self,
         entry: u32,
@@ -306,14 +285,14 @@ impl HotGraph {
     ) -> Option<Lasso> {
         let own = get(component, entry as usize);
         let mut came_by: FxHashMap<Place, (Place, u32)> = FxHashMap::default();
-        let start = (entry, self.due.get(entry).to_vec());
+        let start = (entry, self.due.get(entry as usize).to_vec());
         let mut queue = VecDeque::from([(start.clone(), 0_usize)]);
         while let Some((place, length)) = queue.pop_front() {
             if length + 1 >= room {
                 return None;
             }
             let (state, pending) = &place;
-            for (label, target) in self.moves.get(*state) {
+            for (label, target) in self.moves.get(*state as usize) {
                 *effort += 1;
                 if get(component, *target as usize) != own {
                     continue;

@@ -4,7 +4,7 @@ use super::model::{Model, Moves};
 use super::report::{Violation, ViolationKind};
 use super::store::Store;
 
-/// Which states may have ways out that the search has not seen.
+/// The states that may have ways out that the search has not seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Unexplored {
     None,
@@ -39,7 +39,7 @@ pub(super) fn out_of_reach<M: Model>(
 
 /// For each state those that a move leads from.
 struct Ways {
-    /// Where the list of each state begins in `from`.
+    /// The place in `from` at which the list of each state begins.
     starts: Vec<u32>,
     from: Vec<u32>,
 }

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use super::exploration::{Exploration, Limits};
 use super::model::{Model, Moves};
 use super::product::Product;
 use super::report::{Inspection, Omission, Progress};
-use super::search::{Exploration, Limits};
 use crate::board::Owner;
 use crate::event::Event;
 
@@ -19,7 +19,7 @@ pub struct Graph {
     pub states: Vec<GraphState>,
     /// By the state they leave, then in a fixed order.
     pub edges: Vec<GraphEdge>,
-    /// What is missing.
+    /// The missing parts.
     #[serde(skip)]
     pub not_covered: Vec<Omission>,
 }
@@ -97,8 +97,8 @@ impl Graph {
         dot
     }
 
-    /// The graph as JSON: `{"states": [..], "edges": [{"from": 0, "event": .., "to": 1}, ..]}`, with events written as in
-    /// [`crate::notation`].
+    /// The graph as JSON: `{"states": [..], "edges": [{"from": 0, "event": .., "to": 1}, ..]}`, with events written as
+    /// in [`crate::notation`].
     ///
     /// # Errors
     /// When an event's data has no JSON form, such as a key that is not a text.
@@ -113,11 +113,11 @@ impl GraphState {
             Owner::BThread(bthread) => bthread.to_json().unwrap_or_else(|_| format!("{bthread:?}").into()),
             Owner::Proxy => serde_json::to_value(bid).unwrap_or_else(|_| format!("{bid:?}").into()),
         };
-        let locals = product.locals(state);
-        let hot = product.locals(state).filter(|local| local.bid.is_hot());
+        let locals = product.locals.of(state);
+        let hot = product.locals.of(state).filter(|local| local.bid.is_hot());
         Self {
             bthreads: locals.map(|local| (local.name.clone(), of_owner(&local.owner, &local.bid))).collect(),
-            queue: product.queue(state).cloned().collect(),
+            queue: product.view(state).external_queue().cloned().collect(),
             hot: hot.map(|local| local.name.clone()).collect(),
             failure: product.failure(state).map(|(bthread, message)| format!("{bthread}: {message}")),
             deadlock: product.fault(state, stuck, &[Inspection::Deadlock]).is_some(),

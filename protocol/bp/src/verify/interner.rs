@@ -34,7 +34,7 @@ impl<T: Clone + Eq + Hash> Interner<T> {
         self.values.get(number as usize)
     }
 
-    /// How many values there are.
+    /// The number of values.
     pub fn len(&self) -> usize {
         self.values.len()
     }

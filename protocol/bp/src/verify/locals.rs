@@ -20,7 +20,7 @@ pub(super) type LocalId = u32;
 /// In place of a local state: the b-thread has ended.
 pub(super) const ENDED: LocalId = 0;
 
-/// What a local state is moved by.
+/// The cause that moves a local state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Cause {
     /// An event, by number, that it requests, waits for or is interrupted by.
@@ -28,7 +28,7 @@ pub(super) enum Cause {
     Deadline,
 }
 
-/// Where a local state goes.
+/// The outcome of a cause for a local state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outcome {
     /// The next local state, or [`ENDED`].
@@ -51,7 +51,7 @@ pub(super) struct Local {
     pub(super) requests: Vec<u32>,
     /// Whether it stands for the world, so that what it requests counts as external.
     pub(super) is_world: bool,
-    /// Which rule the bid breaks, and how.
+    /// The rule that the bid breaks, and how.
     pub(super) fault: Option<(String, String)>,
     /// Known outcomes, sorted by cause.
     outcomes: Vec<(Cause, Outcome)>,
@@ -63,7 +63,7 @@ impl Local {
     }
 }
 
-/// What a program's settings say about events.
+/// The settings of a program about events.
 #[derive(Clone, Debug)]
 pub(super) struct Rules {
     pub(super) strategy: Strategy,
@@ -73,7 +73,7 @@ pub(super) struct Rules {
     pub(super) home: EventSet,
     /// The b-threads that stand for the world.
     pub(super) world: BTreeSet<Arc<str>>,
-    /// What must hold of every bid.
+    /// The rules for every bid.
     pub(super) of_bids: Vec<BidRule>,
 }
 
@@ -124,6 +124,11 @@ impl Locals {
 
     pub(super) fn get(&self, id: LocalId) -> Option<&Local> {
         self.locals.get((id as usize).checked_sub(1)?)
+    }
+
+    /// The local states of a product state.
+    pub(super) fn of<'a>(&'a self, state: &'a [u32]) -> impl Iterator<Item = &'a Local> + use<'a> {
+        state.iter().skip(1).filter_map(|id| self.get(*id))
     }
 
     /// The slot of a local state. Earlier names have lower ones.
@@ -207,7 +212,7 @@ impl Locals {
         id
     }
 
-    /// Where a local state goes at `cause`.
+    /// The outcome of `cause` for a local state.
     pub(super) fn outcome(&mut self, id: LocalId, cause: Cause) -> Outcome {
         let Some(local) = self.get(id) else { return Outcome { next: ENDED, plain: true } };
         match local.outcomes.binary_search_by_key(&cause, |(known, _)| *known) {

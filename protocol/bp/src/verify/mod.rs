@@ -1,9 +1,10 @@
 //! The verifier: looks at every run of a program, and shows the shortest one that goes wrong.
 //!
-//! All runs of a program together are the paths through a graph. A state is where each b-thread is, and what waits in the
-//! queues; an edge is an event that may be selected. The verifier builds the graph of all that the program can reach, by
-//! the rules of [`Program`](crate::Program) and with every tie taken both ways, and looks for [`Inspection`]s. An ordinary
-//! way to state a requirement is a b-thread that watches and calls [`Context::fail`](crate::Context::fail).
+//! All runs of a program together are the paths through a graph. A state is where each b-thread is, and what waits in
+//! the queues; an edge is an event that may be selected. The verifier builds the graph of all that the program can
+//! reach, by the rules of [`Program`](crate::Program) and with every tie taken both ways, and looks for
+//! [`Inspection`]s. An ordinary way to state a requirement is a b-thread that watches and calls
+//! [`Context::fail`](crate::Context::fail).
 //!
 //! ```
 //! use skein_bp::script::{Op, Script};
@@ -30,13 +31,16 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Time stands still at the start of the run: [`Context::now`](crate::Context::now) is zero. Whether deadlines fire is a
-//! setting, [`Timers`]. What belongs to scheduling and not to the program plays no part: the seed, fairness in ties, the
-//! limit on selections. Where [`ProgramConfig::externals_after`](crate::ProgramConfig::externals_after) is set, an external
-//! event may come at any time.
+//! Time stands still at the start of the run: [`Context::now`](crate::Context::now) is zero. Whether deadlines fire is
+//! a setting, [`Timers`]. What belongs to scheduling and not to the program plays no part: the seed, fairness in ties,
+//! the limit on selections. Where [`ProgramConfig::externals_after`](crate::ProgramConfig::externals_after) is set, an
+//! external event may come at any time.
 
+mod bits;
 mod coverage;
 mod cycle;
+mod exploration;
+mod frontier;
 mod goals;
 mod graph;
 mod interner;
@@ -58,16 +62,18 @@ use crate::bid::Bid;
 use crate::event::Event;
 use crate::program::Program;
 pub use coverage::{BThreadCoverage, Coverage};
+pub use exploration::Limits;
+pub use frontier::Search;
 pub use graph::{Graph, GraphEdge, GraphState};
 pub use interner::Interner;
 pub use model::{Model, Moves};
 use product::Product;
 pub use report::{Fault, Inspection, Omission, Progress, Report, Violation, ViolationKind};
+pub use search::check;
 use search::check_by_two;
-pub use search::{Limits, Search, check};
 pub use view::View;
 
-/// What becomes of deadlines.
+/// The treatment of deadlines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Timers {
     /// They never fire. A program that only waits for one has not come to rest for good, and is not deadlocked.
@@ -75,33 +81,26 @@ pub enum Timers {
     Never,
     /// Any open one may fire at any time, also before an earlier one. In a trace this is `timeout{bthread: ".."}`.
     AnyTime,
-    /// Any open one may fire whenever nothing internal can be selected: a program that runs to rest much faster than its
-    /// deadlines are far.
+    /// Any open one may fire whenever nothing internal can be selected: a program that runs to rest much faster than
+    /// its deadlines are far.
     AtRest,
 }
 
-/// Something that must hold in every state.
-#[derive(Clone)]
-struct Invariant {
+/// A requirement with a name, of which only that is shown.
+struct Rule<F: ?Sized> {
     name: String,
-    holds: Arc<InvariantFn>,
+    holds: Arc<F>,
 }
 
-/// Something that must hold of every bid, whatever the others state.
-#[derive(Clone)]
-struct BidRule {
-    name: String,
-    holds: Arc<BidRuleFn>,
-}
+/// Holds in every state.
+type Invariant = Rule<dyn Fn(&View<'_>) -> Result<(), String> + Send + Sync>;
+/// Holds of every bid, whatever the others state.
+type BidRule = Rule<dyn Fn(&str, &Bid) -> Result<(), String> + Send + Sync>;
+/// Must stay within reach.
+type Goal = Rule<dyn Fn(&View<'_>) -> bool + Send + Sync>;
+type OnProgress = Box<dyn FnMut(&Progress)>;
 
-/// What must stay within reach.
-#[derive(Clone)]
-struct Goal {
-    name: String,
-    is_met: Arc<GoalFn>,
-}
-
-/// What a verification asks of a program besides its [`Inspection`]s, and who is not part of the program.
+/// The requirements of a verification besides its [`Inspection`]s, and the b-threads that are not part of the program.
 #[derive(Clone, Debug, Default)]
 struct Requirements {
     world: BTreeSet<Arc<str>>,
@@ -109,11 +108,6 @@ struct Requirements {
     invariants: Vec<Invariant>,
     goals: Vec<Goal>,
 }
-
-type InvariantFn = dyn Fn(&View<'_>) -> Result<(), String> + Send + Sync;
-type BidRuleFn = dyn Fn(&str, &Bid) -> Result<(), String> + Send + Sync;
-type GoalFn = dyn Fn(&View<'_>) -> bool + Send + Sync;
-type OnProgress = Box<dyn FnMut(&Progress)>;
 
 /// A verification of one program, to be set up and run.
 pub struct Verifier {
@@ -178,12 +172,12 @@ impl Verifier {
         goal: impl Into<String>,
         is_met: impl Fn(&View<'_>) -> bool + Send + Sync + 'static,
     ) -> Self {
-        self.requirements.goals.push(Goal { name: goal.into(), is_met: Arc::new(is_met) });
+        self.requirements.goals.push(Goal { name: goal.into(), holds: Arc::new(is_met) });
         self
     }
 
-    /// The b-threads that stand for the world around the program: what they request may happen whenever an external event
-    /// may, whatever its priority.
+    /// The b-threads that stand for the world around the program: what they request may happen whenever an external
+    /// event may, whatever its priority.
     #[must_use]
     pub fn world<N: Into<Arc<str>>>(mut self, bthreads: impl IntoIterator<Item = N>) -> Self {
         self.requirements.world.extend(bthreads.into_iter().map(Into::into));
@@ -211,14 +205,14 @@ impl Verifier {
         self
     }
 
-    /// How many threads may work at it; 2 unless set, and more do not help. The outcome is the same.
+    /// Sets the number of threads; 2 unless set, and more do not help. The outcome is the same.
     #[must_use]
     pub fn threads(mut self, threads: usize) -> Self {
         self.threads = threads;
         self
     }
 
-    /// What becomes of deadlines.
+    /// Sets the treatment of deadlines.
     #[must_use]
     pub fn timers(mut self, timers: Timers) -> Self {
         self.timers = timers;
@@ -308,20 +302,14 @@ impl BidRule {
     }
 }
 
-impl fmt::Debug for BidRule {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("BidRule").field(&self.name).finish()
+impl<F: ?Sized> Clone for Rule<F> {
+    fn clone(&self) -> Self {
+        Self { name: self.name.clone(), holds: self.holds.clone() }
     }
 }
 
-impl fmt::Debug for Goal {
+impl<F: ?Sized> fmt::Debug for Rule<F> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Goal").field(&self.name).finish()
-    }
-}
-
-impl fmt::Debug for Invariant {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Invariant").field(&self.name).finish()
+        f.debug_tuple("Rule").field(&self.name).finish()
     }
 }

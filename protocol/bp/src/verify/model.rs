@@ -1,15 +1,16 @@
-//! What a search needs to know of a system: its states, its moves, and what is wrong with a state.
+//! A system to be searched: its states, its moves, and what is wrong with a state.
 
 use std::sync::Arc;
 
-use super::rows::{Rows, hash};
-use super::{Fault, Inspection};
 use crate::event::Event;
+use crate::verify::report::{Fault, Inspection};
+use crate::verify::rows::{Rows, hash};
 
 /// A system of states and moves.
 ///
-/// A state is a short row of numbers, each of which stands for a part that the model knows in full; equal rows must mean
-/// equal states, and unequal rows unequal ones. So equality of states is exact and cheap, however large the parts are.
+/// A state is a short row of numbers, each of which stands for a part that the model knows in full; equal rows must
+/// mean equal states, and unequal rows unequal ones. So equality of states is exact and cheap, however large the parts
+/// are.
 pub trait Model {
     /// The state in which every run begins.
     fn start(&mut self) -> Vec<u32>;
@@ -17,7 +18,7 @@ pub trait Model {
     /// Adds every move that is possible in `state`, in a fixed order.
     fn expand(&mut self, state: &[u32], moves: &mut Moves);
 
-    /// What is wrong with `state` by one of the `inspections`; `stuck`: it has no moves. Those of cycles are not asked
+    /// The fault of `state` by one of the `inspections`; `stuck`: it has no moves. Those of cycles are not asked
     /// here.
     fn fault(&self, state: &[u32], stuck: bool, inspections: &[Inspection]) -> Option<Fault>;
 
@@ -29,14 +30,15 @@ pub trait Model {
         let _ = (state, bthreads);
     }
 
-    /// Adds the numbers of what is due in `state`, each once: it comes about sooner or later unless a move forestalls it. A
-    /// run in which something is due from some state on and never comes about is none (justice in the sense of Manna and
-    /// Pnueli 1992).
+    /// Adds the numbers of what is due in `state`, each once: it comes about sooner or later unless a move forestalls
+    /// it. A run in which something is due from some state on and never comes about is none (justice in the sense of
+    /// Manna and Pnueli 1992).
     fn due(&mut self, state: &[u32], due: &mut Vec<u32>) {
         let _ = (state, due);
     }
 
-    /// What comes about, or is forestalled, with a move of this label, by the numbers that [`Model::due`] gives.
+    /// The things that come about, or are forestalled, with a move of this label, by the numbers that [`Model::due`]
+    /// gives.
     fn brings_about(&self, label: u32) -> &[u32] {
         let _ = label;
         &[]
@@ -58,6 +60,11 @@ pub trait Model {
 
     /// The event that a move of this label shows in a trace.
     fn event(&self, label: u32) -> Event;
+}
+
+/// The names of b-threads, given by number.
+pub(super) fn names<M: Model>(model: &M, numbers: &[u32]) -> Vec<Arc<str>> {
+    numbers.iter().map(|number| model.bthread(*number)).collect()
 }
 
 /// Moves: labels, and the states they lead to.
@@ -95,7 +102,7 @@ impl Moves {
         self.close();
     }
 
-    /// How many moves there are.
+    /// The number of moves.
     pub fn len(&self) -> usize {
         self.labels.len()
     }

@@ -4,16 +4,22 @@
 //! states. B-threads are functions of state and event, so each local move is run once and remembered, and a move of the
 //! product is put together from remembered ones. A move that spawns, enqueues or fails is handed to [`Program`] itself.
 
+mod faults;
+mod open;
+
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::interner::Interner;
-use super::locals::{Cause, ENDED, Kind, Local, Locals, Rules};
-use super::model::{Model, Moves};
-use super::{Coverage, Fault, Goal, Inspection, Invariant, Requirements, Timers, View, ViolationKind};
 use crate::event::Event;
 use crate::program::{Program, Rest};
-use crate::strategy::Strategy;
+use crate::verify::bits::{has, ones};
+use crate::verify::coverage::Coverage;
+use crate::verify::interner::Interner;
+use crate::verify::locals::{Cause, ENDED, Kind, Local, Locals, Rules};
+use crate::verify::model::{Model, Moves};
+use crate::verify::report::{Fault, Inspection};
+use crate::verify::view::View;
+use crate::verify::{Goal, Invariant, Requirements, Timers};
 
 /// Set in the labels of moves by deadline; the rest of the label is a slot.
 const DEADLINE: u32 = 1 << 31;
@@ -23,7 +29,7 @@ const DEADLINE: u32 = 1 << 31;
 pub(super) struct Product {
     /// The program before its first selection.
     program: Program,
-    locals: Locals,
+    pub(super) locals: Locals,
     rests: Interner<Beside>,
     timers: Timers,
     feed: Vec<Event>,
@@ -46,7 +52,7 @@ struct OrderWatch {
     varies: bool,
 }
 
-/// What a product state holds beside local states.
+/// The part of a product state beside local states.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Beside {
     /// The external queue, as event numbers.
@@ -55,7 +61,7 @@ struct Beside {
     failure: Option<(Arc<str>, String)>,
     /// Whether the program takes what is left of the feed.
     daemon: bool,
-    /// How many events of the feed were taken.
+    /// The number of events of the feed that were taken.
     fed: usize,
 }
 
@@ -119,7 +125,7 @@ impl Product {
         }
     }
 
-    /// What of the program was met so far.
+    /// The parts of the program that were met so far.
     pub(super) fn coverage(&self) -> Coverage {
         let mut coverage = Coverage::default();
         for (local, causes) in self.locals.all() {
@@ -142,19 +148,8 @@ impl Product {
         self.rests.get(*state.first()?)
     }
 
-    pub(super) fn locals<'a>(&'a self, state: &'a [u32]) -> impl Iterator<Item = &'a Local> {
-        state.iter().skip(1).filter_map(|id| self.locals.get(*id))
-    }
-
-    /// The events in the external queue.
-    pub(super) fn queue<'a>(&'a self, state: &'a [u32]) -> impl Iterator<Item = &'a Event> {
-        let numbers = self.beside(state).map_or(&[][..], |beside| &beside.externals);
-        numbers.iter().filter_map(|number| self.locals.events.get(*number))
-    }
-
-    /// Whose assertion has failed, and what it said.
-    pub(super) fn failure(&self, state: &[u32]) -> Option<(&Arc<str>, &str)> {
-        self.beside(state)?.failure.as_ref().map(|(bthread, message)| (bthread, &**message))
+    pub(super) fn view<'a>(&'a self, state: &'a [u32]) -> View<'a> {
+        View::new(&self.locals, state, self.beside(state).map_or(&[], |beside| &beside.externals))
     }
 
     /// The row of a program's state, of whose feed so much was taken.
@@ -184,13 +179,13 @@ impl Product {
     fn program_of(&self, state: &[u32]) -> Program {
         let beside = self.beside(state);
         let rest = Rest {
-            externals: self.queue(state).cloned().collect(),
+            externals: self.view(state).external_queue().cloned().collect(),
             occurrences: beside.map(|b| b.occurrences.iter().cloned().collect()).unwrap_or_default(),
             failure: beside.and_then(|beside| beside.failure.clone()),
             daemon: beside.is_some_and(|beside| beside.daemon),
         };
         let seats =
-            self.locals(state).map(|local| (local.name.clone(), local.owner.clone(), local.bid.clone()));
+            self.locals.of(state).map(|local| (local.name.clone(), local.owner.clone(), local.bid.clone()));
         self.program.assemble(seats, rest)
     }
 
@@ -205,65 +200,6 @@ impl Product {
         // A failure is part of the state.
         let _ = program.synchronise(Duration::ZERO);
         self.row_of(&program, self.fed(state))
-    }
-
-    /// Fills `scratch.blocked`, and `scratch.open` with the internal events that may be selected.
-    fn find_open(&mut self, state: &[u32]) {
-        let Scratch { blocked, open, own, .. } = &mut self.scratch;
-        let locals = &self.locals;
-        let ids = state.get(1..).unwrap_or_default();
-        union(blocked, locals.width(), ids.iter().map(|id| locals.bits(*id, Kind::Blocks)));
-        own.clear();
-        own.extend(ids.iter().filter(|id| !locals.get(**id).is_some_and(|local| local.is_world)));
-        let ids = own;
-        match locals.rules.strategy {
-            Strategy::Simple => {
-                union(open, locals.width(), ids.iter().map(|id| locals.bits(*id, Kind::Requests)));
-                open.iter_mut().zip(&*blocked).for_each(|(open, blocked)| *open &= !blocked);
-            }
-            Strategy::Ordered => {
-                let first =
-                    |local: &Local| local.requests.iter().copied().find(|event| !has(blocked, *event));
-                union(open, locals.width(), std::iter::empty());
-                for event in ids.iter().filter_map(|id| locals.get(*id)).filter_map(first) {
-                    if let Some(word) = open.get_mut(event as usize / 64) {
-                        *word |= 1 << (event % 64);
-                    }
-                }
-            }
-            Strategy::SyncPriority | Strategy::BThreadPriority => {
-                let is_open = |id: &&u32| {
-                    locals.bits(**id, Kind::Requests).iter().zip(&*blocked).any(|(r, b)| r & !b != 0)
-                };
-                let rank = |id: &u32| locals.get(*id).and_then(|local| local.rank);
-                let best = ids.iter().filter(is_open).map(rank).max();
-                let foremost = ids.iter().filter(|id| Some(rank(id)) == best);
-                union(open, locals.width(), foremost.map(|id| locals.bits(*id, Kind::Requests)));
-                open.iter_mut().zip(&*blocked).for_each(|(open, blocked)| *open &= !blocked);
-            }
-        }
-    }
-
-    /// Fills `scratch.open` with what the world requests and nobody blocks. Needs `scratch.blocked`.
-    fn find_open_to_world(&mut self, state: &[u32]) {
-        let Scratch { blocked, open, .. } = &mut self.scratch;
-        let locals = &self.locals;
-        let ids = state.iter().skip(1);
-        let world = ids.filter(|id| locals.get(**id).is_some_and(|local| local.is_world));
-        union(open, locals.width(), world.map(|id| locals.bits(*id, Kind::Requests)));
-        open.iter_mut().zip(&*blocked).for_each(|(open, blocked)| *open &= !blocked);
-    }
-
-    /// The position in the queue of the external event whose turn it is. Needs `scratch.blocked`.
-    fn next_external(&self, state: &[u32]) -> Option<usize> {
-        if state.len() < 2 {
-            return None;
-        }
-        let home = |event: u32| {
-            self.locals.events.get(event).is_some_and(|event| self.locals.rules.home.contains(event))
-        };
-        let queue = &self.beside(state)?.externals;
-        queue.iter().position(|event| !has(&self.scratch.blocked, *event) && home(*event))
     }
 
     /// Adds the move of an internal event, or of the external one at a position in the queue.
@@ -377,7 +313,7 @@ impl Product {
     /// Gives a daemon that has come to rest events of its feed until one can be selected, and adds that move.
     fn feed(&mut self, state: &[u32], moves: &mut Moves) {
         let Some(beside) = self.beside(state) else { return };
-        if !beside.daemon || !self.locals(state).any(|local| !local.is_proxy()) {
+        if !beside.daemon || !self.locals.of(state).any(|local| !local.is_proxy()) {
             return;
         }
         let mut beside = beside.clone();
@@ -396,66 +332,6 @@ impl Product {
                 return self.select(&fed, event, Some(at), moves);
             }
         }
-    }
-
-    /// Whether the b-threads among themselves allow nothing, as [`Program::is_deadlocked`] has it.
-    fn is_deadlocked(&self, state: &[u32]) -> bool {
-        let mut blocked = Vec::new();
-        let ids = state.get(1..).unwrap_or_default();
-        let own = |id: &&u32| self.locals.get(**id).is_some_and(|local| !local.is_proxy());
-        union(
-            &mut blocked,
-            self.locals.width(),
-            ids.iter().filter(own).map(|id| self.locals.bits(*id, Kind::Blocks)),
-        );
-        let stuck = |event: &u32| has(&blocked, *event);
-        let home = |event: &&u32| {
-            self.locals.events.get(**event).is_some_and(|e| self.locals.rules.home.contains(e))
-        };
-        let Some(beside) = self.beside(state) else { return false };
-        self.locals(state).any(|local| !local.is_proxy() && !local.requests.is_empty())
-            && self.locals(state).flat_map(|local| &local.requests).all(stuck)
-            && beside.externals.iter().filter(home).all(stuck)
-    }
-
-    fn fault_by(&self, inspection: &Inspection, state: &[u32], stuck: bool) -> Option<Fault> {
-        let names = |is: &dyn Fn(&Local) -> bool| -> Vec<Arc<str>> {
-            self.locals(state).filter(|local| is(local)).map(|local| local.name.clone()).collect()
-        };
-        let failure = self.failure(state);
-        let at_rest =
-            stuck && failure.is_none() && !self.locals(state).any(|l| l.bid.given_deadline().is_some());
-        match inspection {
-            Inspection::FailedAssertion => failure.map(|(bthread, message)| Fault {
-                kind: ViolationKind::FailedAssertion { message: message.to_owned() },
-                violators: vec![bthread.clone()],
-            }),
-            Inspection::Deadlock if at_rest && self.is_deadlocked(state) => Some(Fault {
-                kind: ViolationKind::Deadlock,
-                violators: names(&|local| !local.is_proxy() && !local.requests.is_empty()),
-            }),
-            Inspection::HotTermination if at_rest => {
-                let violators = names(&|local| local.bid.is_hot());
-                (!violators.is_empty()).then_some(Fault { kind: ViolationKind::HotTermination, violators })
-            }
-            _ => None,
-        }
-    }
-
-    fn broken_by_bid(&self, state: &[u32]) -> Option<Fault> {
-        let (name, (rule, message)) =
-            self.locals(state).find_map(|local| Some((&local.name, local.fault.as_ref()?)))?;
-        let kind = ViolationKind::Invariant { invariant: rule.clone(), message: message.clone() };
-        Some(Fault { kind, violators: vec![name.clone()] })
-    }
-
-    fn broken_invariant(&self, state: &[u32]) -> Option<Fault> {
-        let view = View::new(self, state);
-        self.invariants.iter().find_map(|invariant| {
-            let message = (invariant.holds)(&view).err()?;
-            let kind = ViolationKind::Invariant { invariant: invariant.name.clone(), message };
-            Some(Fault { kind, violators: Vec::new() })
-        })
     }
 }
 
@@ -512,7 +388,7 @@ impl Model for Product {
         self.find_open(state);
         let open = &self.scratch.open;
         let is_open = |local: &&Local| local.requests.iter().any(|event| has(open, *event));
-        bthreads.extend(self.locals(state).filter(|l| !l.is_world).filter(is_open).map(|l| l.slot));
+        bthreads.extend(self.locals.of(state).filter(|l| !l.is_world).filter(is_open).map(|l| l.slot));
     }
 
     fn goals(&self) -> Vec<String> {
@@ -520,11 +396,11 @@ impl Model for Product {
     }
 
     fn meets(&self, goal: usize, state: &[u32]) -> bool {
-        self.goals.get(goal).is_none_or(|goal| (goal.is_met)(&View::new(self, state)))
+        self.goals.get(goal).is_none_or(|goal| (goal.holds)(&self.view(state)))
     }
 
     fn hot(&self, state: &[u32], bthreads: &mut Vec<u32>) {
-        bthreads.extend(self.locals(state).filter(|local| local.bid.is_hot()).map(|local| local.slot));
+        bthreads.extend(self.locals.of(state).filter(|local| local.bid.is_hot()).map(|local| local.slot));
     }
 
     fn bthread(&self, number: u32) -> Arc<str> {
@@ -547,29 +423,4 @@ fn push(moves: &mut Moves, label: u32, state: &[u32], changes: &[(usize, u32)], 
     let changed = |at: usize| changes.iter().find(|(place, _)| *place == at).map(|(_, word)| *word);
     let row = state.iter().enumerate().map(|(at, word)| (at, changed(at).unwrap_or(*word)));
     moves.push(label, row.filter(|(at, word)| *at == 0 || *word != ENDED).map(|(_, word)| word));
-}
-
-/// The places of the ones in a word, lowest first.
-fn ones(mut word: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lowest = word.trailing_zeros() as usize;
-        (word != 0).then(|| {
-            word &= word - 1;
-            lowest
-        })
-    })
-}
-
-/// Whether an event is in a set of bits.
-fn has(bits: &[u64], event: u32) -> bool {
-    bits.get(event as usize / 64).is_some_and(|word| word >> (event % 64) & 1 != 0)
-}
-
-/// Makes `bits` the union of sets.
-fn union<'a>(bits: &mut Vec<u64>, width: usize, sets: impl Iterator<Item = &'a [u64]>) {
-    bits.clear();
-    bits.resize(width, 0);
-    for set in sets {
-        bits.iter_mut().zip(set).for_each(|(bits, set)| *bits |= set);
-    }
 }

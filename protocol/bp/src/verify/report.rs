@@ -1,4 +1,4 @@
-//! What a verification has found, and what it has not looked at.
+//! The findings of a verification, and its omissions.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::event::Event;
 
-/// What a verification looks for. The names and meanings are those of BPjs.
+/// A question of a verification. The names and meanings are those of BPjs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Inspection {
     /// Something is requested, and the b-threads among themselves allow nothing; see
@@ -22,24 +22,24 @@ pub enum Inspection {
     HotRun(BTreeSet<Arc<str>>),
     /// A cycle in which at every synchronisation point some b-thread is hot.
     HotSystem,
-    /// The program can go round on its own requests and never come to rest, so that it would hear nothing any more. Meant
-    /// for programs in which external events and deadlines wait for rest.
+    /// The program can go round on its own requests and never come to rest, so that it would hear nothing any more.
+    /// Meant for programs in which external events and deadlines wait for rest.
     Unsettled,
 }
 
 impl Inspection {
-    /// What is looked for unless told otherwise, as in BPjs.
+    /// The inspections unless told otherwise, as in BPjs.
     pub const USUAL: [Self; 4] =
         [Self::Deadlock, Self::FailedAssertion, Self::HotTermination, Self::HotBThread];
 }
 
-/// What is wrong.
+/// The kind of a violation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ViolationKind {
     Deadlock,
     FailedAssertion {
-        /// What the b-thread said.
+        /// The words of the b-thread.
         message: String,
     },
     HotTermination,
@@ -55,12 +55,12 @@ pub enum ViolationKind {
     /// A state breaks an invariant.
     Invariant {
         invariant: String,
-        /// What is wrong with the state.
+        /// The reason that the invariant gives.
         message: String,
     },
 }
 
-/// What is wrong with one state, and who is to blame.
+/// A fault of one state, and the b-threads to blame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
     pub kind: ViolationKind,
@@ -71,13 +71,13 @@ pub struct Fault {
 /// A violation and a run that shows it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Violation {
-    /// What is wrong.
     pub kind: ViolationKind,
     /// The b-threads that are stuck, failed or hot.
     pub violators: Vec<Arc<str>>,
     /// The run, from the start. It is as short as any that a breadth-first search could find.
     pub trace: Vec<Event>,
-    /// How many events at the end of the trace make up the cycle, if it is one that is wrong. They could go on for ever.
+    /// The number of events at the end of the trace that make up the cycle, if it is one that is wrong. They could go
+    /// on for ever.
     pub cycle_length: Option<usize>,
 }
 
@@ -106,7 +106,7 @@ pub enum Omission {
     NotModelled { what: String },
 }
 
-/// How a verification went. Shown as text it says what was found, how much was looked at, and what was not.
+/// The outcome of a verification. Shown as text it says what was found, how much was looked at, and what was not.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Report {
     /// The first violation found, if any.
@@ -120,11 +120,11 @@ pub struct Report {
     /// The most events that the program can select between two rests, if [`Inspection::Unsettled`] was asked for and it
     /// always comes to rest.
     pub longest_burst: Option<u32>,
-    /// What was not looked at.
+    /// The parts that were not looked at.
     pub not_covered: Vec<Omission>,
 }
 
-/// How far a search has come.
+/// The progress of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Distinct states reached.

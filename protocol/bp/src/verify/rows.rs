@@ -1,23 +1,23 @@
-//! Rows of numbers, one after the other.
+//! Rows of numbers or pairs of them, one after the other.
 
 /// Rows in one list. While all are equally long, their ends need not be looked up.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Rows {
+pub(super) struct Rows<T = u32> {
     /// The rows that are closed, and behind them the words of the next one.
-    pub(super) words: Vec<u32>,
+    pub(super) words: Vec<T>,
     count: usize,
     /// The length of every row, unless they differ.
     length: usize,
-    /// Where each row ends; empty while all are equally long.
+    /// The end of each row; empty while all are equally long.
     ends: Vec<usize>,
 }
 
-impl Rows {
+impl<T> Rows<T> {
     pub(super) fn len(&self) -> usize {
         self.count
     }
 
-    pub(super) fn get(&self, at: usize) -> &[u32] {
+    pub(super) fn get(&self, at: usize) -> &[T] {
         let (start, end) = if self.ends.is_empty() && at < self.count {
             (at * self.length, (at + 1) * self.length)
         } else {
@@ -78,7 +78,7 @@ mod tests {
     fn rows_of_equal_and_of_different_lengths_are_kept_apart() {
         let given: [&[u32]; 5] = [&[1, 2], &[3, 4], &[], &[5], &[6, 7]];
         for take in 0..=given.len() {
-            let mut rows = Rows::default();
+            let mut rows = Rows::<u32>::default();
             for row in given.iter().take(take) {
                 rows.words.extend_from_slice(row);
                 rows.close();

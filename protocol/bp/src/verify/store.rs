@@ -8,7 +8,7 @@ use super::rows::{Rows, hash};
 #[derive(Clone, Debug)]
 pub(super) struct Store {
     states: Rows,
-    /// How each state was first reached.
+    /// The move by which each state was first reached.
     arrivals: Vec<Arrival>,
     /// Open addressing: the hash in the upper half, the state's number plus one in the lower; 0 is free.
     table: Vec<u64>,
@@ -23,7 +23,7 @@ pub(super) struct Arrival {
 
 /// The state in which every run begins.
 pub(super) const START: u32 = 0;
-/// How many states can be numbered.
+/// Most states that can be numbered.
 pub(super) const MOST_STATES: usize = u32::MAX as usize - 1;
 const SMALLEST_TABLE: usize = 1 << 10;
 
@@ -94,7 +94,7 @@ impl Store {
         }
     }
 
-    /// Where the search for a hash begins.
+    /// The place at which the search for a hash begins.
     fn home(&self, hash: u32) -> usize {
         ((u64::from(hash) * self.table.len() as u64) >> 32) as usize
     }

@@ -4,10 +4,10 @@
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
+use super::exploration::{Exploration, Outcome};
 use super::model::{Model, Moves};
 use super::report::{Fault, Inspection, Progress};
 use super::rows::Rows;
-use super::search::{Exploration, Outcome};
 
 /// States that are handed over at once.
 const BATCH: usize = 256;
@@ -18,9 +18,9 @@ const UNDER_WAY: usize = 8;
 #[derive(Default)]
 struct Expanded {
     moves: Moves,
-    /// How many of the moves each state has; states after one at fault are left out.
+    /// The number of moves of each state; states after one at fault are left out.
     counts: Vec<usize>,
-    /// What is wrong with the last state.
+    /// The fault of the last state.
     fault: Option<Fault>,
 }
 

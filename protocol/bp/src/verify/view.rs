@@ -5,19 +5,20 @@ use crate::board::Owner;
 use crate::bthread::BThread;
 use crate::event::Event;
 
-use super::locals::Local;
-use super::product::Product;
+use super::locals::{Local, Locals};
 
 /// One state of a program under verification.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    product: &'a Product,
+    locals: &'a Locals,
     state: &'a [u32],
+    /// The external queue, as event numbers.
+    externals: &'a [u32],
 }
 
 impl<'a> View<'a> {
-    pub(super) fn new(product: &'a Product, state: &'a [u32]) -> Self {
-        Self { product, state }
+    pub(super) fn new(locals: &'a Locals, state: &'a [u32], externals: &'a [u32]) -> Self {
+        Self { locals, state, externals }
     }
 
     /// The state of one b-thread, if it runs and is a `T`.
@@ -35,11 +36,12 @@ impl<'a> View<'a> {
     }
 
     /// The external queue, next event first.
-    pub fn external_queue(&self) -> impl Iterator<Item = &'a Event> {
-        self.product.queue(self.state)
+    pub fn external_queue(&self) -> impl Iterator<Item = &'a Event> + use<'a> {
+        let locals = self.locals;
+        self.externals.iter().filter_map(|number| locals.events.get(*number))
     }
 
     fn locals(&self) -> impl Iterator<Item = &'a Local> + use<'a> {
-        self.product.locals(self.state).filter(|local| !local.is_proxy())
+        self.locals.of(self.state).filter(|local| !local.is_proxy())
     }
 }

@@ -1,16 +1,17 @@
 //! The verifier for a small network: every run of up to three nodes, with what may go wrong between them.
 //!
-//! What is explored are [`Node`](crate::Node)s themselves. A move lets one message arrive, or one lease lapse, or the
-//! deadline of a b-thread pass, or a node restart, and then the node goes on until it has settled, in every way in which its
-//! ties may fall. Messages take any time; records of bids are lost and, if so set, overtaken; so many messages as are set
-//! arrive again; occurrences come in order, since holes are repaired. While a partition lasts nothing arrives across it, and
-//! leases lapse. Time has no length: a lease lapses at a move, at its holder before its home, as the protocol sees to it
-//! (G3). An open deadline may pass at any move, before or after any other, however long it is: that is more than can happen.
-//! Of the deadlines that one b-thread has open at once, the shortest is the one that passes.
+//! It explores [`Node`](crate::Node)s themselves. A move lets one message arrive, or one lease lapse, or the deadline
+//! of a b-thread pass, or a node restart, and then the node goes on until it has settled, in every way in which its
+//! ties may fall. Messages take any time; records of bids are lost and, if so set, overtaken; so many messages as are
+//! set arrive again; occurrences come in order, since holes are repaired. While a partition lasts nothing arrives
+//! across it, and leases lapse. Time has no length: a lease lapses at a move, at its holder before its home, as the
+//! protocol sees to it (G3). An open deadline may pass at any move, before or after any other, however long it is: that
+//! is more than can happen. Of the deadlines that one b-thread has open at once, the shortest is the one that passes.
 //!
-//! Cycles along which somebody is hot are looked for by the rules of one program's verifier, but only those that a network
-//! and a clock that work can go round for ever: what is on its way all along arrives, a partition ends, a deadline that is
-//! open all along passes, and the guard after a restart ends. Leases need not lapse, and ties may fall the same way for ever.
+//! Cycles along which somebody is hot are looked for by the rules of one program's verifier, but only those that a
+//! network and a clock that work can go round for ever: what is on its way all along arrives, a partition ends, a
+//! deadline that is open all along passes, and the guard after a restart ends. Leases need not lapse, and ties may fall
+//! the same way for ever.
 //!
 //! ```
 //! use skein_dbp::verify::{Faults, programs};
@@ -19,20 +20,26 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod choices;
+mod model;
 mod network;
 pub mod programs;
 pub(crate) mod row;
+#[cfg(test)]
+mod runs;
+mod step;
 mod wire;
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use network::{NetworkModel, Step};
 use skein_bp::Program;
 use skein_bp::verify::{Inspection, Limits, Omission, Progress, Report, check};
 
-use crate::NodeConfig;
+use crate::config::NodeConfig;
+use crate::verify::model::NetworkModel;
+use crate::verify::step::Step;
 
 /// One node of a network under verification.
 #[derive(Clone, Debug)]
@@ -45,24 +52,24 @@ pub struct Member {
     pub may_restart: bool,
 }
 
-/// What may go wrong, and how often.
+/// The faults that there may be, and how many of each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Faults {
     /// Whether an older record of bids, or an older acknowledgement, may still arrive once a newer one was sent.
     pub delay: bool,
-    /// How many leases may lapse.
+    /// The number of leases that may lapse.
     pub lapses: u32,
-    /// How many restarts there may be, of members that may.
+    /// The number of restarts, of members that may.
     pub restarts: u32,
-    /// How many messages may arrive once more than they should; then also older ones may arrive after newer ones.
+    /// The number of messages that arrive once more than they should; then also older ones may arrive after newer ones.
     pub repeats: u32,
-    /// How often two nodes may be cut off from one another, each time until the cut is healed. What lapses meanwhile does
-    /// not count as a lapse.
+    /// The number of times that two nodes are cut off from one another, until the cut is healed. What lapses meanwhile
+    /// does not count as a lapse.
     pub partitions: u32,
-    /// Whether what a node tells itself of the fleet, its facts, takes time to arrive at others, like all that occurs. It is
-    /// of interest only where a b-thread waits for another node's facts.
+    /// Whether what a node tells itself of the fleet, its facts, takes time to arrive at others, like all that occurs.
+    /// It is of interest only where a b-thread waits for another node's facts.
     pub late_facts: bool,
-    /// How many occurrences may be on their way from one node to another.
+    /// The most occurrences on their way from one node to another.
     pub most_under_way: usize,
 }
 
@@ -80,7 +87,7 @@ impl Default for Faults {
     }
 }
 
-/// How many moves of each kind a verification has made, by the kind's name.
+/// The moves of a verification, counted by kind.
 pub type MoveCounts = BTreeMap<&'static str, u64>;
 
 /// The programs of all nodes in one state, as an invariant sees them.
@@ -112,7 +119,7 @@ struct Invariant {
 }
 
 type InvariantFn = dyn Fn(&NetworkView<'_>) -> Result<(), String> + Send + Sync;
-/// What is looked for unless told otherwise.
+/// The inspections unless told otherwise.
 const USUAL: [Inspection; 3] =
     [Inspection::FailedAssertion, Inspection::HotTermination, Inspection::HotBThread];
 
@@ -137,9 +144,9 @@ impl NetworkVerifier {
         Self { members, faults, limits, inspections, invariants: Vec::new(), on_progress: Box::new(|_| {}) }
     }
 
-    /// Looks for these instead of failed assertions, networks at rest where somebody is hot, and b-threads that are hot for
-    /// ever. Deadlocks are not looked for, and a node that does not settle counts as a failed assertion. B-threads are named
-    /// `node#bthread`.
+    /// Looks for these instead of failed assertions, networks at rest where somebody is hot, and b-threads that are hot
+    /// for ever. Deadlocks are not looked for, and a node that does not settle counts as a failed assertion. B-threads
+    /// are named `node#bthread`.
     #[must_use]
     pub fn inspect(mut self, inspections: impl IntoIterator<Item = Inspection>) -> Self {
         self.inspections = inspections.into_iter().collect();
@@ -171,8 +178,8 @@ impl NetworkVerifier {
         self
     }
 
-    /// Looks at every state, until a b-thread fails, an invariant is broken, a node cannot go on, or a bound is reached; then
-    /// at the cycles.
+    /// Looks at every state, until a b-thread fails, an invariant is broken, a node cannot go on, or a bound is
+    /// reached; then at the cycles.
     pub fn run(self) -> Report {
         self.run_and_count().0
     }

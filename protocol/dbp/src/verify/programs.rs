@@ -1,5 +1,5 @@
-//! Small networks that show the rules of b-programs across nodes at work: those by which the fleet flies, and beside some of
-//! them how it is not to be written.
+//! Small networks that show the rules of b-programs across nodes at work: those by which the fleet flies, and beside
+//! some of them how it is not to be written.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -8,22 +8,23 @@ use serde::Serialize;
 use skein_bp::script::{Op, Script, ScriptError};
 use skein_bp::{BThread, Bid, Context, Event, EventSet, Program, ProgramConfig};
 
-use super::{Faults, Member, NetworkVerifier, NetworkView};
-use crate::{NodeConfig, NodeName, NodeNameError, facts};
+use crate::config::NodeConfig;
+use crate::facts;
+use crate::name::{NodeName, NodeNameError};
+use crate::verify::{Faults, Member, NetworkVerifier, NetworkView};
 
 /// A network and what must hold in it.
 #[derive(Clone)]
 pub struct Network {
-    /// What it is called.
     pub name: &'static str,
-    /// What happens in it, in one line.
+    /// The story, in one line.
     pub about: &'static str,
     /// Whether its requirement holds. Those that are not sound show that the verifier finds it.
     pub is_sound: bool,
-    /// What may go wrong in it unless told otherwise: what its states can be counted with in reasonable time.
+    /// The faults unless told otherwise, with which its states can be counted in reasonable time.
     pub faults: Faults,
     pub members: Vec<Member>,
-    /// What must hold in every state, besides that no b-thread's assertion fails.
+    /// The invariant, besides that no b-thread's assertion fails.
     pub requirement: Option<(&'static str, Arc<Requirement>)>,
 }
 
@@ -52,9 +53,6 @@ impl Network {
 }
 
 /// All of them.
-///
-/// # Errors
-/// None but for a mistake in this file.
 pub fn all() -> Result<Vec<Network>, NetworkError> {
     Ok(vec![
         alternating_gate()?,
@@ -74,9 +72,6 @@ pub fn all() -> Result<Vec<Network>, NetworkError> {
 }
 
 /// Those that are sound, as they are to be written.
-///
-/// # Errors
-/// None but for a mistake in this file.
 pub fn sound() -> Result<Vec<Network>, NetworkError> {
     Ok(all()?.into_iter().filter(|network| network.is_sound).collect())
 }
@@ -95,9 +90,6 @@ const CALM: Faults = Faults {
 const ONE_OF_EACH: Faults = Faults { lapses: 1, restarts: 1, repeats: 1, partitions: 1, ..CALM };
 
 /// Two nodes pass a gate by turns: `uav/1`, where the gate is, never lets one pass twice in a row.
-///
-/// # Errors
-/// None but for a mistake in this file.
 pub fn alternating_gate() -> Result<Network, NetworkError> {
     let (one, other) = ("uav/1/pass/1", "uav/1/pass/2");
     let passes = |event: &str| Op::Sync(Bid::new().request(event));
@@ -130,9 +122,6 @@ pub fn alternating_gate() -> Result<Network, NetworkError> {
 
 /// A shared place that at most one of `count` vehicles may be in: each blocks the others, awaits confirmation, then
 /// enters, and leaves at once when its block lapses. Entering is `guarded` after a restart.
-///
-/// # Errors
-/// None but for a mistake in this file.
 pub fn guarded_resource(count: usize) -> Result<Network, NetworkError> {
     let members = (1..=count).map(|number| {
         let (name, mut program) = vehicle(number)?;
@@ -158,10 +147,8 @@ pub fn guarded_resource(count: usize) -> Result<Network, NetworkError> {
     })
 }
 
-/// The same place, where each blocks the others and enters without waiting to hear that the block holds. It is not safe.
-///
-/// # Errors
-/// None but for a mistake in this file.
+/// The same place, where each blocks the others and enters without waiting to hear that the block holds. It is not
+/// safe.
 pub fn naive_resource(count: usize) -> Result<Network, NetworkError> {
     let members = (1..=count).map(|number| {
         let (name, mut program) = vehicle(number)?;
@@ -182,9 +169,6 @@ pub fn naive_resource(count: usize) -> Result<Network, NetworkError> {
 
 /// The same place, where each waits only so long for its block to be confirmed: then it withdraws the block, and tries
 /// again later.
-///
-/// # Errors
-/// None but for a mistake in this file.
 pub fn patient_resource() -> Result<Network, NetworkError> {
     let about =
         "each blocks the others and awaits confirmation only so long: then it gives way and tries again";
@@ -192,9 +176,6 @@ pub fn patient_resource() -> Result<Network, NetworkError> {
 }
 
 /// The same place, where each enters once it has waited long enough, confirmed or not. It is not safe.
-///
-/// # Errors
-/// None but for a mistake in this file.
 pub fn impatient_resource() -> Result<Network, NetworkError> {
     let about = "each blocks the others and awaits confirmation only so long: then it enters all the same";
     claimed("impatient right of way", about, false)
@@ -218,9 +199,6 @@ fn claimed(name: &'static str, about: &'static str, gives_way: bool) -> Result<N
 }
 
 /// Two vehicles meet in a corridor and say on which side they pass. They do pass, since the first keeps to its side.
-///
-/// # Errors
-/// None but for a mistake in this file.
 pub fn corridor() -> Result<Network, NetworkError> {
     let heard = || Op::Sync(Bid::new().wait_for("uav/2/right").hot());
     // It looks up every second; that it may do so for ever, with the answer on its way, is no fault.
@@ -237,9 +215,6 @@ pub fn corridor() -> Result<Network, NetworkError> {
 }
 
 /// The same meeting, where each dodges when it hears that the other is on the same side. They may dodge for ever.
-///
-/// # Errors
-/// None but for a mistake in this file.
 pub fn courteous_corridor() -> Result<Network, NetworkError> {
     let dodges = |one: &str, other: &str| {
         let takes = |side: &str, free: &str| {
@@ -280,9 +255,6 @@ fn meeting(
 }
 
 /// The ground asks `uav/1` to take off and holds it back until it says go: no take-off while the hold stands.
-///
-/// # Errors
-/// None but for a mistake in this file.
 pub fn held_launch() -> Result<Network, NetworkError> {
     let ground = NodeName::new("ground/main")?;
     let until_go = Bid::new().block("uav/1/takeoff").wait_for("ground/main/go");
@@ -314,20 +286,14 @@ pub fn held_launch() -> Result<Network, NetworkError> {
     })
 }
 
-/// The ground holds `uav/1`, whose leave to move is blocked for as long as the ground counts on it: the holder hears that
-/// its block lapses before the home lets go.
-///
-/// # Errors
-/// None but for a mistake in this file.
+/// The ground holds `uav/1`, whose leave to move is blocked for as long as the ground counts on it: the holder hears
+/// that its block lapses before the home lets go.
 pub fn hold() -> Result<Network, NetworkError> {
     holding("hold", "the ground holds a vehicle until its lease lapses, of which it hears first", false)
 }
 
 /// The same hold, stated to outlive its holder: once confirmed it stays through lapses, partitions and restarts of the
 /// vehicle.
-///
-/// # Errors
-/// None but for a mistake in this file.
 pub fn kept_hold() -> Result<Network, NetworkError> {
     holding(
         "kept hold",
@@ -375,18 +341,12 @@ fn holding(name: &'static str, about: &'static str, outlives: bool) -> Result<Ne
 }
 
 /// The ground asks `uav/1` once to drop its load, and asks no more when it cannot know; a log hears every drop.
-///
-/// # Errors
-/// None but for a mistake in this file.
 pub fn asked_once() -> Result<Network, NetworkError> {
     let about = "the ground asks once for a drop, and asks no more when it cannot know";
     drops("asked once", about, true, vec![Op::Sync(Bid::new().request("uav/1/drop"))])
 }
 
 /// The same request, asked again when it is unknown whether it was served. It is not safe.
-///
-/// # Errors
-/// None but for a mistake in this file.
 pub fn asked_again() -> Result<Network, NetworkError> {
     let unknown = facts::of(&NodeName::new("ground/main")?, facts::UNKNOWN);
     let ask = Op::Sync(Bid::new().request("uav/1/drop").wait_for(unknown));
@@ -473,7 +433,7 @@ struct Claim {
     stage: Stage,
     /// When its patience is at an end.
     until: Option<Duration>,
-    /// What it does then.
+    /// Whether it gives way then, or enters.
     gives_way: bool,
 }
 
@@ -487,7 +447,7 @@ enum Stage {
     Yielding,
 }
 
-/// How long it waits for confirmation, and before it tries again.
+/// The time it waits for confirmation, and before it tries again.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 impl BThread for Claim {

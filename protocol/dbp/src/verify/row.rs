@@ -8,7 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use skein_bp::verify::Interner;
 use skein_bp::{Event, EventSet, Program};
 
-use crate::{NodeName, Refusal, RemoteBid};
+use crate::message::{Refusal, RemoteBid};
+use crate::name::NodeName;
 
 /// Something that is equal or not.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -39,7 +40,7 @@ pub(crate) struct Row<'a> {
     parts: &'a mut Interner<Part>,
     families: &'a mut Interner<Family>,
     words: Vec<u32>,
-    /// Where in the row a number of a family stands: family, number, place.
+    /// The numbers in the row: family, number, place.
     numbers: Vec<(u32, u64, usize)>,
 }
 
@@ -89,7 +90,7 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// What `node` bids elsewhere in one of its lives.
+    /// A bid of `node` elsewhere, in one of its lives.
     pub(crate) fn bid(&mut self, node: &NodeName, life: u64, bid: &RemoteBid) {
         self.text(&bid.bthread);
         self.number(Family::Sync(node.clone(), life, bid.bthread.clone()), bid.sync);
@@ -97,7 +98,7 @@ impl<'a> Row<'a> {
         self.part(Part::Bid(bid.requests.clone(), bid.block.clone(), bid.priority));
     }
 
-    /// What of a bid of `node` was refused.
+    /// The refusal of a bid of `node`.
     pub(crate) fn refusal(&mut self, node: &NodeName, life: u64, refusal: &Refusal) {
         self.text(&refusal.bthread);
         self.number(Family::Sync(node.clone(), life, refusal.bthread.clone()), refusal.sync);

@@ -1,7 +1,7 @@
 //! Runs of real nodes, held against the model: wherever a run comes to, there the model comes too.
 //!
-//! Time runs in them: messages take it, are lost and repeated, leases are renewed or lapse, partitions begin and end. Only
-//! the clock of the b-threads is held, as the model has it, and their deadlines are let pass when they are due.
+//! Time runs in them: messages take it, are lost and repeated, leases are renewed or lapse, partitions begin and end.
+//! Only the clock of the b-threads is held, as the model has it, and their deadlines are let pass when they are due.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::rc::Rc;
@@ -11,14 +11,16 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rustc_hash::FxHashSet;
 
-use super::{Network, NetworkModel, pairs};
+use crate::message::{BidRecord, Message, Recipient};
+use crate::name::NodeName;
+use crate::verify::model::NetworkModel;
+use crate::verify::network::Network;
 use crate::verify::{Faults, programs};
-use crate::{BidRecord, Message, NodeName, Recipient};
 
 const MS: Duration = Duration::from_millis(1);
-/// How long a run takes.
+/// The length of a run.
 const LENGTH: Duration = Duration::from_secs(4);
-/// How much of a run is told when it leaves the model.
+/// The events of a run that are told when it leaves the model.
 const STORY: usize = 12;
 
 /// Every state that the model comes to, as far as a run can be compared with it.
@@ -28,7 +30,7 @@ fn reached_by(model: &mut NetworkModel) -> FxHashSet<Vec<u32>> {
     let mut seen = FxHashSet::from_iter([model.row(&start)]);
     let mut queue = VecDeque::from([start]);
     while let Some(network) = queue.pop_front() {
-        for step in model.steps(&network) {
+        for step in network.steps() {
             for (_, next) in model.outcomes(&network, &step) {
                 if seen.insert(model.row(&next)) {
                     reached.insert(comparable_row(model, &next));
@@ -40,11 +42,11 @@ fn reached_by(model: &mut NetworkModel) -> FxHashSet<Vec<u32>> {
     reached
 }
 
-/// A state without what a run does not share with the model: how much may still go wrong, what has lapsed of itself because
-/// there was nothing to renew, and signs of life, which come again and again.
+/// A state without what a run does not share with the model: how much may still go wrong, what has lapsed of itself
+/// because there was nothing to renew, and signs of life, which come again and again.
 fn comparable_row(model: &mut NetworkModel, network: &Network) -> Vec<u32> {
     let mut network = network.clone();
-    (network.lapses, network.restarts, network.repeats, network.partitions) = (0, 0, 0, 0);
+    network.faults = Faults { lapses: 0, restarts: 0, repeats: 0, partitions: 0, ..network.faults };
     network.lapsing.clear();
     network.wires.values_mut().for_each(|wire| Rc::make_mut(wire).presence = None);
     network.nodes.values_mut().for_each(|node| Rc::make_mut(node).overlook_idle_leases());
@@ -59,7 +61,7 @@ struct Underway {
     message: Message,
 }
 
-/// How a run ends.
+/// The end of a run.
 enum End {
     /// It was as long as it should be.
     Whole,
@@ -74,12 +76,12 @@ struct Run<'a> {
     network: Network,
     underway: Vec<Underway>,
     rng: ChaCha8Rng,
-    /// How likely a message is lost or comes twice, and how long it may take.
+    /// The probability that a message is lost or comes twice, and the longest time it takes.
     loss: f64,
     slowest: Duration,
     /// When each deadline of a b-thread passes, with the synchronisation point at which it was set.
     deadlines: BTreeMap<(NodeName, String), (u64, Duration)>,
-    /// What each node has stated last to each home.
+    /// The record that each node has stated last to each home.
     stated: BTreeMap<(NodeName, NodeName), BidRecord>,
     /// Who was sure of whom, who heard whom, and whose bids stood where.
     standing: BTreeMap<(NodeName, NodeName), [bool; 3]>,
@@ -87,7 +89,7 @@ struct Run<'a> {
     answers: bool,
     /// When two nodes are cut off from one another, and when they are joined again.
     cut: Option<(Duration, Duration)>,
-    /// How many leases have lapsed without a partition.
+    /// The number of leases that have lapsed without a partition.
     lapses: u32,
     /// The last things that happened, for people.
     story: VecDeque<String>,
@@ -98,7 +100,7 @@ impl<'a> Run<'a> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let network = model.formed();
         let start = network.now;
-        let cut = (model.faults.partitions > 0).then(|| {
+        let cut = (network.faults.partitions > 0).then(|| {
             let begins = start + MS * rng.random_range(0..1500);
             (begins, begins + MS * rng.random_range(100..2500))
         });
@@ -123,7 +125,8 @@ impl<'a> Run<'a> {
 
     fn play(mut self) -> End {
         let end = self.network.now + LENGTH;
-        for node in self.model.roster() {
+        let nodes: Vec<NodeName> = self.network.nodes.keys().cloned().collect();
+        for node in nodes {
             self.go_on(&node);
             self.compare(format!("{node} begins"));
         }
@@ -137,7 +140,7 @@ impl<'a> Run<'a> {
     }
 
     fn is_beyond_faults(&self) -> bool {
-        self.lapses > self.model.faults.lapses
+        self.lapses > self.network.faults.lapses
     }
 
     /// Lets what comes next happen: a cut, an arrival, a deadline, or the next step of a node that has something to do.
@@ -171,9 +174,7 @@ impl<'a> Run<'a> {
     }
 
     fn cut_or_heal(&mut self) {
-        let mut roster = self.model.roster();
-        roster.truncate(2);
-        roster.sort();
+        let roster: Vec<NodeName> = self.network.nodes.keys().take(2).cloned().collect();
         let [one, other] = &roster[..] else { return };
         let pair = (one.clone(), other.clone());
         match self.cut {
@@ -194,17 +195,16 @@ impl<'a> Run<'a> {
 
     fn arrive(&mut self, underway: Underway) {
         let Underway { from, to, message, .. } = underway;
-        // The model does not have it that several occurrences are told at once, behind a hole that is filled; so what comes
-        // too early is lost.
+        // The model does not have it that several occurrences are told at once, behind a hole that is filled; so what
+        // comes too early is lost.
         let comes_early = matches!(&message, Message::Occurrence(occurrence)
-            if occurrence.seq > self.network.nodes[&to].applied(&from) + 1);
+            if occurrence.seq > self.network.nodes[&to].channel.applied(&from) + 1);
         if comes_early || self.network.are_cut_off(&from, &to) {
             return;
         }
         let what = format!("{to} hears {message:?}");
         self.take_off_the_wire(&from, &to, &message);
-        let now = self.network.now;
-        self.network.hand_over(&to, now, Some(message));
+        self.network.hand_over(&to, Some(message));
         self.go_on(&to);
         self.answers = false;
         self.compare(what);
@@ -245,9 +245,9 @@ impl<'a> Run<'a> {
         });
         self.count_lapses();
         for (recipient, message) in outgoing {
-            for to in self.model.roster().iter().filter(|to| *to != name) {
-                if !matches!(&recipient, Recipient::Node(node) if node != to) {
-                    self.send(name, to, message.clone());
+            for to in self.network.others(name) {
+                if !matches!(&recipient, Recipient::Node(node) if *node != to) {
+                    self.send(name, &to, message.clone());
                 }
             }
         }
@@ -258,20 +258,17 @@ impl<'a> Run<'a> {
 
     /// Facts arrive at once, where the model has it so.
     fn hear_facts(&mut self) {
-        let now = self.network.now;
-        while !self.model.faults.late_facts
-            && let Some((from, to)) = self.network.next_fact()
-        {
+        while let Some((from, to)) = self.network.next_fact() {
             let fact = self.network.wire(&from, &to).occurrences.pop_front();
-            self.network.hand_over(&to, now, fact.map(Message::Occurrence));
+            self.network.hand_over(&to, fact.map(Message::Occurrence));
             self.go_on(&to);
         }
     }
 
     /// Occurrences that a node has been told of are on their way to it no more.
     fn drop_heard(&mut self) {
-        for (from, to) in pairs(&self.network.clone()) {
-            let applied = self.network.nodes.get(to).map_or(0, |node| node.applied(from));
+        for (from, to) in self.network.clone().pairs() {
+            let applied = self.network.nodes.get(to).map_or(0, |node| node.channel.applied(from));
             let wire = self.network.wire(from, to);
             while wire.occurrences.front().is_some_and(|next| next.seq <= applied) {
                 wire.occurrences.pop_front();
@@ -293,12 +290,12 @@ impl<'a> Run<'a> {
             Message::Occurrence(occurrence) => {
                 let wire = self.network.wire(from, to);
                 wire.occurrences.iter().any(|other| other.seq == occurrence.seq)
-                    || self.network.nodes[to].applied(from) >= occurrence.seq
+                    || self.network.nodes[to].channel.applied(from) >= occurrence.seq
             }
             Message::Presence(_) | Message::Repair(_) => true,
         };
         if !repeats {
-            self.network.put(from, to, message.clone(), self.model.faults);
+            self.network.put(from, to, message.clone());
         }
         while !self.rng.random_bool(self.loss) {
             let at = self.network.now + self.slowest.mul_f64(self.rng.random_range(0.0..1.0)) + MS;
@@ -313,11 +310,11 @@ impl<'a> Run<'a> {
     fn sure_and_heard(&self) -> BTreeMap<(NodeName, NodeName), [bool; 3]> {
         let nodes = &self.network.nodes;
         let standing = |(from, to): (&NodeName, &NodeName)| {
-            let relies = nodes[from].relies_on(to) && nodes[from].is_sure_of(to);
-            let held = nodes[to].holds_bids_of(from);
-            ((from.clone(), to.clone()), [relies, nodes[to].hears(from), held])
+            let relies = nodes[from].guest.relies_on(to) && nodes[from].is_sure_of(to);
+            let held = nodes[to].home.holds_bids_of(from);
+            ((from.clone(), to.clone()), [relies, nodes[to].channel.counts_as_alive(from), held])
         };
-        pairs(&self.network).map(standing).collect()
+        self.network.pairs().map(standing).collect()
     }
 
     fn count_lapses(&mut self) {
@@ -325,8 +322,8 @@ impl<'a> Run<'a> {
         for (pair, [relied, heard, held]) in &std::mem::replace(&mut self.standing, now.clone()) {
             let (from, to) = pair;
             let [relies, hears, _] = now[pair];
-            let no_longer_sure = *relied && !relies && self.network.nodes[from].relies_on(to);
-            let let_go = *held && !self.network.nodes[to].keeps_lease_of(from);
+            let no_longer_sure = *relied && !relies && self.network.nodes[from].guest.relies_on(to);
+            let let_go = *held && !self.network.nodes[to].home.keeps_lease_of(from);
             if no_longer_sure || let_go || *heard && !hears {
                 self.lapses += u32::from(!self.network.are_cut_off(from, to));
                 self.network.wire(to, from).acks.clear();
@@ -335,7 +332,7 @@ impl<'a> Run<'a> {
                 {
                     // The next copy is as good as sent.
                     let copy = BidRecord { sent_at: self.network.now, ..record };
-                    self.network.put(from, to, Message::Bid(copy), self.model.faults);
+                    self.network.put(from, to, Message::Bid(copy));
                 }
             }
         }

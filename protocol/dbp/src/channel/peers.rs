@@ -1,24 +1,24 @@
-//! Who of the roster lives, as far as this node can tell (G5).
+//! The peers of a node, and which of them live as far as it can tell (G5).
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use crate::NodeName;
+use crate::name::NodeName;
 
-/// What this node knows of another one.
+/// A peer, as this node knows it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Peer {
     /// Its incarnation, once it has been heard.
     pub incarnation: Option<u64>,
     /// When it was last heard, on this node's clock.
     pub last_word: Option<Duration>,
-    /// How long it counts as alive without a word.
+    /// The time for which it counts as alive without a word.
     pub lease: Duration,
     /// Whether it counts as alive.
     pub alive: bool,
 }
 
-/// What a word from a peer means.
+/// The meaning of a word from a peer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Word {
     /// It comes from a life that is over, or from a stranger: it counts for nothing.
@@ -43,6 +43,11 @@ impl Peers {
     pub(crate) fn new(roster: impl IntoIterator<Item = NodeName>, lease: Duration) -> Self {
         let silent = Peer { incarnation: None, last_word: None, lease, alive: false };
         Self(roster.into_iter().map(|name| (name, silent.clone())).collect())
+    }
+
+    /// The peer of this name, if there is one.
+    pub(crate) fn name(&self, name: &str) -> Option<&NodeName> {
+        self.0.get_key_value(name).map(|(name, _)| name)
     }
 
     pub(crate) fn names(&self) -> impl Iterator<Item = &NodeName> {
@@ -89,7 +94,7 @@ impl Peers {
         }
     }
 
-    /// Those who count as lost from now on.
+    /// The peers that count as lost from now on.
     pub(crate) fn take_lost(&mut self, now: Duration) -> Vec<NodeName> {
         let mut lost = Vec::new();
         for (name, peer) in &mut self.0 {
@@ -108,7 +113,7 @@ impl Peers {
 }
 
 impl Peer {
-    /// How long ago it was last heard.
+    /// The time since it was last heard.
     #[must_use]
     pub fn age(&self, now: Duration) -> Option<Duration> {
         self.last_word.map(|at| now.saturating_sub(at))

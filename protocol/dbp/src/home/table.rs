@@ -2,51 +2,23 @@
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::time::Duration;
 
-use skein_bp::{Bid, Event, EventSet};
+use skein_bp::{Event, EventSet};
 
 use crate::history::History;
+use crate::home::bidder::{Bidder, TakenBid};
+use crate::home::rights::Rights;
+use crate::joint::roster::Roster;
+use crate::kept::KeptBlock;
+use crate::message::{BidRecord, Refusal, RefusalReason, ServedRequest};
 #[cfg(feature = "mutants")]
 use crate::mutant::Mutant;
-use crate::{
-    Authority, BidRecord, KeptBlock, NodeName, OnLoss, Refusal, RefusalReason, RemoteBid, Roster,
-    ServedRequest,
-};
+use crate::name::NodeName;
+use crate::run::ProxyChange;
 
-/// What of a remote bid this home honours.
-#[derive(Clone, Debug)]
-pub(crate) struct Rights {
-    /// The events that have their home here.
-    pub(crate) home: EventSet,
-    /// The home's own facts: nobody requests or blocks them from afar.
-    pub(crate) facts: EventSet,
-    /// Events that nobody requests or blocks from afar ...
-    pub(crate) safety: EventSet,
-    /// ... but for these, which may be requested.
-    pub(crate) gateway: EventSet,
-    /// An operator's orders to the node itself, which nobody blocks from afar.
-    pub(crate) orders: EventSet,
-    /// What may be blocked from afar: the home's events without all of these.
-    pub(crate) blockable: EventSet,
-    /// Who may do what of the rest.
-    pub(crate) authority: Authority,
-    /// The band of priorities.
-    pub(crate) priority: RangeInclusive<i32>,
-    /// The longest lease granted.
-    pub(crate) longest_lease: Duration,
-    /// Whether blocks may outlive their holders, since what must be kept is kept on disk.
-    pub(crate) durable: bool,
-    #[cfg(feature = "mutants")]
-    pub(crate) mutant: Option<crate::Mutant>,
-}
-
-/// The change of a proxy: its new bid, or none if it goes.
-pub(crate) type ProxyChange = (Arc<str>, Option<Bid>);
-
-/// What has occurred at this home.
+/// The occurrences at this home.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Past<'a> {
     pub(crate) history: &'a History,
@@ -55,14 +27,13 @@ pub(crate) struct Past<'a> {
     pub(crate) decisions: Option<&'a History>,
 }
 
-/// What became of a record.
+/// The outcome of a record.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum TakenIn {
     /// It counts, and is acknowledged.
     Yes {
-        /// How the proxies change.
         proxies: Vec<ProxyChange>,
-        /// What is not honoured of it, and was not in the record before.
+        /// The refusals that are not those of the record before.
         denied: Vec<Refusal>,
     },
     /// It is older than what is known, or its sender has to catch up first: no answer.
@@ -79,49 +50,9 @@ impl TakenIn {
 pub(crate) struct BidTable {
     incarnation: u64,
     rights: Rights,
-    pub(crate) bidders: BTreeMap<NodeName, Bidder>,
-    /// Whether the blocks to be kept have changed since they were last taken to be saved.
+    pub(super) bidders: BTreeMap<NodeName, Bidder>,
+    /// Whether the blocks to be kept are not saved as they are.
     unsaved: bool,
-}
-
-/// One node's bids in one of its lives.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Bidder {
-    pub(crate) incarnation: u64,
-    pub(crate) epoch: u64,
-    pub(crate) sent_at: Duration,
-    /// When the newest copy arrived, on this home's clock.
-    pub(crate) heard_at: Duration,
-    pub(crate) lease: Duration,
-    /// Whether the lease runs.
-    pub(crate) live: bool,
-    /// Whether one of its records was made for this home's present life.
-    pub(crate) knows_this_life: bool,
-    pub(crate) bids: BTreeMap<String, TakenBid>,
-    /// The b-threads whose blocks lapsed with the lease, until the next record.
-    pub(crate) released: BTreeSet<String>,
-    /// Highest synchronisation point of each b-thread at which a request was served (G4).
-    pub(crate) served: BTreeMap<String, u64>,
-    pub(crate) refused: Vec<Refusal>,
-    /// Blocks that an authority has lifted: for each b-thread, up to which synchronisation point.
-    pub(crate) lifted: BTreeMap<String, u64>,
-}
-
-/// One bid, as far as it is honoured.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct TakenBid {
-    pub(crate) sync: u64,
-    pub(crate) requests: Vec<Event>,
-    pub(crate) block: EventSet,
-    /// The block as it was asked for, of which this home honours its own part.
-    pub(crate) asked_block: EventSet,
-    pub(crate) priority: Option<i32>,
-    /// Whether the requests may still be served.
-    pub(crate) open: bool,
-    /// Whether the block outlives its holder.
-    pub(crate) keep: bool,
-    /// Whether it is left over from a life of its node that has ended, so that only an authority can lift it.
-    pub(crate) orphaned: bool,
 }
 
 /// A remote b-thread that stands behind a proxy.
@@ -129,7 +60,7 @@ pub(crate) struct TakenBid {
 pub struct RemoteParty {
     pub node: NodeName,
     pub bthread: String,
-    /// How long ago its bid was renewed, on this home's clock.
+    /// The time since its bid was renewed, on this home's clock.
     pub lease_age: Duration,
     /// After what age it lapses.
     pub lease: Duration,
@@ -137,7 +68,7 @@ pub struct RemoteParty {
 
 impl BidTable {
     /// A table with the blocks that a former life of this home has kept, and the proxies that stand for them.
-    pub(crate) fn new(incarnation: u64, rights: Rights, kept: Vec<KeptBlock>) -> (Self, Vec<ProxyChange>) {
+    pub(super) fn new(incarnation: u64, rights: Rights, kept: Vec<KeptBlock>) -> (Self, Vec<ProxyChange>) {
         let mut bidders: BTreeMap<NodeName, Bidder> = BTreeMap::new();
         for KeptBlock { node, incarnation, .. } in &kept {
             let bidder = bidders.entry(node.clone()).or_default();
@@ -146,7 +77,8 @@ impl BidTable {
         for KeptBlock { node, incarnation, bthread, sync, block } in kept {
             let bidder = bidders.entry(node).or_default();
             let (asked_block, orphaned) = (block.clone(), incarnation < bidder.incarnation);
-            bidder.bids.insert(bthread, TakenBid { sync, block, asked_block, orphaned, ..TakenBid::kept() });
+            let bid = TakenBid { sync, block, asked_block, keep: true, orphaned, ..TakenBid::default() };
+            bidder.bids.insert(bthread, bid);
         }
         let nothing = BTreeMap::new();
         let proxies =
@@ -154,9 +86,9 @@ impl BidTable {
         (Self { incarnation, rights, bidders, unsaved: false }, proxies)
     }
 
-    /// The rights that this home grants from now on.
-    pub(crate) fn rights_mut(&mut self) -> &mut Rights {
-        &mut self.rights
+    /// From now on, these events have their home here.
+    pub(crate) fn set_home(&mut self, events: EventSet) {
+        self.rights.set_home(events);
     }
 
     /// The blocks that must outlive this home's life.
@@ -246,8 +178,8 @@ impl BidTable {
         bidder.lifted.retain(|bthread, _| taken.contains_key(bthread));
         for (bthread, orphan) in bidder.bids.iter().filter(|(_, bid)| bid.orphaned) {
             let heir = taken.entry(bthread.clone()).or_insert_with(|| orphan.clone());
-            // The b-thread's new life takes the block over if it states all of it, and then may withdraw it. What this home
-            // honours of the two may differ, when it has become the coordinator between them, or is it no more.
+            // The b-thread's new life takes the block over if it states all of it, and then may withdraw it. What this
+            // home honours of the two may differ, when it has become the coordinator between them, or is it no more.
             if !(heir.keep && orphan.asked_block.is_within(&heir.asked_block)) {
                 heir.block = joined(&heir.block, &orphan.block);
                 heir.asked_block = joined(&heir.asked_block, &orphan.asked_block);
@@ -264,7 +196,7 @@ impl BidTable {
         }
     }
 
-    /// What the last record of `node` asked for in vain.
+    /// The refusals of the last record of `node`.
     pub(crate) fn refused(&self, node: &NodeName) -> &[Refusal] {
         self.bidders.get(node).map_or(&[], |bidder| &bidder.refused)
     }
@@ -366,14 +298,14 @@ impl BidTable {
         })
     }
 
-    /// What the b-thread behind a proxy asked to block, if it blocks anything here.
+    /// The block that the b-thread behind a proxy asked for, if it blocks anything here.
     pub(crate) fn asked_block(&self, proxy: &str) -> Option<&EventSet> {
         let (node, bthread) = proxy.split_once('#')?;
         let bid = self.bidders.get(node)?.bids.get(bthread)?;
         (!bid.block.is_none()).then_some(&bid.asked_block)
     }
 
-    /// Who stands behind a proxy.
+    /// The remote b-thread behind a proxy.
     pub(crate) fn party(&self, proxy: &str, now: Duration) -> Option<RemoteParty> {
         let (node, bthread) = proxy.split_once('#')?;
         let (node, bidder) = self.bidders.get_key_value(node)?;
@@ -386,181 +318,18 @@ impl BidTable {
     }
 }
 
-impl Bidder {
-    /// Its b-threads whose blocks end with its lease.
-    fn releasing(&self) -> impl Iterator<Item = String> + '_ {
-        let releasing = |bid: &TakenBid| !bid.block.is_none() && !bid.keep;
-        self.bids.iter().filter(move |(_, bid)| releasing(bid)).map(|(bthread, _)| bthread.clone())
-    }
-
-    /// The same node in a new life: of the old one, only the blocks that are kept count.
-    fn reborn(&mut self, incarnation: u64) -> Self {
-        let mut bids = std::mem::take(&mut self.bids);
-        bids.retain(|_, bid| bid.keep);
-        bids.values_mut().for_each(|bid| *bid = TakenBid { orphaned: true, ..bid.left_over() });
-        Self { incarnation, bids, ..Self::default() }
-    }
-
-    /// Takes over a newer copy's number, age and lease.
-    fn renew(&mut self, now: Duration, record: &BidRecord) {
-        self.epoch = record.epoch;
-        self.sent_at = record.sent_at;
-        self.heard_at = now;
-        self.lease = Duration::from_millis(record.lease_ms);
-        self.live = true;
-    }
-
-    fn has_been_served(&self, bid: &RemoteBid) -> bool {
-        self.served.get(&bid.bthread).is_some_and(|served| bid.sync <= *served)
-    }
-
-    fn refuse(&mut self, bid: &RemoteBid, reasons: Vec<RefusalReason>) {
-        let refusals = reasons.into_iter().map(|reason| Refusal {
-            bthread: bid.bthread.clone(),
-            sync: bid.sync,
-            reason,
-        });
-        self.refused.extend(refusals);
-    }
-}
-
-impl Rights {
-    /// When the lease of a bidder runs out, on this home's clock.
-    fn lapses_at(&self, bidder: &Bidder) -> Duration {
-        #[cfg(feature = "mutants")]
-        match self.mutant {
-            Some(Mutant::G3) => return bidder.heard_at + bidder.lease * 8 / 10,
-            Some(Mutant::G5) => return Duration::MAX,
-            _ => {}
-        }
-        bidder.heard_at + bidder.lease
-    }
-
-    /// From now on, these events have their home here.
-    pub(crate) fn set_home(&mut self, home: EventSet) {
-        let never = EventSet::any_of([&self.facts, &self.safety, &self.gateway, &self.orders]);
-        #[cfg(feature = "mutants")]
-        let never = if self.mutant == Some(Mutant::G6) { self.facts.clone() } else { never };
-        self.blockable = home.clone().and(never.not());
-        self.home = home;
-    }
-
-    /// What of a bid at this place of a record is honoured, and why not the rest.
-    fn judge(
-        &self,
-        node: &NodeName,
-        bid: &RemoteBid,
-        place: usize,
-        lease: Duration,
-    ) -> (Option<TakenBid>, Vec<RefusalReason>) {
-        if !bid.is_within_quota(place) {
-            return (None, vec![RefusalReason::Quota]);
-        }
-        if lease > self.longest_lease {
-            return (None, vec![RefusalReason::LeaseTooLong]);
-        }
-        let denial = |event: &Event| self.denial(node, &bid.bthread, event);
-        #[cfg(feature = "mutants")]
-        let denial = |event: &Event| {
-            denial(event)
-                .filter(|why| self.mutant != Some(Mutant::G7) || *why != RefusalReason::MayNotRequest)
-        };
-        let mut reasons: Vec<_> = bid.requests.iter().filter_map(denial).collect();
-        // A b-thread blocks with one set what it wants to block at all homes together.
-        let block = match self.authority.may_block(node, &bid.bthread, &bid.block.about(&self.home)) {
-            true => self.honoured_block(bid),
-            false => {
-                reasons.push(RefusalReason::MayNotBlock);
-                EventSet::None
-            }
-        };
-        if bid.on_loss == OnLoss::Hold && !self.durable {
-            reasons.push(RefusalReason::HoldUnsupported);
-        }
-        reasons.sort_unstable();
-        reasons.dedup();
-        let allowed = bid.requests.iter().filter(|event| denial(event).is_none());
-        let requests: Vec<Event> = allowed.cloned().collect();
-        let open = !requests.is_empty();
-        let priority =
-            bid.priority.map(|priority| priority.max(*self.priority.start()).min(*self.priority.end()));
-        let keep = bid.on_loss == OnLoss::Hold && !block.is_none();
-        let asked_block = bid.block.clone();
-        let taken =
-            TakenBid { sync: bid.sync, requests, block, asked_block, priority, open, keep, orphaned: false };
-        (Some(taken), reasons)
-    }
-
-    /// Why `bthread` of `node` may not request `event` from afar, if so.
-    fn denial(&self, node: &NodeName, bthread: &str, event: &Event) -> Option<RefusalReason> {
-        if !self.home.contains(event) {
-            Some(RefusalReason::NotHome)
-        } else if self.facts.contains(event) {
-            Some(RefusalReason::Reserved)
-        } else if self.safety.contains(event) && !self.gateway.contains(event) {
-            Some(RefusalReason::Safety)
-        } else if !self.authority.may_request(node, bthread, event) {
-            Some(RefusalReason::MayNotRequest)
-        } else {
-            None
-        }
-    }
-
-    /// The block without what may not be blocked from afar.
-    fn honoured_block(&self, bid: &RemoteBid) -> EventSet {
-        if bid.block.is_none() || (bid.on_loss == OnLoss::Hold && !self.durable) {
-            return EventSet::None;
-        }
-        bid.block.clone().and(self.blockable.clone())
-    }
-}
-
-impl TakenBid {
-    /// A block that is kept, and nothing else.
-    fn kept() -> Self {
-        Self {
-            sync: 0,
-            requests: Vec::new(),
-            block: EventSet::None,
-            asked_block: EventSet::None,
-            priority: None,
-            open: false,
-            keep: true,
-            orphaned: false,
-        }
-    }
-
-    /// What stays of a bid whose holder is lost.
-    fn left_over(&self) -> Self {
-        let (block, asked_block) = (self.block.clone(), self.asked_block.clone());
-        Self { sync: self.sync, block, asked_block, orphaned: self.orphaned, ..Self::kept() }
-    }
-
-    /// The bid of the proxy.
-    fn to_bid(&self) -> Bid {
-        let mut bid = Bid::new().block(self.block.clone());
-        if self.open {
-            bid = self.requests.iter().fold(bid, |bid, event| bid.request(event));
-        }
-        match self.priority {
-            Some(priority) => bid.priority(priority),
-            None => bid,
-        }
-    }
-}
-
 /// The events of both sets; no larger a tree each time that the same ones are joined.
 fn joined(more: &EventSet, set: &EventSet) -> EventSet {
     if more.is_within(set) { set.clone() } else { more.clone().or(set.clone()) }
 }
 
-/// What of these bids must outlive this home's life.
+/// The bids that must outlive this home's life.
 fn kept_blocks(bids: &BTreeMap<String, TakenBid>) -> impl Iterator<Item = (&String, u64, bool, &EventSet)> {
     let kept = bids.iter().filter(|(_, bid)| bid.keep);
     kept.map(|(bthread, bid)| (bthread, bid.sync, bid.orphaned, &bid.block))
 }
 
-/// How the proxies of `node` change from one set of bids to the next.
+/// The changes of the proxies of `node` from one set of bids to the next.
 fn changes(
     node: &NodeName,
     before: &BTreeMap<String, TakenBid>,

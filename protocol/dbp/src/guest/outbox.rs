@@ -1,23 +1,23 @@
-//! What this node bids for the events of one other home, and what that home has said to it.
+//! A node's bids for the events of one other home, and that home's answers.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use crate::{BidAck, BidRecord, NodeName, OnLoss, Refusal, RemoteBid};
+use crate::message::{BidAck, OnLoss, Refusal, RemoteBid};
 
 /// The newest record for one home, kept alive by renewals.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Outbox {
     /// The home's incarnation, once it is known.
     pub(crate) home_incarnation: Option<u64>,
     /// Number of the present content; 0 before the first.
     pub(crate) epoch: u64,
     pub(crate) bids: Vec<RemoteBid>,
-    /// For each b-thread that blocks something there, how its block came to be what it is.
+    /// The origin of each b-thread's block there.
     pub(crate) blocks: BTreeMap<String, Statement>,
     /// Requests that a former life of the home may have served: the synchronisation point not to be asked for again.
     pub(crate) unknown: BTreeMap<String, u64>,
-    /// What the home did not honour of the content it acknowledged last.
+    /// The refusals of the content that the home acknowledged last.
     pub(crate) refused: Vec<Refusal>,
     pub(crate) acked_epoch: u64,
     /// When the last acknowledged copy was sent.
@@ -39,23 +39,13 @@ pub(crate) struct Statement {
     pub(crate) durable: Option<u64>,
 }
 
-/// What a home surely does about a block.
+/// The sure hold of a home on a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Upheld {
     /// Until when, on the holder's clock, it keeps the block: one that it keeps without renewal has no end.
     pub(crate) until: Duration,
     /// Whether it has acknowledged the block as it is stated at this very synchronisation point.
     pub(crate) acknowledged: bool,
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Sender<'a> {
-    pub(crate) node: &'a NodeName,
-    pub(crate) incarnation: u64,
-    pub(crate) lease: Duration,
-    /// The term it is in, and how many of its decisions it has applied.
-    pub(crate) term: u64,
-    pub(crate) decided: u64,
 }
 
 impl Statement {
@@ -73,25 +63,6 @@ impl Statement {
 }
 
 impl Outbox {
-    pub(crate) fn new() -> Self {
-        Self {
-            home_incarnation: None,
-            epoch: 0,
-            bids: Vec::new(),
-            blocks: BTreeMap::new(),
-            unknown: BTreeMap::new(),
-            refused: Vec::new(),
-            acked_epoch: 0,
-            acked_sent_at: Duration::ZERO,
-            sent_at: None,
-        }
-    }
-
-    /// The life of the home that requests are addressed to.
-    pub(crate) fn home_incarnation(&self) -> Option<u64> {
-        self.home_incarnation
-    }
-
     /// States these bids from now on.
     pub(crate) fn state(&mut self, mut bids: Vec<RemoteBid>) {
         self.unknown
@@ -117,8 +88,8 @@ impl Outbox {
 
     /// The statement of a block that goes on with this bid: it blocks what it blocked in the content before, or less.
     ///
-    /// The home keeps such a block whichever of the two contents it has. That a b-thread has moved on can be passed over only
-    /// if the home has taken in the block before that, for what is still on its way may be a refusal.
+    /// The home keeps such a block whichever of the two contents it has. That a b-thread has moved on can be passed
+    /// over only if the home has taken in the block before that, for what is still on its way may be a refusal.
     fn continued(&self, place: usize, bid: &RemoteBid) -> Option<Statement> {
         let before = self.bids.iter().find(|before| before.bthread == bid.bthread)?;
         let statement = *self.blocks.get(&bid.bthread)?;
@@ -159,7 +130,8 @@ impl Outbox {
         open.chain(self.unknown.iter().map(|(bthread, sync)| (bthread.clone(), *sync))).collect()
     }
 
-    /// What `bthread` requests since its synchronisation point `sync` may have occurred elsewhere: it is not asked for here.
+    /// The requests of `bthread` at its synchronisation point `sync` may have occurred elsewhere: they are not made
+    /// here.
     pub(crate) fn leave_unknown(&mut self, bthread: &str, sync: u64) {
         self.unknown.insert(bthread.into(), sync);
     }
@@ -193,8 +165,8 @@ impl Outbox {
         self.refused.iter().filter(|refusal| !before.contains(refusal)).cloned().collect()
     }
 
-    /// What the home surely does about the block that `bthread` holds at its synchronisation point `sync`; none if it is
-    /// not known to have taken it in. Counts 0.9 lease from sending (G3).
+    /// The home's sure hold on the block of `bthread` at its synchronisation point `sync`; none if it is not known to
+    /// have taken the block in. Counts 0.9 lease from sending (G3).
     pub(crate) fn upheld(&self, bthread: &str, sync: u64, lease: Duration) -> Option<Upheld> {
         let statement = self.blocks.get(bthread).filter(|statement| statement.sync == sync)?;
         self.upheld_by(*statement, bthread).then(|| match statement.durable {
@@ -218,32 +190,12 @@ impl Outbox {
             && !statement.is_refused(bthread, &self.refused)
     }
 
-    /// The record to send now, if one is due. Each renewal is repeated every tenth of the lease until it is
+    /// The bids to send a copy of now, if one is due. Each renewal is repeated every tenth of the lease until it is
     /// acknowledged; the next one follows a third of the lease after it was sent.
-    pub(crate) fn due(
-        &mut self,
-        now: Duration,
-        from: &Sender<'_>,
-        home: &NodeName,
-        applied: u64,
-    ) -> Option<BidRecord> {
-        if self.next_deadline(from.lease).is_none_or(|due| now < due) {
-            return None;
-        }
+    pub(crate) fn take_due(&mut self, now: Duration, lease: Duration) -> Option<Vec<RemoteBid>> {
+        self.next_deadline(lease).filter(|due| now >= *due)?;
         self.sent_at = Some(now);
-        Some(BidRecord {
-            node: from.node.clone(),
-            incarnation: from.incarnation,
-            home: home.clone(),
-            home_incarnation: self.home_incarnation,
-            epoch: self.epoch,
-            sent_at: now,
-            applied,
-            term: from.term,
-            decided: from.decided,
-            lease_ms: u64::try_from(from.lease.as_millis()).unwrap_or(u64::MAX),
-            bids: self.bids.clone(),
-        })
+        Some(self.bids.clone())
     }
 
     /// When the next copy is due.

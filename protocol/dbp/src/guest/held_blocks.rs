@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use skein_bp::EventSet;
 
-use crate::outbox::Upheld;
-use crate::{NodeName, OnLoss};
+use crate::guest::outbox::Upheld;
+use crate::message::OnLoss;
+use crate::name::NodeName;
 
 /// Every local b-thread whose block concerns other homes.
 #[derive(Clone, Debug, Default)]
@@ -30,7 +31,7 @@ pub(crate) struct Block {
     pub(crate) is_awaited: bool,
 }
 
-/// What the holder may rely on.
+/// How far the holder may rely on a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Standing {
     Unsure,
@@ -41,7 +42,7 @@ pub(crate) enum Standing {
     Confirmed,
 }
 
-/// What a holder is to be told.
+/// News for a holder.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum BlockNews {
     /// Every home keeps the block.
@@ -81,7 +82,7 @@ impl HeldBlocks {
         self.0.retain(|bthread, held| stated.get(bthread) == Some(&held.sync));
     }
 
-    /// What has changed, given what each home surely does about the block of a b-thread at a synchronisation point.
+    /// The changes, given the sure hold of each home on the block of a b-thread at a synchronisation point.
     pub(crate) fn check(
         &mut self,
         now: Duration,

@@ -1,11 +1,11 @@
-//! Who decides together, and who decides for all.
+//! The nodes that decide together, and the one that decides for all.
 
 use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 use skein_bp::{Event, EventSet};
 
-use crate::{NodeName, NodeNameError};
+use crate::name::{NodeName, NodeNameError};
 
 /// First chunk of the events that the coordinator is home to.
 pub const SWARM: &str = "swarm/";
@@ -22,7 +22,7 @@ pub const ROSTER: &str = "roster";
 pub struct Roster {
     /// From 1; a later term makes an earlier one void.
     pub term: u64,
-    /// Where joint events have their home.
+    /// The home of joint events.
     pub coordinator: NodeName,
     /// Every node without which nothing is decided, the coordinator among them.
     pub members: BTreeSet<NodeName>,
@@ -83,5 +83,9 @@ impl Roster {
     #[must_use]
     pub fn joint_events() -> EventSet {
         EventSet::prefix(SWARM)
+    }
+
+    pub(crate) fn is_joint(event: &Event) -> bool {
+        event.name().starts_with(SWARM)
     }
 }

@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Who blocks what, by the event's name and the proxy's.
+/// The stalled events, by name, with the proxies that block each.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Stalls(pub(crate) BTreeMap<String, BTreeSet<String>>);
 
-/// What is to be told.
+/// A change that is to be told.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum StallNews {
     /// An event is requested and blocked by this proxy.

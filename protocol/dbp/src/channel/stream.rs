@@ -3,16 +3,16 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use crate::Occurrence;
+use crate::message::Occurrence;
 
-/// How many occurrences wait behind a hole; those too far ahead are asked for again later.
+/// Most occurrences that wait behind a hole; those too far ahead are asked for again later.
 const MOST_PENDING: usize = 1024;
-/// How many holes are asked for at once.
+/// Most holes that are asked for at once.
 const MOST_HOLES: usize = 8;
-/// How many occurrences of one hole are asked for, and repeated, at once.
+/// Most occurrences of one hole that are asked for, and repeated, at once.
 pub(crate) const REPAIR_CHUNK: u64 = 64;
 
-/// What a stream gives, in order.
+/// A piece of a stream, given out in order.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Heard {
     /// The next occurrence.
@@ -21,7 +21,7 @@ pub(crate) enum Heard {
     Gap { from: u64, to: u64 },
 }
 
-/// What is known of one home's occurrences.
+/// The occurrences of one home, as far as they are known.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Stream {
     incarnation: Option<u64>,
@@ -50,7 +50,7 @@ impl Stream {
         self.applied.is_some()
     }
 
-    /// The home lives in a new incarnation. What the old one left behind is given out, its holes as gaps.
+    /// The home lives in a new incarnation. The rest of the old one is given out, its holes as gaps.
     ///
     /// A home that was known before is heard from its first occurrence on; for one met now, its presence tells.
     pub(crate) fn restart(&mut self, incarnation: u64, heard: &mut VecDeque<Heard>) {
@@ -193,7 +193,7 @@ mod tests {
     use skein_bp::Event;
 
     use super::*;
-    use crate::NodeName;
+    use crate::name::NodeName;
 
     fn occurrence(seq: u64) -> Occurrence {
         Occurrence {

@@ -1,30 +1,27 @@
-//! Who may request and block what at a home (G7).
+//! The grants of a home: which nodes may request and block which of its events (G7).
 
 use serde::Deserialize;
 use skein_bp::{Event, EventSet, Pattern};
 
-use crate::NodeName;
+use crate::name::NodeName;
 
 /// First part of the name of a b-thread that is a script: it needs the rights of its node and those of scripts.
 pub const SCRIPT: &str = "script/";
 
-/// What somebody may do with the events of a home.
+/// The events of a home that somebody may request and block.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Grant {
-    /// What may be requested.
     pub request: EventSet,
-    /// What may be blocked.
     pub block: EventSet,
 }
 
-/// A kind of node, and what all of that kind may do.
+/// A kind of node, and the grant of all its nodes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Role {
     /// Its name, such as `vehicle` or `operator`.
     pub name: String,
     /// The nodes that have it.
     pub nodes: Vec<Pattern>,
-    /// What they may do.
     pub grant: Grant,
 }
 
@@ -52,7 +49,7 @@ pub struct Role {
 #[serde(from = "Vec<RoleTable>")]
 pub struct Authority {
     roles: Vec<Role>,
-    /// What scripts may do at most; none: what their node may.
+    /// The most that scripts may do; none: what their node may.
     scripts: Option<Grant>,
 }
 
@@ -75,7 +72,7 @@ impl Authority {
         &self.roles
     }
 
-    /// What scripts may do at most, if that is less than their node.
+    /// The most that scripts may do, if that is less than their node.
     #[must_use]
     pub fn scripts(&self) -> Option<&Grant> {
         self.scripts.as_ref()

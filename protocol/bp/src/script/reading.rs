@@ -1,0 +1,63 @@
+//! Reading TOML and JSON so that a fault names its line and its field.
+
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::script::fault::{Fault, ScriptFileError};
+
+/// The longest text of a script, in bytes.
+pub const MAX_TEXT: usize = 16 * 1024;
+pub(super) fn too_long(length: usize) -> String {
+    format!("the script is {length} bytes long: expected at most {MAX_TEXT}")
+}
+
+pub(super) fn from_toml<T: for<'de> Deserialize<'de>>(file: &str, text: &str) -> Result<T, ScriptFileError> {
+    let fault = |error: &toml::de::Error, field: String| ScriptFileError {
+        file: file.to_owned(),
+        line: error
+            .span()
+            .and_then(|span| text.get(..span.start))
+            .map(|before| before.matches('\n').count() + 1),
+        field,
+        problem: error.message().to_owned(),
+    };
+    check_length(file, text)?;
+    let parser = toml::Deserializer::parse(text).map_err(|error| fault(&error, String::new()))?;
+    serde_path_to_error::deserialize(parser).map_err(|error| fault(error.inner(), path(&error)))
+}
+
+pub(super) fn from_json<T: for<'de> Deserialize<'de>>(file: &str, text: &str) -> Result<T, ScriptFileError> {
+    check_length(file, text)?;
+    let mut parser = serde_json::Deserializer::from_str(text);
+    let fault = |error: &serde_json::Error, field: String| {
+        let message = error.to_string();
+        let problem = message.split(" at line ").next().unwrap_or_default().to_owned();
+        ScriptFileError { file: file.to_owned(), line: Some(error.line()), field, problem }
+    };
+    let read =
+        serde_path_to_error::deserialize(&mut parser).map_err(|error| fault(error.inner(), path(&error)))?;
+    parser.end().map_err(|error| fault(&error, String::new()))?;
+    Ok(read)
+}
+
+fn check_length(file: &str, text: &str) -> Result<(), ScriptFileError> {
+    if text.len() > MAX_TEXT {
+        return Err(Fault::new("", too_long(text.len())).within(file));
+    }
+    Ok(())
+}
+
+/// The field of an error; empty for the whole.
+fn path<E>(error: &serde_path_to_error::Error<E>) -> String {
+    let path = error.path().to_string();
+    if path == "." { String::new() } else { path }
+}
+
+/// Reads a value that stands at `field`.
+pub(super) fn read<T: for<'de> Deserialize<'de>>(field: &str, value: Value) -> Result<T, Fault> {
+    serde_path_to_error::deserialize(value).map_err(|error| {
+        let inner = path(&error);
+        let dot = if inner.is_empty() || inner.starts_with('[') { "" } else { "." };
+        Fault::new(format!("{field}{dot}{inner}"), error.inner().to_string())
+    })
+}

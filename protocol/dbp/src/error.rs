@@ -1,0 +1,32 @@
+//! Reasons why a node's step does not go well.
+
+use std::sync::Arc;
+
+use skein_bp::ProgramError;
+
+use crate::name::NodeName;
+
+/// A step that did not go well. What happened in it counts all the same.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NodeError {
+    /// The program cannot go on.
+    #[error(transparent)]
+    Program(#[from] ProgramError),
+    /// The b-threads kept requesting.
+    #[error("{node}: the step did not settle within {limit} selections; look at the b-threads that kept requesting: {}", .bthreads.join(", "))]
+    Unsettled {
+        node: NodeName,
+        /// The limit, from [`NodeConfig::settle_limit`](crate::NodeConfig::settle_limit).
+        limit: usize,
+        /// The b-threads that requested the last events.
+        bthreads: Vec<Arc<str>>,
+    },
+    /// A b-thread requests events of two homes at one synchronisation point, so that both could occur.
+    #[error("{node}: b-thread `{bthread}` requests events of {} at one synchronisation point; request at one home only", .homes.join(" and "))]
+    TwoHomes {
+        node: NodeName,
+        /// The b-thread at fault.
+        bthread: String,
+        homes: Vec<String>,
+    },
+}
