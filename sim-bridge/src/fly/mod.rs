@@ -22,11 +22,10 @@ use skein_agent::AgentConfig;
 use skein_ground::{Order, Who};
 use skein_wire::{Fleet, Network, NetworkConfig};
 
-pub(crate) use self::swarm::scan_for_agent;
 pub use self::{
     recording::Recording,
     setup::{FLEET, GROUND, agent_configs, ground_config, simulation_config, vehicle_name},
-    swarm::{Happenings, Links, Swarm},
+    swarm::{Happenings, Links, Swarm, scan_for_agent},
     trial::{Flown, Trial},
 };
 use crate::{
@@ -81,14 +80,6 @@ pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
     let path = out.join("summary.json");
     summary.write(&path).with_context(|| format!("{}: cannot be written", path.display()))?;
     Ok(summary)
-}
-
-/// Flies a scenario as fast as the processor allows, shows nothing and writes no file.
-///
-/// # Errors
-/// What is wrong with the scenario.
-pub(crate) fn in_memory(scenario: &Scenario) -> anyhow::Result<Summary> {
-    in_lockstep(scenario, cli::Controller::Bp, None, None)
 }
 
 fn in_lockstep(

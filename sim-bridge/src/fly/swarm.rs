@@ -11,7 +11,6 @@ use skein_wire::{Link, MemoryStore};
 use skein_world::{LidarScan, Simulation, Truth};
 
 use super::{plan_times::PlanTimes, report::Account, trace_hash::TraceHash};
-use crate::cpu_time;
 use crate::summary::{EventCounts, Traffic};
 
 /// Agents and ground tick once in so many steps of the world: every 20 ms.
@@ -27,7 +26,14 @@ pub struct Swarm {
     trace: TraceHash,
     events: EventCounts,
     plan_times: PlanTimes,
-    agents_cpu: Duration,
+    stopwatch: Option<Stopwatch>,
+}
+
+/// The time that the agents take, by somebody's clock.
+#[derive(Clone, Copy)]
+struct Stopwatch {
+    clock: fn() -> Duration,
+    total: Duration,
 }
 
 struct Vehicle {
@@ -71,7 +77,7 @@ impl Swarm {
             vehicles,
             ground: GroundCore::durable(ground, Box::new(MemoryStore::default())),
             plan_times: PlanTimes::default(),
-            agents_cpu: Duration::ZERO,
+            stopwatch: None,
             ground_link: links.ground,
             steps: 0,
             trace: TraceHash::default(),
@@ -93,9 +99,7 @@ impl Swarm {
         for (index, scan) in &happenings.scans {
             if let Some(vehicle) = self.vehicles.get_mut(*index) {
                 let scan = scan_for_agent(scan);
-                let began = cpu_time();
-                vehicle.agent.sense(now, &scan);
-                self.agents_cpu += cpu_time().saturating_sub(began);
+                timed(&mut self.stopwatch, || vehicle.agent.sense(now, &scan));
             }
         }
         if self.steps.is_multiple_of(STEPS_PER_TICK) {
@@ -118,9 +122,8 @@ impl Swarm {
         keep_own(&mut heard, self.ground.name());
         selections.append(&mut heard);
         for (index, vehicle) in self.vehicles.iter_mut().enumerate() {
-            let (began, cpu_began) = (Instant::now(), cpu_time());
-            vehicle.agent.tick(now, vehicle.link.as_mut());
-            self.agents_cpu += cpu_time().saturating_sub(cpu_began);
+            let began = Instant::now();
+            timed(&mut self.stopwatch, || vehicle.agent.tick(now, vehicle.link.as_mut()));
             let mut heard = vehicle.agent.take_selections();
             self.plan_times.take_in(index, began, &heard, vehicle.agent.is_planning());
             self.simulation.send(index, &vehicle.agent.take_mavlink());
@@ -210,10 +213,15 @@ impl Swarm {
         }
     }
 
-    /// Processor time that the agents have used so far, together.
+    /// Measures the time of all agents together by this clock from now on.
+    pub fn time_agents(&mut self, clock: fn() -> Duration) {
+        self.stopwatch = Some(Stopwatch { clock, total: Duration::ZERO });
+    }
+
+    /// The time that the agents have taken since [`time_agents`](Self::time_agents).
     #[must_use]
-    pub fn agents_cpu(&self) -> Duration {
-        self.agents_cpu
+    pub fn agents_time(&self) -> Duration {
+        self.stopwatch.map_or(Duration::ZERO, |watch| watch.total)
     }
 
     /// What the referee has seen so far.
@@ -243,9 +251,12 @@ pub struct Links {
     pub ground: Box<dyn Link>,
 }
 
-/// What this thread has used so far; a system that does not tell makes all cost nothing.
-fn cpu_time() -> Duration {
-    cpu_time::this_thread().unwrap_or_default()
+fn timed(stopwatch: &mut Option<Stopwatch>, act: impl FnOnce()) {
+    let began = stopwatch.map(|watch| (watch.clock)());
+    act();
+    if let (Some(watch), Some(began)) = (stopwatch, began) {
+        watch.total += (watch.clock)().saturating_sub(began);
+    }
 }
 
 /// Remote b-threads are named `node#bthread`.
@@ -258,9 +269,9 @@ fn keep_own(selections: &mut Vec<Happened>, node: &NodeName) {
     selections.retain(|selection| selection.home == *node);
 }
 
-/// What the agent gets of a scan: all but the true pose, which it never learns.
-/// A scan of the world as a vehicle takes it in.
-pub(crate) fn scan_for_agent(scan: &LidarScan) -> Scan {
+/// The part of a scan that an agent gets: all but the true pose, which it never learns.
+#[must_use]
+pub fn scan_for_agent(scan: &LidarScan) -> Scan {
     Scan {
         stamp: scan.stamp,
         angle_min: scan.angle_min,

@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use comfy_table::{Table, presets};
 use serde_json::{Map, Value, json};
 
-use super::Figure;
+use crate::figure::Figure;
 
 /// What came of an experiment: numbers, tables, figures, and how the numbers compare with what must be reached.
 #[derive(Debug, Clone, Default)]

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 /// The one object that a benchmark prints.
 fn bench(arguments: &[&str], environment: &[(&str, &str)]) -> (Value, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_skein-sim"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_skein-lab"));
     let output = command.arg("bench").args(arguments).arg("--json").envs(environment.iter().copied());
     let output = output.output().expect("the program starts");
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -54,7 +54,6 @@ fn a_fleet_is_measured_at_every_size_asked_for() {
     assert!(sizes[1]["received_messages_per_s"].as_f64() > sizes[0]["received_messages_per_s"].as_f64());
 }
 
-#[cfg(feature = "zenoh")]
 #[test]
 fn round_trips_are_measured_between_processes() {
     let arguments =

@@ -5,13 +5,11 @@ use std::fs;
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
+use skein_lab::bench::plan::movingai::{self, Problem};
 use skein_planning::global::astar::{Astar, AstarConfig, Request, plan};
 use skein_planning::global::{DStarLite, Effort, Potential, Search};
-use skein_planning::grid::movingai::{self, Problem};
 use skein_planning::grid::{Grid, OccupancyGrid, StepCosts};
 use skein_planning::map::{ClearanceMap, VoxelIndex, VoxelMapConfig};
-
-use crate::grids::reference::cells;
 
 /// A map with its problems, or `None`, said aloud, where the data is absent.
 fn shared(map: &str, scenario: &str) -> Option<(Grid, Vec<Problem>)> {
@@ -81,6 +79,10 @@ fn check_clearance_map(map: &str, scenario: &str, stride: usize) {
         let request = Request { start, goal, potential: &potential, discs: &[] };
         assert_published(plan(&mut map, &request, &config, &mut search).unwrap().cost, problem);
     }
+}
+
+fn cells([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = VoxelIndex> {
+    (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| VoxelIndex { x, y, z })))
 }
 
 fn clearance_map(grid: &OccupancyGrid) -> ClearanceMap {

@@ -144,12 +144,7 @@ impl RouteCost {
 
     /// The cost of a leg by itself, without others and endurance.
     #[must_use]
-    pub(super) fn assess_leg(
-        &self,
-        from: &Vector3<f64>,
-        to: &Vector3<f64>,
-        airspace: &Airspace,
-    ) -> Assessment {
+    pub fn assess_leg(&self, from: &Vector3<f64>, to: &Vector3<f64>, airspace: &Airspace) -> Assessment {
         let mut sum = Assessment::default();
         self.add_way(&(to - from), &mut sum);
         self.add_surroundings(from, to, airspace, &mut sum);

@@ -2,23 +2,20 @@
 
 use nalgebra::Vector3;
 
-use super::{Assessment, RouteCost, RouteError, RouteProblem, Traffic};
-use crate::particle_swarm::{
-    Best, Constriction, Improved, ImprovedConfig, Motion, Objective, Standard, Swarm, TabuConfig, TabuSwarm,
-};
 use skein_planning::airspace::Airspace;
 
-/// The algorithms of P3, and those they are compared with. All begin with the same particles, if the seed is the same.
+use super::{Assessment, RouteCost, RouteError, RouteProblem, Traffic};
+use crate::particle_swarm::{
+    Best, Improved, ImprovedConfig, Motion, Objective, Swarm, TabuConfig, TabuSwarm,
+};
+
+/// The algorithms of P3. Both begin with the same particles, if the seed is the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Planner {
     /// The improved particle swarm: on a vehicle.
     Onboard,
     /// The same with tabu search: on the ground.
     Ground,
-    /// The standard particle swarm.
-    Standard,
-    /// The particle swarm with constriction.
-    Constriction,
 }
 
 /// How much is spent on a plan: `particles * generations` evaluations.
@@ -65,16 +62,6 @@ impl Planner {
                     swarm.best().clone()
                 })
             }
-            Planner::Standard => Plan::by_swarm(
-                problem,
-                Swarm::new(space, Standard::default(), effort.particles, seed),
-                effort,
-            ),
-            Planner::Constriction => Plan::by_swarm(
-                problem,
-                Swarm::new(space, Constriction::default(), effort.particles, seed),
-                effort,
-            ),
         }
     }
 }

@@ -6,14 +6,18 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
+use clap::Args;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use skein_bp::script::{Op, Script};
 use skein_bp::verify::{Inspection, Verifier};
 use skein_bp::{Bid, EventSet, Program, ProgramConfig};
+use skein_sim::cli::Exit;
 
-use super::quantile::median;
 use crate::cpu_time;
+use crate::numbers::seconds;
+use crate::quantile::median;
+use crate::task::Task;
 
 /// The same programs on BPpy, for a Python that has it.
 const PEER: &str = include_str!("bp_peer.py");
@@ -47,66 +51,81 @@ impl<T> Figures<T> {
     }
 }
 
-pub(super) fn run(
+#[derive(Args)]
+pub struct Bp {
+    /// Runs of each program; the median counts.
+    #[arg(long, value_name = "N", default_value_t = 5)]
     repetitions: usize,
-    cpu_time: Duration,
+    /// CPU time of each run.
+    #[arg(long, value_name = "S", default_value = "0.5", value_parser = seconds)]
+    seconds: Duration,
+    /// Diners in the state space that the verifier explores.
+    #[arg(long, value_name = "N", default_value_t = 12)]
     philosophers: usize,
-    as_json: bool,
-) -> anyhow::Result<()> {
-    let ours = measure(repetitions, cpu_time)?;
-    let verified = verify(philosophers)?;
-    let theirs = match measure_peer(repetitions, cpu_time) {
-        Ok(theirs) => Some(theirs),
-        Err(why) => {
-            eprintln!(
-                "skein-sim: no comparison: {why:#}; `python3 -m pip install bppy` provides it, {PYTHON} names another interpreter"
-            );
-            None
-        }
-    };
-    let ratio = |of: fn(&Figures<f64>) -> f64| theirs.as_ref().map(|theirs| of(&ours) / of(theirs));
-    let lost = 1.0 - ours.idle_1000 / ours.hot_cold;
-    if as_json {
-        let object = json!({
-            "hot_cold_events_per_s": ours.hot_cold,
-            "idle_100_events_per_s": ours.idle_100,
-            "idle_1000_events_per_s": ours.idle_1000,
-            "woken_1000_events_per_s": ours.woken_1000,
-            "lost_to_1000_idle": lost,
-            "philosophers": philosophers,
-            "verified_states": verified.states,
-            "verify_states_per_s": verified.states as f64 / verified.time_s,
-            "verify_states_per_cpu_s": verified.states as f64 / verified.cpu_time_s,
-            "bppy_events_per_s": theirs,
-            "ratio_hot_cold": ratio(|figures| figures.hot_cold),
-            "ratio_idle_100": ratio(|figures| figures.idle_100),
-            "ratio_idle_1000": ratio(|figures| figures.idle_1000),
-            "ratio_woken_1000": ratio(|figures| figures.woken_1000),
-        });
-        println!("{object}");
-        return Ok(());
-    }
-    type Pick = fn(&Figures<f64>) -> f64;
-    let rows: [(&str, Pick); 4] = [
-        ("hot and cold", |figures| figures.hot_cold),
-        ("with 100 idle", |figures| figures.idle_100),
-        ("with 1000 idle", |figures| figures.idle_1000),
-        ("1000 woken by each", |figures| figures.woken_1000),
-    ];
-    for (name, of) in rows {
-        let beside = match (&theirs, ratio(of)) {
-            (Some(theirs), Some(ratio)) => format!(", {ratio:.0} times BPpy's {:.0}", of(theirs)),
-            _ => String::new(),
+}
+
+impl Task for Bp {
+    const NAME: &'static str = "bp";
+    const ABOUT: &'static str =
+        "Behavioural programs on one processor, beside the same on BPpy where Python has it";
+
+    fn run(&self, as_json: bool) -> anyhow::Result<Exit> {
+        let Self { repetitions, seconds: cpu_time, philosophers } = *self;
+        let ours = measure(repetitions, cpu_time)?;
+        let verified = verify(philosophers)?;
+        let theirs = match measure_peer(repetitions, cpu_time) {
+            Ok(theirs) => Some(theirs),
+            Err(why) => {
+                eprintln!(
+                    "skein-lab: no comparison: {why:#}; `python3 -m pip install bppy` provides it, {PYTHON} names another interpreter"
+                );
+                None
+            }
         };
-        println!("{name:<20} {:>10.0} events per CPU second{beside}", of(&ours));
+        let ratio = |of: fn(&Figures<f64>) -> f64| theirs.as_ref().map(|theirs| of(&ours) / of(theirs));
+        let lost = 1.0 - ours.idle_1000 / ours.hot_cold;
+        if as_json {
+            let object = json!({
+                "hot_cold_events_per_s": ours.hot_cold,
+                "idle_100_events_per_s": ours.idle_100,
+                "idle_1000_events_per_s": ours.idle_1000,
+                "woken_1000_events_per_s": ours.woken_1000,
+                "lost_to_1000_idle": lost,
+                "philosophers": philosophers,
+                "verified_states": verified.states,
+                "verify_states_per_s": verified.states as f64 / verified.time_s,
+                "verify_states_per_cpu_s": verified.states as f64 / verified.cpu_time_s,
+                "bppy_events_per_s": theirs,
+                "ratio_hot_cold": ratio(|figures| figures.hot_cold),
+                "ratio_idle_100": ratio(|figures| figures.idle_100),
+                "ratio_idle_1000": ratio(|figures| figures.idle_1000),
+                "ratio_woken_1000": ratio(|figures| figures.woken_1000),
+            });
+            println!("{object}");
+            return Ok(Exit::Done);
+        }
+        type Pick = fn(&Figures<f64>) -> f64;
+        let rows: [(&str, Pick); 4] = [
+            ("hot and cold", |figures| figures.hot_cold),
+            ("with 100 idle", |figures| figures.idle_100),
+            ("with 1000 idle", |figures| figures.idle_1000),
+            ("1000 woken by each", |figures| figures.woken_1000),
+        ];
+        for (name, of) in rows {
+            let beside = match (&theirs, ratio(of)) {
+                (Some(theirs), Some(ratio)) => format!(", {ratio:.0} times BPpy's {:.0}", of(theirs)),
+                _ => String::new(),
+            };
+            println!("{name:<20} {:>10.0} events per CPU second{beside}", of(&ours));
+        }
+        println!("1000 idle b-threads cost {:.1} %", lost * 100.0);
+        println!(
+            "{philosophers} dining philosophers: {} states verified, {:.0} a second",
+            verified.states,
+            verified.states as f64 / verified.time_s
+        );
+        Ok(Exit::Done)
     }
-    println!("1000 idle b-threads cost {:.1} %", lost * 100.0);
-    println!(
-        "{philosophers} dining philosophers: {} states verified, {:.0} a second",
-        verified.states,
-        verified.states as f64 / verified.time_s
-    );
-    Ok(())
 }
 
 /// The median of several runs of each program, one after another so that a disturbance meets all alike.

@@ -1,4 +1,4 @@
-"""The b-programs of `skein-sim bench bp`, run by BPpy (https://pypi.org/project/bppy).
+"""The b-programs of `skein-lab bench bp`, run by BPpy (https://pypi.org/project/bppy).
 
 Reads from the command line how many times each is run and for how many CPU seconds, and prints as JSON the events per
 CPU second of each time. Events are made once, which is the fastest BPpy can have it.

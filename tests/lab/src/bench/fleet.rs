@@ -8,12 +8,17 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use anyhow::Context as _;
+use clap::Args;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use skein_bp::{BThread, Bid, Context, Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Node, NodeConfig, NodeName, facts};
+use skein_sim::cli::Exit;
 use skein_wire::vocabulary::{ADVANCE, ENTER, TAKEOFF, event, of, of_every_vehicle};
 use skein_wire::{Fleet, Key, Link, MemoryLink, Network, NetworkConfig, NodeLink, State};
+
+use crate::numbers::seconds;
+use crate::task::Task;
 
 /// A control loop's period.
 const TICK: Duration = Duration::from_millis(20);
@@ -40,67 +45,97 @@ struct Cost {
     events_per_s: f64,
 }
 
-/// Measures each size in a process of its own, and prints a table.
-pub(super) fn run(sizes: &[usize], simulated: Duration, as_json: bool) -> anyhow::Result<()> {
-    let costs = sizes.iter().map(|nodes| elsewhere(*nodes, simulated)).collect::<anyhow::Result<Vec<_>>>()?;
-    if as_json {
-        println!("{}", json!({ "simulated_s": simulated.as_secs_f64(), "per_node": costs }));
-        return Ok(());
+#[derive(Args)]
+pub struct Sizes {
+    /// Sizes of the fleet, the ground station included.
+    #[arg(long, value_name = "N", value_delimiter = ',', default_values_t = [2, 10, 50, 100])]
+    nodes: Vec<usize>,
+    /// Simulated time of each run.
+    #[arg(long, value_name = "S", default_value = "30", value_parser = seconds)]
+    seconds: Duration,
+}
+
+impl Task for Sizes {
+    const NAME: &'static str = "fleet";
+    const ABOUT: &'static str = "Memory and messages per node as a fleet grows, over the network in memory";
+
+    fn run(&self, as_json: bool) -> anyhow::Result<Exit> {
+        let costs = self.nodes.iter().map(|nodes| elsewhere(*nodes, self.seconds));
+        let costs = costs.collect::<anyhow::Result<Vec<_>>>()?;
+        if as_json {
+            println!("{}", json!({ "simulated_s": self.seconds.as_secs_f64(), "per_node": costs }));
+            return Ok(Exit::Done);
+        }
+        println!("| nodes | memory, kB | sent/s | sent, kB/s | received/s | received, kB/s | events/s |");
+        println!("|---|---|---|---|---|---|---|");
+        for cost in costs {
+            println!(
+                "| {} | {:.0} | {:.0} | {:.1} | {:.0} | {:.1} | {:.0} |",
+                cost.nodes,
+                cost.memory_bytes / 1e3,
+                cost.sent_messages_per_s,
+                cost.sent_bytes_per_s / 1e3,
+                cost.received_messages_per_s,
+                cost.received_bytes_per_s / 1e3,
+                cost.events_per_s
+            );
+        }
+        Ok(Exit::Done)
     }
-    println!("| nodes | memory, kB | sent/s | sent, kB/s | received/s | received, kB/s | events/s |");
-    println!("|---|---|---|---|---|---|---|");
-    for cost in costs {
-        println!(
-            "| {} | {:.0} | {:.0} | {:.1} | {:.0} | {:.1} | {:.0} |",
-            cost.nodes,
-            cost.memory_bytes / 1e3,
-            cost.sent_messages_per_s,
-            cost.sent_bytes_per_s / 1e3,
-            cost.received_messages_per_s,
-            cost.received_bytes_per_s / 1e3,
-            cost.events_per_s
-        );
-    }
-    Ok(())
 }
 
 fn elsewhere(nodes: usize, simulated: Duration) -> anyhow::Result<Cost> {
     let seconds = simulated.as_secs_f64().to_string();
     let output = Command::new(std::env::current_exe().context("where this program is")?)
-        .args(["bench", "fleet-of", &nodes.to_string(), "--seconds", &seconds])
+        .args(["bench", OneSize::NAME, &nodes.to_string(), "--seconds", &seconds])
         .stderr(Stdio::inherit())
         .output()?;
     anyhow::ensure!(output.status.success(), "the run of {nodes} nodes has ended with {}", output.status);
     Ok(serde_json::from_slice(&output.stdout)?)
 }
 
-/// Runs a fleet of one size here, and prints what it cost as JSON.
-pub(super) fn run_one(nodes: usize, simulated: Duration) -> anyhow::Result<()> {
-    anyhow::ensure!(nodes >= 2 && !simulated.is_zero(), "a fleet has two nodes at least, and some time");
-    let before = memory_bytes()?;
-    let mut members = fleet(nodes)?;
-    let mut now = Duration::ZERO;
-    while now < simulated {
-        members.network.advance(now);
-        for member in &mut members.nodes {
-            member.go_on(now)?;
+#[derive(Args)]
+pub struct OneSize {
+    /// Size of the fleet.
+    nodes: usize,
+    /// Simulated time.
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    seconds: Duration,
+}
+
+impl Task for OneSize {
+    const NAME: &'static str = "fleet-of";
+    const ABOUT: &'static str = "One size of fleet, in this process; the cost as JSON";
+    const HIDDEN: bool = true;
+
+    fn run(&self, _: bool) -> anyhow::Result<Exit> {
+        let Self { nodes, seconds: simulated } = *self;
+        anyhow::ensure!(nodes >= 2 && !simulated.is_zero(), "a fleet has two nodes at least, and some time");
+        let before = memory_bytes()?;
+        let mut members = fleet(nodes)?;
+        let mut now = Duration::ZERO;
+        while now < simulated {
+            members.network.advance(now);
+            for member in &mut members.nodes {
+                member.go_on(now)?;
+            }
+            now += TICK;
         }
-        now += TICK;
+        let memory = memory_bytes()?.saturating_sub(before);
+        let sum = |of: fn(&Member) -> u64| members.nodes.iter().map(of).sum::<u64>() as f64 / nodes as f64;
+        let rate = |of: fn(&Member) -> u64| sum(of) / simulated.as_secs_f64();
+        let cost = Cost {
+            nodes,
+            memory_bytes: memory as f64 / nodes as f64,
+            sent_messages_per_s: rate(|member| member.link.sent.messages),
+            sent_bytes_per_s: rate(|member| member.link.sent.bytes),
+            received_messages_per_s: rate(|member| member.link.received.messages),
+            received_bytes_per_s: rate(|member| member.link.received.bytes),
+            events_per_s: rate(|member| member.events),
+        };
+        println!("{}", serde_json::to_string(&cost)?);
+        Ok(Exit::Done)
     }
-    let memory = memory_bytes()?.saturating_sub(before);
-    let sum = |of: fn(&Member) -> u64| members.nodes.iter().map(of).sum::<u64>() as f64 / nodes as f64;
-    let rate = |of: fn(&Member) -> u64| sum(of) / simulated.as_secs_f64();
-    let cost = Cost {
-        nodes,
-        memory_bytes: memory as f64 / nodes as f64,
-        sent_messages_per_s: rate(|member| member.link.sent.messages),
-        sent_bytes_per_s: rate(|member| member.link.sent.bytes),
-        received_messages_per_s: rate(|member| member.link.received.messages),
-        received_bytes_per_s: rate(|member| member.link.received.bytes),
-        events_per_s: rate(|member| member.events),
-    };
-    println!("{}", serde_json::to_string(&cost)?);
-    Ok(())
 }
 
 /// The memory of this process that is backed by no file.

@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use anyhow::Context as _;
+use clap::Args;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -14,14 +15,15 @@ use skein_agent::pipeline::perception::{Perception, Pose};
 use skein_agent::{AgentConfig, Me};
 use skein_mav::SetPoint;
 use skein_planning::separation::{self, FilterConfig, Neighbour, filter};
+use skein_sim::cli::{Controller, Exit};
+use skein_sim::fly::{agent_configs, scan_for_agent};
+use skein_sim::scenario::Scenario;
+use skein_sim::summary::PlanTimes;
 use skein_wire::vocabulary::GOTO;
 use skein_world::{Lidar, Scene};
 
-use crate::cli::Controller;
 use crate::cpu_time;
-use crate::fly::{agent_configs, scan_for_agent};
-use crate::scenario::Scenario;
-use crate::summary::PlanTimes;
+use crate::task::Task;
 
 /// Neighbours around the vehicle.
 const NEIGHBOURS: usize = 20;
@@ -54,40 +56,57 @@ struct Figures {
     plan_ms: PlanTimes,
 }
 
-pub(super) fn run(ticks: usize, seed: u64, as_json: bool) -> anyhow::Result<()> {
-    let times = measure(ticks, seed)?;
-    let (plans, rays) = (times.plan.len(), 720);
-    let figures = Figures {
-        tick_ms: PlanTimes::of(times.tick),
-        map_ms: PlanTimes::of(times.map),
-        look_ahead_ms: PlanTimes::of(times.look),
-        steer_ms: PlanTimes::of(times.steer),
-        filter_ms: PlanTimes::of(times.filter),
-        plan_ms: PlanTimes::of(times.plan),
-    };
-    if as_json {
-        let mut object = json!({ "ticks": ticks, "rays": rays, "neighbours": NEIGHBOURS, "plans": plans });
-        if let (Some(all), serde_json::Value::Object(parts)) =
-            (object.as_object_mut(), serde_json::to_value(&figures)?)
-        {
-            all.extend(parts);
+#[derive(Args)]
+pub struct Nav {
+    /// Ticks.
+    #[arg(long, value_name = "N", default_value_t = 2000)]
+    ticks: usize,
+    /// The seed of forest and neighbours.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    seed: u64,
+}
+
+impl Task for Nav {
+    const NAME: &'static str = "nav";
+    const ABOUT: &'static str = "One tick of a vehicle's navigation: map from a scan of 720 rays, local plan, safety filter with 20 neighbours";
+
+    fn run(&self, as_json: bool) -> anyhow::Result<Exit> {
+        let Self { ticks, seed } = *self;
+        let times = measure(ticks, seed)?;
+        let (plans, rays) = (times.plan.len(), 720);
+        let figures = Figures {
+            tick_ms: PlanTimes::of(times.tick),
+            map_ms: PlanTimes::of(times.map),
+            look_ahead_ms: PlanTimes::of(times.look),
+            steer_ms: PlanTimes::of(times.steer),
+            filter_ms: PlanTimes::of(times.filter),
+            plan_ms: PlanTimes::of(times.plan),
+        };
+        if as_json {
+            let mut object =
+                json!({ "ticks": ticks, "rays": rays, "neighbours": NEIGHBOURS, "plans": plans });
+            if let (Some(all), serde_json::Value::Object(parts)) =
+                (object.as_object_mut(), serde_json::to_value(&figures)?)
+            {
+                all.extend(parts);
+            }
+            println!("{object}");
+            return Ok(Exit::Done);
         }
-        println!("{object}");
-        return Ok(());
+        println!("{ticks} ticks with a scan, {NEIGHBOURS} neighbours; CPU time in ms: mean, p99, most");
+        let rows = [
+            ("one tick", figures.tick_ms),
+            ("  map from the scan", figures.map_ms),
+            ("  look along the path", figures.look_ahead_ms),
+            ("  velocity", figures.steer_ms),
+            ("    of it the filter", figures.filter_ms),
+            ("a path, when needed", figures.plan_ms),
+        ];
+        for (name, PlanTimes { mean, p99, max }) in rows {
+            println!("{name:<24} {mean:>8.3} {p99:>8.3} {max:>8.3}");
+        }
+        Ok(Exit::Done)
     }
-    println!("{ticks} ticks with a scan, {NEIGHBOURS} neighbours; CPU time in ms: mean, p99, most");
-    let rows = [
-        ("one tick", figures.tick_ms),
-        ("  map from the scan", figures.map_ms),
-        ("  look along the path", figures.look_ahead_ms),
-        ("  velocity", figures.steer_ms),
-        ("    of it the filter", figures.filter_ms),
-        ("a path, when needed", figures.plan_ms),
-    ];
-    for (name, PlanTimes { mean, p99, max }) in rows {
-        println!("{name:<24} {mean:>8.3} {p99:>8.3} {max:>8.3}");
-    }
-    Ok(())
 }
 
 /// Flies one vehicle through the forest, to and fro, among others that keep around it.

@@ -2,35 +2,58 @@
 
 use std::io::{IsTerminal as _, Write as _};
 
+use clap::Args;
 use serde_json::json;
 use skein_promises::{Campaign, Failure, Report, Settings, campaign};
+use skein_sim::cli::Exit;
 
-use crate::cli::NetworkCampaign;
+use crate::task::Task;
 
 /// How many failing stories are shrunk and told.
 const TOLD: usize = 3;
 
-/// Runs the campaign, and prints what came of it. Returns whether nothing was violated.
-pub(super) fn run(args: &NetworkCampaign, as_json: bool) -> anyhow::Result<bool> {
-    let settings = settings(args.breaks.as_deref())?;
-    let processors = std::thread::available_parallelism().map_or(1, usize::from);
-    let jobs = args.jobs.unwrap_or(processors);
-    let plan = Campaign { from: args.from, seeds: args.seeds, jobs, shrunk: TOLD, settings };
-    let on_terminal = std::io::stderr().is_terminal();
-    let report = campaign(&plan, &|done, failed| {
-        if on_terminal {
-            let mut stderr = std::io::stderr().lock();
-            // Nobody misses a line of progress that cannot be written.
-            let _ = write!(stderr, "\r{done} of {} seeds, {failed} failed", args.seeds);
-            let _ = if done == args.seeds { writeln!(stderr) } else { stderr.flush() };
+#[derive(Args)]
+pub struct Network {
+    /// Seeds.
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    seeds: u64,
+    /// The first seed.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    from: u64,
+    /// Seeds at once; as many as this computer has processors if not given.
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// Let every node break this promise on purpose; needs the cargo feature `mutants`.
+    #[arg(long = "break", value_name = "PROMISE", ignore_case = true,
+        value_parser = ["G1", "G2", "G3", "G4", "G5", "G6", "G7", "G8", "G9"])]
+    breaks: Option<String>,
+}
+
+impl Task for Network {
+    const NAME: &'static str = "network";
+    const ABOUT: &'static str = "Generated programs on 2 to 10 nodes in memory, in lockstep, under every fault a network and a process can have; every promise is checked at every step";
+
+    fn run(&self, as_json: bool) -> anyhow::Result<Exit> {
+        let settings = settings(self.breaks.as_deref())?;
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        let jobs = self.jobs.unwrap_or(processors);
+        let plan = Campaign { from: self.from, seeds: self.seeds, jobs, shrunk: TOLD, settings };
+        let on_terminal = std::io::stderr().is_terminal();
+        let report = campaign(&plan, &|done, failed| {
+            if on_terminal {
+                let mut stderr = std::io::stderr().lock();
+                // Nobody misses a line of progress that cannot be written.
+                let _ = write!(stderr, "\r{done} of {} seeds, {failed} failed", self.seeds);
+                let _ = if done == self.seeds { writeln!(stderr) } else { stderr.flush() };
+            }
+        });
+        if as_json {
+            println!("{}", to_json(&report));
+        } else {
+            print(&report);
         }
-    });
-    if as_json {
-        println!("{}", to_json(&report));
-    } else {
-        print(&report);
+        Ok(Exit::of(report.failures.is_empty()))
     }
-    Ok(report.failures.is_empty())
 }
 
 #[cfg(feature = "mutants")]
@@ -46,7 +69,7 @@ fn settings(breaks: Option<&str>) -> anyhow::Result<Settings> {
 fn settings(breaks: Option<&str>) -> anyhow::Result<Settings> {
     if let Some(promise) = breaks {
         anyhow::bail!(
-            "`--break {promise}` needs a build that can break promises: cargo run --release --features mutants -- campaign network --break {promise}"
+            "`--break {promise}` needs a build that can break promises: cargo run --release -p skein-lab --features mutants -- campaign network --break {promise}"
         );
     }
     Ok(Settings::default())

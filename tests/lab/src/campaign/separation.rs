@@ -1,16 +1,19 @@
 //! `campaign separation`: swarms that hear one another late and not always, in lockstep; nobody may touch anybody, or anything.
 
 use std::io::{IsTerminal as _, Write as _};
+use std::ops::RangeInclusive;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use clap::Args;
 use serde::Serialize;
 use serde_json::json;
+use skein_sim::cli::{Controller, Exit};
+use skein_sim::fly::Trial;
+use skein_sim::scenario::{Network, Scenario};
+use skein_sim::summary::Summary;
 
-use crate::cli::SeparationCampaign;
-use crate::fly;
-use crate::scenario::{Network, Scenario};
-use crate::summary::Summary;
+use crate::task::Task;
 
 /// One flight of the campaign.
 #[derive(Debug, Clone, Serialize)]
@@ -38,45 +41,78 @@ impl Run {
     }
 }
 
-/// Runs the campaign, and prints what came of it. Returns whether nobody touched anything.
-pub(super) fn run(args: &SeparationCampaign, as_json: bool) -> anyhow::Result<bool> {
-    let runs = fly_all(args)?;
-    let collided: Vec<&Run> = runs.iter().filter(|run| run.collisions > 0).collect();
-    let late: Vec<&Run> = runs.iter().filter(|run| run.collisions == 0 && !run.arrived).collect();
-    let least = |of: fn(&Run) -> Option<f64>| runs.iter().filter_map(of).reduce(f64::min);
-    let separation_m = least(|run| run.min_separation_m);
-    let clearance_m = least(|run| run.min_clearance_m);
-    if as_json {
-        let object = json!({
-            "runs": runs.len(),
-            "vehicles": args.vehicles,
-            "latency_ms": args.latency_ms,
-            "loss": args.loss,
-            "lease_ms": args.lease_ms,
-            "collisions": collided.iter().map(|run| run.collisions).sum::<u64>(),
-            "arrived": runs.iter().filter(|run| run.arrived).count(),
-            "min_separation_m": separation_m,
-            "min_clearance_m": clearance_m,
-            "collided": collided,
-            "not_arrived": late,
-        });
-        println!("{object}");
-    } else {
-        for Run { scenario, seed, reason, .. } in collided.iter().chain(&late) {
-            println!("{scenario}, seed {seed}: {}", reason.as_deref().unwrap_or_default());
+#[derive(Args)]
+pub struct Separation {
+    /// Seeds of each scenario.
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    seeds: u64,
+    /// The first seed.
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    from: u64,
+    /// Built-in scenarios.
+    #[arg(long = "scenario", value_name = "NAME", default_values_t = ["antipodal".to_owned(), "forest".to_owned()])]
+    scenarios: Vec<String>,
+    /// Size of the swarm.
+    #[arg(long, value_name = "N", default_value_t = 16)]
+    vehicles: usize,
+    /// Mean time that a message takes; each takes from half to one and a half of it.
+    #[arg(long, value_name = "MS", default_value_t = 300.0, value_parser = within(0.0..=60_000.0))]
+    latency_ms: f64,
+    /// Share of messages that are lost.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.3, value_parser = share)]
+    loss: f64,
+    /// How long bids hold elsewhere without being renewed: several times as long as a message takes there and back.
+    #[arg(long, value_name = "MS", default_value_t = 4000.0, value_parser = within(100.0..=10_000.0))]
+    lease_ms: f64,
+    /// Flights at once; as many as this computer has processors if not given.
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+}
+
+impl Task for Separation {
+    const NAME: &'static str = "separation";
+    const ABOUT: &'static str = "Whole swarms in lockstep whose vehicles hear one another late and not always: nobody may touch anything";
+
+    fn run(&self, as_json: bool) -> anyhow::Result<Exit> {
+        let runs = fly_all(self)?;
+        let collided: Vec<&Run> = runs.iter().filter(|run| run.collisions > 0).collect();
+        let late: Vec<&Run> = runs.iter().filter(|run| run.collisions == 0 && !run.arrived).collect();
+        let least = |of: fn(&Run) -> Option<f64>| runs.iter().filter_map(of).reduce(f64::min);
+        let separation_m = least(|run| run.min_separation_m);
+        let clearance_m = least(|run| run.min_clearance_m);
+        if as_json {
+            let object = json!({
+                "runs": runs.len(),
+                "vehicles": self.vehicles,
+                "latency_ms": self.latency_ms,
+                "loss": self.loss,
+                "lease_ms": self.lease_ms,
+                "collisions": collided.iter().map(|run| run.collisions).sum::<u64>(),
+                "arrived": runs.iter().filter(|run| run.arrived).count(),
+                "min_separation_m": separation_m,
+                "min_clearance_m": clearance_m,
+                "collided": collided,
+                "not_arrived": late,
+            });
+            println!("{object}");
+        } else {
+            for Run { scenario, seed, reason, .. } in collided.iter().chain(&late) {
+                println!("{scenario}, seed {seed}: {}", reason.as_deref().unwrap_or_default());
+            }
+            let metres =
+                |length: Option<f64>| length.map_or("-".to_owned(), |length| format!("{length:.3} m"));
+            println!("{:<20} {:>10}", "flights", runs.len());
+            println!("{:<20} {:>10}", "with a collision", collided.len());
+            println!("{:<20} {:>10}", "all arrived", runs.iter().filter(|run| run.arrived).count());
+            println!("{:<20} {:>10}", "least separation", metres(separation_m));
+            println!("{:<20} {:>10}", "least clearance", metres(clearance_m));
         }
-        let metres = |length: Option<f64>| length.map_or("-".to_owned(), |length| format!("{length:.3} m"));
-        println!("{:<20} {:>10}", "flights", runs.len());
-        println!("{:<20} {:>10}", "with a collision", collided.len());
-        println!("{:<20} {:>10}", "all arrived", runs.iter().filter(|run| run.arrived).count());
-        println!("{:<20} {:>10}", "least separation", metres(separation_m));
-        println!("{:<20} {:>10}", "least clearance", metres(clearance_m));
+        Ok(Exit::of(collided.is_empty()))
     }
-    Ok(collided.is_empty())
 }
 
 /// Every scenario with every seed, in that order whichever ends first.
-fn fly_all(args: &SeparationCampaign) -> anyhow::Result<Vec<Run>> {
+fn fly_all(args: &Separation) -> anyhow::Result<Vec<Run>> {
     let seeds = args.from..args.from + args.seeds;
     let flights: Vec<(&str, u64)> = args
         .scenarios
@@ -106,11 +142,11 @@ fn fly_all(args: &SeparationCampaign) -> anyhow::Result<Vec<Run>> {
     results.into_iter().map(|(_, run)| run).collect()
 }
 
-fn fly_one(args: &SeparationCampaign, scenario: &str, seed: u64) -> anyhow::Result<Run> {
+fn fly_one(args: &Separation, scenario: &str, seed: u64) -> anyhow::Result<Run> {
     let mut scenario = Scenario::built_in(scenario, Some(args.vehicles), seed)?;
     scenario.network = Network { latency_ms: args.latency_ms, loss: args.loss, lease_ms: args.lease_ms };
     scenario.validate()?;
-    fly::in_memory(&scenario).map(Run::of)
+    Ok(Run::of(Trial::new(&scenario, Controller::Bp).fly(&mut |_, _| {})?.summary))
 }
 
 fn tell(done: usize, of: usize) {
@@ -119,5 +155,19 @@ fn tell(done: usize, of: usize) {
         // Nobody misses a line of progress that cannot be written.
         let _ = write!(stderr, "\r{done} of {of} flights");
         let _ = if done == of { writeln!(stderr) } else { stderr.flush() };
+    }
+}
+
+fn within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| match text.parse() {
+        Ok(number) if range.contains(&number) => Ok(number),
+        _ => Err(format!("expected a number from {} to {}", range.start(), range.end())),
+    }
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(number) if (0.0..1.0).contains(&number) => Ok(number),
+        _ => Err("expected a number from 0 to below 1".to_owned()),
     }
 }

@@ -1,14 +1,18 @@
 //! Ablation: each layer of the pipeline is left out in turn, to see what it contributes.
 
+use clap::Args;
 use serde_json::json;
 use skein_agent::{GlobalPlanner, Layer, LocalPlanner, Planners};
+use skein_sim::cli::Controller;
+use skein_sim::fly::Trial;
+use skein_sim::scenario::Scenario;
+use skein_sim::summary::Summary;
 
-use super::statistics::mean;
-use super::{Bound, Options, Report, runs};
-use crate::cli::Controller;
-use crate::fly::Trial;
-use crate::scenario::Scenario;
-use crate::summary::Summary;
+use crate::numbers::one_or_more;
+use crate::report::{Bound, Report};
+use crate::reported::Experiment;
+use crate::runs;
+use crate::statistics::mean;
 
 /// Worlds of the first scenario.
 const RUNS: usize = 50;
@@ -35,57 +39,73 @@ const fn without(layer: Layer) -> Planners {
     Planners { without: Some(layer), ..ALL }
 }
 
-pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
-    let runs = options.runs.unwrap_or(RUNS);
-    let mut flights = Vec::new();
-    for (scenario, fewer) in SCENARIOS {
-        for (_, planners) in VARIANTS {
-            flights.extend((1..=runs.div_ceil(fewer) as u64).map(|seed| (scenario, planners, seed)));
-        }
-    }
-    let summaries = runs::in_turn("flights", &flights, |(scenario, planners, seed)| {
-        let mut scenario = Scenario::built_in(scenario, options.vehicles, *seed)?;
-        scenario.orders.clear();
-        scenario.time_limit_s = TIME_LIMIT_S;
-        let trial = Trial::new(&scenario, Controller::Bp);
-        Ok(trial.with_agents(|agent| agent.planners = *planners).fly(&mut |_, _| {})?.summary)
-    })?;
-    let mut report = Report::default();
-    let mut rest = summaries.as_slice();
-    let mut variants = Vec::new();
-    for (scenario, fewer) in SCENARIOS {
-        let worlds = runs.div_ceil(fewer);
-        let mut rows = Vec::new();
-        for (name, planners) in VARIANTS {
-            let (summaries, others) = rest.split_at(worlds);
-            rest = others;
-            let found = Found::of(summaries);
-            if planners == ALL {
-                let what = format!("worlds of `{scenario}` that all layers together bring everyone through");
-                report.goal(&what, found.succeeded as f64, Bound::Exactly(worlds as f64));
+#[derive(Args)]
+pub struct Ablation {
+    /// Worlds, whose seeds are 1 to N.
+    #[arg(long, value_name = "N", default_value_t = RUNS, value_parser = one_or_more())]
+    runs: usize,
+    /// Size of the swarm; the scenario's own if not given.
+    #[arg(long, value_name = "N", value_parser = one_or_more())]
+    vehicles: Option<usize>,
+}
+
+impl Experiment for Ablation {
+    const NAME: &'static str = "ablation";
+    const ABOUT: &'static str =
+        "what each layer of the pipeline contributes: forests, a crossing and a window without it";
+
+    fn run(&self) -> anyhow::Result<Report> {
+        let mut flights = Vec::new();
+        for (scenario, fewer) in SCENARIOS {
+            for (_, planners) in VARIANTS {
+                flights.extend((1..=self.runs.div_ceil(fewer) as u64).map(|seed| (scenario, planners, seed)));
             }
-            rows.push(found.row(name));
-            variants.push(found.json(scenario, name));
         }
-        report.table(
-            &format!(
-                "What each layer contributes in `{scenario}`: time and distance are means over the worlds that succeed"
-            ),
-            &[
-                "",
-                "succeeded",
-                "hit obstacles",
-                "hit vehicles",
-                "time, s",
-                "distance, m",
-                "closest, m",
-                "clearance, m",
-            ],
-            rows,
-        );
+        let summaries = runs::in_turn("flights", &flights, |(scenario, planners, seed)| {
+            let mut scenario = Scenario::built_in(scenario, self.vehicles, *seed)?;
+            scenario.orders.clear();
+            scenario.time_limit_s = TIME_LIMIT_S;
+            let trial = Trial::new(&scenario, Controller::Bp);
+            Ok(trial.with_agents(|agent| agent.planners = *planners).fly(&mut |_, _| {})?.summary)
+        })?;
+        let mut report = Report::default();
+        let mut rest = summaries.as_slice();
+        let mut variants = Vec::new();
+        for (scenario, fewer) in SCENARIOS {
+            let worlds = self.runs.div_ceil(fewer);
+            let mut rows = Vec::new();
+            for (name, planners) in VARIANTS {
+                let (summaries, others) = rest.split_at(worlds);
+                rest = others;
+                let found = Found::of(summaries);
+                if planners == ALL {
+                    let what =
+                        format!("worlds of `{scenario}` that all layers together bring everyone through");
+                    report.goal(&what, found.succeeded as f64, Bound::Exactly(worlds as f64));
+                }
+                rows.push(found.row(name));
+                variants.push(found.json(scenario, name));
+            }
+            report.table(
+                &format!(
+                    "What each layer contributes in `{scenario}`: time and distance are means over the worlds that succeed"
+                ),
+                &[
+                    "",
+                    "succeeded",
+                    "hit obstacles",
+                    "hit vehicles",
+                    "time, s",
+                    "distance, m",
+                    "closest, m",
+                    "clearance, m",
+                ],
+                rows,
+            );
+        }
+        report.number("variants", variants);
+        Ok(report)
     }
-    report.number("variants", variants);
-    Ok(report)
 }
 
 /// What came of one variant.
@@ -154,8 +174,7 @@ mod tests {
 
     #[test]
     fn every_layer_is_left_out_once_in_every_scenario() {
-        let options = Options { runs: Some(1), vehicles: Some(2), ..Options::default() };
-        let json = run(&options).expect("it can be flown").to_json();
+        let json = Ablation { runs: 1, vehicles: Some(2) }.run().expect("it can be flown").to_json();
         let variants = json["variants"].as_array().expect("a list");
         assert_eq!(variants.len(), VARIANTS.len() * SCENARIOS.len());
         for (place, (scenario, _)) in SCENARIOS.iter().enumerate() {

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 use std::time::Duration;
 
+use clap::Args;
 use nalgebra::{Vector2, Vector3};
 use serde_json::json;
 use skein_mav::{Command, Companion, CompanionConfig, FlightMode, SetPoint};
@@ -10,8 +11,12 @@ use skein_world::{
     PositionIntegral, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup, WindConfig,
 };
 
-use super::statistics::{mean, root_mean_square};
-use super::{Bound, Figure, Line, Options, Report, Style, runs};
+use crate::figure::{Figure, Line, Style};
+use crate::numbers::one_or_more;
+use crate::report::{Bound, Report};
+use crate::reported::Experiment;
+use crate::runs;
+use crate::statistics::{mean, root_mean_square};
 
 const RUNS: usize = 20;
 /// The circle: its radius in metres, and how fast it is flown, m/s.
@@ -46,47 +51,59 @@ impl Flight {
     }
 }
 
-pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
-    let seeds: Vec<u64> = (1..=options.runs.unwrap_or(RUNS) as u64).collect();
-    let flights = runs::in_turn("flights", &seeds, |seed| {
-        INTEGRALS.iter().map(|(_, integral)| fly(*integral, *seed)).collect::<anyhow::Result<Vec<_>>>()
-    })?;
-    let mut report = Report::default();
-    report.number("runs", seeds.len());
-    let mut rows = Vec::new();
-    let mut found = Vec::new();
-    for (index, (name, _)) in INTEGRALS.iter().enumerate() {
-        let errors: Vec<Vec<f64>> =
-            flights.iter().filter_map(|flight| flight.get(index)).map(Flight::errors_m).collect();
-        let rms_m = mean(&errors.iter().map(|errors| root_mean_square(errors)).collect::<Vec<_>>());
-        let greatest = |errors: &Vec<f64>| errors.iter().copied().fold(0.0, f64::max);
-        let max_m = mean(&errors.iter().map(greatest).collect::<Vec<_>>());
-        report.number(&name.replace(' ', "_"), json!({ "rms_m": rms_m, "max_m": max_m }));
-        rows.push(vec![(*name).to_owned(), format!("{rms_m:.3}"), format!("{max_m:.3}")]);
-        found.push((rms_m, max_m));
-    }
-    report.table(
-        "Tracking a circle: means over the runs of each run's error",
-        &["position loop", "RMS, m", "greatest, m"],
-        rows,
-    );
-    if let [variable, plain, ..] = found.as_slice() {
-        report.goal(
-            "RMS error, share of that of the plain integral",
-            variable.0 / plain.0,
-            Bound::Below(1.0),
+#[derive(Args)]
+pub struct Circle {
+    /// Flights, whose seeds are 1 to N.
+    #[arg(long, value_name = "N", default_value_t = RUNS, value_parser = one_or_more())]
+    runs: usize,
+}
+
+impl Experiment for Circle {
+    const NAME: &'static str = "circle";
+    const ABOUT: &'static str = "a circle by cascade PID: variable integral against a plain one (Zhang 2019)";
+
+    fn run(&self) -> anyhow::Result<Report> {
+        let seeds: Vec<u64> = (1..=self.runs as u64).collect();
+        let flights = runs::in_turn("flights", &seeds, |seed| {
+            INTEGRALS.iter().map(|(_, integral)| fly(*integral, *seed)).collect::<anyhow::Result<Vec<_>>>()
+        })?;
+        let mut report = Report::default();
+        report.number("runs", seeds.len());
+        let mut rows = Vec::new();
+        let mut found = Vec::new();
+        for (index, (name, _)) in INTEGRALS.iter().enumerate() {
+            let errors: Vec<Vec<f64>> =
+                flights.iter().filter_map(|flight| flight.get(index)).map(Flight::errors_m).collect();
+            let rms_m = mean(&errors.iter().map(|errors| root_mean_square(errors)).collect::<Vec<_>>());
+            let greatest = |errors: &Vec<f64>| errors.iter().copied().fold(0.0, f64::max);
+            let max_m = mean(&errors.iter().map(greatest).collect::<Vec<_>>());
+            report.number(&name.replace(' ', "_"), json!({ "rms_m": rms_m, "max_m": max_m }));
+            rows.push(vec![(*name).to_owned(), format!("{rms_m:.3}"), format!("{max_m:.3}")]);
+            found.push((rms_m, max_m));
+        }
+        report.table(
+            "Tracking a circle: means over the runs of each run's error",
+            &["position loop", "RMS, m", "greatest, m"],
+            rows,
         );
-        report.goal(
-            "greatest error, share of that of the plain integral",
-            variable.1 / plain.1,
-            Bound::Below(1.0),
-        );
+        if let [variable, plain, ..] = found.as_slice() {
+            report.goal(
+                "RMS error, share of that of the plain integral",
+                variable.0 / plain.0,
+                Bound::Below(1.0),
+            );
+            report.goal(
+                "greatest error, share of that of the plain integral",
+                variable.1 / plain.1,
+                Bound::Below(1.0),
+            );
+        }
+        if let Some(first) = flights.first() {
+            report.figure("circle", map(first));
+            report.figure("error", errors_over_time(first));
+        }
+        Ok(report)
     }
-    if let Some(first) = flights.first() {
-        report.figure("circle", map(first));
-        report.figure("error", errors_over_time(first));
-    }
-    Ok(report)
 }
 
 /// Where the vehicle shall be `since_s` after it was first sent to the circle.
@@ -219,7 +236,7 @@ mod tests {
 
     #[test]
     fn the_variable_integral_overshoots_less_than_the_plain_one() {
-        let report = run(&Options { runs: Some(1), ..Options::default() }).expect("it can be flown");
+        let report = Circle { runs: 1 }.run().expect("it can be flown");
         assert!(report.is_reached(), "{report}");
     }
 }

@@ -3,6 +3,7 @@
 
 use std::fmt;
 
+use clap::Args;
 use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -13,9 +14,13 @@ use skein_planning::global::{DStarLite, Effort, Route, Search, Unsolved, elide_c
 use skein_planning::grid::{Grid, OccupancyGrid, SizeError, StepCosts};
 use skein_planning::map::VoxelIndex;
 
-use super::{Bound, Figure, Line, Options, Report, Style, runs};
-use crate::bench::quantile::{median, quantile};
 use crate::cpu_time;
+use crate::figure::{Figure, Line, Style};
+use crate::numbers::one_or_more;
+use crate::quantile::{median, quantile};
+use crate::report::{Bound, Report};
+use crate::reported::Experiment;
+use crate::runs;
 
 /// Cells along a side of the marker grid.
 const MARKERS: usize = 10;
@@ -34,7 +39,6 @@ const SIZE: [usize; 3] = [200, 200, 40];
 const REACH_M: f64 = 10.0;
 /// The vehicle moves on by a cell after so many changes.
 const CHANGES_PER_STEP: usize = 4;
-/// Runs of each world, unless the command line says otherwise.
 const RUNS: usize = 1;
 /// Changes from one line of progress to the next.
 const CHANGES_PER_LINE: usize = 100;
@@ -43,11 +47,24 @@ const SPEEDUP: f64 = 10.0;
 /// Two sums of the same costs in different order differ by less.
 const SAME_COST: f64 = 1e-6;
 
-pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
-    let mut report = Report::default();
-    routes(&mut report)?;
-    replanning(&mut report, options.runs.unwrap_or(RUNS))?;
-    Ok(report)
+#[derive(Args)]
+pub struct DstarGrid {
+    /// Runs of each world, whose seeds are 1 to N.
+    #[arg(long, value_name = "N", default_value_t = RUNS, value_parser = one_or_more())]
+    runs: usize,
+}
+
+impl Experiment for DstarGrid {
+    const NAME: &'static str = "dstar-grid";
+    const ABOUT: &'static str =
+        "D* with a collision factor on the marker grid, and re-planning by D* Lite (Zhang 2019)";
+
+    fn run(&self) -> anyhow::Result<Report> {
+        let mut report = Report::default();
+        routes(&mut report)?;
+        replanning(&mut report, self.runs)?;
+        Ok(report)
+    }
 }
 
 /// The cell with a number on the marker grid.

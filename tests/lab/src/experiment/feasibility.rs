@@ -3,12 +3,16 @@
 
 use std::time::Duration;
 
+use clap::Args;
 use serde_json::json;
+use skein_sim::cli::Controller;
+use skein_sim::fly::{Swarm, Trial};
+use skein_sim::scenario::Scenario;
 
-use super::{Bound, Options, Report, runs};
-use crate::cli::Controller;
-use crate::fly::{Swarm, Trial};
-use crate::scenario::Scenario;
+use crate::numbers::one_or_more;
+use crate::report::{Bound, Report};
+use crate::reported::Experiment;
+use crate::{runs, statistics};
 
 const RUNS: usize = 5;
 /// How long a vehicle that does nothing is waited for, s: twice as long as one that flies needs.
@@ -39,46 +43,62 @@ struct Outcome {
     path_length_m: f64,
 }
 
-pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
-    let seeds = 1..=options.runs.unwrap_or(RUNS) as u64;
-    let flights: Vec<_> = CASES.iter().flat_map(|case| seeds.clone().map(move |seed| (case, seed))).collect();
-    let vehicles = options.vehicles.unwrap_or(1);
-    let outcomes = runs::in_turn("flights", &flights, |(case, seed)| fly(case, vehicles, *seed))?;
-    let mut report = Report::default();
-    let mut rows = Vec::new();
-    let mut cases = Vec::new();
-    for (case, outcomes) in CASES.iter().zip(outcomes.chunks(seeds.clone().count())) {
-        let ran = outcomes.iter().filter(|outcome| outcome.ran).count();
-        let navigated = outcomes.iter().filter(|outcome| outcome.navigated).count();
-        let lengths: Vec<f64> = outcomes.iter().map(|outcome| outcome.path_length_m).collect();
-        let path_length_m = super::statistics::mean(&lengths);
-        let loaded = if case.loaded { "loaded" } else { "not loaded" };
-        let obstacles = if case.obstacles { "obstacles" } else { "no obstacles" };
-        let all = outcomes.len();
-        rows.push(vec![
-            loaded.to_owned(),
-            obstacles.to_owned(),
-            verdict(ran, all),
-            verdict(navigated, all),
-            format!("{path_length_m:.1} m"),
-        ]);
-        cases.push(json!({
-            "b_threads": case.loaded, "obstacles": case.obstacles, "runs": all,
-            "program_runs": ran, "navigates": navigated, "path_length_m": path_length_m,
-        }));
-        let what = |what| format!("b-threads {loaded}, {obstacles}: runs in which {what}");
-        report.goal(&what("the program runs"), ran as f64, Bound::Exactly(all as f64));
-        let expected = if case.navigates { all } else { 0 };
-        report.goal(&what("the vehicle navigates"), navigated as f64, Bound::Exactly(expected as f64));
+#[derive(Args)]
+pub struct Feasibility {
+    /// Worlds, whose seeds are 1 to N.
+    #[arg(long, value_name = "N", default_value_t = RUNS, value_parser = one_or_more())]
+    runs: usize,
+    /// Size of the swarm.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = one_or_more())]
+    vehicles: usize,
+}
+
+impl Experiment for Feasibility {
+    const NAME: &'static str = "feasibility";
+    const ABOUT: &'static str =
+        "whether it navigates: b-threads loaded or not, obstacles or none (Wang 2023, table 1)";
+
+    fn run(&self) -> anyhow::Result<Report> {
+        let seeds = 1..=self.runs as u64;
+        let flights: Vec<_> =
+            CASES.iter().flat_map(|case| seeds.clone().map(move |seed| (case, seed))).collect();
+        let outcomes = runs::in_turn("flights", &flights, |(case, seed)| fly(case, self.vehicles, *seed))?;
+        let mut report = Report::default();
+        let mut rows = Vec::new();
+        let mut cases = Vec::new();
+        for (case, outcomes) in CASES.iter().zip(outcomes.chunks(seeds.clone().count())) {
+            let ran = outcomes.iter().filter(|outcome| outcome.ran).count();
+            let navigated = outcomes.iter().filter(|outcome| outcome.navigated).count();
+            let lengths: Vec<f64> = outcomes.iter().map(|outcome| outcome.path_length_m).collect();
+            let path_length_m = statistics::mean(&lengths);
+            let loaded = if case.loaded { "loaded" } else { "not loaded" };
+            let obstacles = if case.obstacles { "obstacles" } else { "no obstacles" };
+            let all = outcomes.len();
+            rows.push(vec![
+                loaded.to_owned(),
+                obstacles.to_owned(),
+                verdict(ran, all),
+                verdict(navigated, all),
+                format!("{path_length_m:.1} m"),
+            ]);
+            cases.push(json!({
+                "b_threads": case.loaded, "obstacles": case.obstacles, "runs": all,
+                "program_runs": ran, "navigates": navigated, "path_length_m": path_length_m,
+            }));
+            let what = |what| format!("b-threads {loaded}, {obstacles}: runs in which {what}");
+            report.goal(&what("the program runs"), ran as f64, Bound::Exactly(all as f64));
+            let expected = if case.navigates { all } else { 0 };
+            report.goal(&what("the vehicle navigates"), navigated as f64, Bound::Exactly(expected as f64));
+        }
+        report.number("runs", seeds.count());
+        report.number("cases", cases);
+        report.table(
+            "Feasibility (Wang 2023, table 1)",
+            &["b-threads", "world", "program runs", "navigates", "flown"],
+            rows,
+        );
+        Ok(report)
     }
-    report.number("runs", seeds.count());
-    report.number("cases", cases);
-    report.table(
-        "Feasibility (Wang 2023, table 1)",
-        &["b-threads", "world", "program runs", "navigates", "flown"],
-        rows,
-    );
-    Ok(report)
 }
 
 fn verdict(of: usize, all: usize) -> String {
@@ -126,7 +146,7 @@ mod tests {
 
     #[test]
     fn the_program_runs_in_all_four_cases_and_navigates_with_b_threads_only() {
-        let report = run(&Options { runs: Some(1), ..Options::default() }).expect("it can be run");
+        let report = Feasibility { runs: 1, vehicles: 1 }.run().expect("it can be run");
         let json = report.to_json();
         let ticks = |field: &str| {
             CASES.iter().enumerate().map(|(n, _)| json["cases"][n][field].clone()).collect::<Vec<_>>()

@@ -1,13 +1,19 @@
 //! Performance: the navigator of b-threads against one sequential loop around the same planners, in the same random
 //! worlds (Wang 2023, the second experiment).
 
+use clap::Args;
 use serde_json::{Value, json};
+use skein_sim::cli::Controller;
+use skein_sim::fly::Trial;
+use skein_sim::scenario::Scenario;
 
-use super::statistics::{confidence_95, mean};
-use super::{Bound, Figure, Line, Options, Report, Style, runs};
-use crate::cli::Controller;
-use crate::fly::Trial;
-use crate::scenario::Scenario;
+use crate::cpu_time;
+use crate::figure::{Figure, Line, Style};
+use crate::numbers::one_or_more;
+use crate::report::{Bound, Report};
+use crate::reported::Experiment;
+use crate::runs;
+use crate::statistics::{confidence_95, mean};
 
 const SCENARIO: &str = include_str!("performance.toml");
 const RUNS: usize = 500;
@@ -55,27 +61,45 @@ struct Flight {
     odometry_m: f64,
 }
 
-pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
-    let seeds: Vec<u64> = (1..=options.runs.unwrap_or(RUNS) as u64).collect();
-    let vehicles = options.vehicles.unwrap_or(1);
-    let pairs = runs::in_turn("pairs", &seeds, |seed| {
-        let scenario = Scenario::from_toml(SCENARIO, "performance.toml", Some(vehicles), *seed)?;
-        Ok([fly(&scenario, Controller::Bp)?, fly(&scenario, Controller::Sequential)?])
-    })?;
-    let mut report = Report::default();
-    compare(&mut report, &pairs);
-    Ok(report)
+#[derive(Args)]
+pub struct Performance {
+    /// Worlds, whose seeds are 1 to N.
+    #[arg(long, value_name = "N", default_value_t = RUNS, value_parser = one_or_more())]
+    runs: usize,
+    /// Size of the swarm.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = one_or_more())]
+    vehicles: usize,
+}
+
+impl Experiment for Performance {
+    const NAME: &'static str = "performance";
+    const ABOUT: &'static str =
+        "b-threads against one sequential loop in 500 random worlds (Wang 2023, table 2)";
+
+    fn run(&self) -> anyhow::Result<Report> {
+        let seeds: Vec<u64> = (1..=self.runs as u64).collect();
+        let pairs = runs::in_turn("pairs", &seeds, |seed| {
+            let scenario = Scenario::from_toml(SCENARIO, "performance.toml", Some(self.vehicles), *seed)?;
+            Ok([fly(&scenario, Controller::Bp)?, fly(&scenario, Controller::Sequential)?])
+        })?;
+        let mut report = Report::default();
+        compare(&mut report, &pairs);
+        Ok(report)
+    }
 }
 
 fn fly(scenario: &Scenario, controller: Controller) -> anyhow::Result<Flight> {
-    let flown = Trial::new(scenario, controller).fly(&mut |_, _| {})?;
+    let began = cpu_time::this_thread()?;
+    let trial = Trial::new(scenario, controller).timed_by(cpu_time::this_thread_or_nothing);
+    let flown = trial.fly(&mut |_, _| {})?;
+    let whole_cpu = cpu_time::this_thread()?.saturating_sub(began);
     let summary = flown.summary;
     Ok(Flight {
         succeeded: summary.succeeded,
         navigation_s: summary.flight_time_s.mean,
         simulation_s: summary.sim_time_s,
-        cpu_percent: 100.0 * flown.agents_cpu.as_secs_f64() / summary.sim_time_s,
-        whole_cpu_percent: 100.0 * flown.whole_cpu.as_secs_f64() / summary.sim_time_s,
+        cpu_percent: 100.0 * flown.agents_time.as_secs_f64() / summary.sim_time_s,
+        whole_cpu_percent: 100.0 * whole_cpu.as_secs_f64() / summary.sim_time_s,
         odometry_m: summary.path_length_m.mean,
     })
 }
@@ -185,7 +209,7 @@ mod tests {
 
     #[test]
     fn both_navigators_cross_the_same_worlds() {
-        let report = run(&Options { runs: Some(2), ..Options::default() }).expect("it can be run");
+        let report = Performance { runs: 2, vehicles: 1 }.run().expect("it can be run");
         let json = report.to_json();
         assert_eq!(json["succeeded"], json!({ "bp": 2, "sequential": 2 }));
         for of in ["bp", "sequential"] {

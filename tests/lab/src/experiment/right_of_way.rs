@@ -3,17 +3,22 @@
 
 use std::collections::BTreeMap;
 
+use clap::Args;
 use serde_json::json;
 use skein_agent::PassageRule;
 use skein_bp::Event;
 use skein_dbp::{Happened, NodeName};
+use skein_sim::cli::Controller;
+use skein_sim::fly::Trial;
+use skein_sim::scenario::Scenario;
 use skein_wire::vocabulary::{ENTER, LANDED, LEAVE};
 
-use super::statistics::mean;
-use super::{Bound, Figure, Line, Options, Report, Style, runs};
-use crate::cli::Controller;
-use crate::fly::Trial;
-use crate::scenario::Scenario;
+use crate::figure::{Figure, Line, Style};
+use crate::numbers::one_or_more;
+use crate::report::{Bound, Report};
+use crate::reported::Experiment;
+use crate::runs;
+use crate::statistics::mean;
 
 const RUNS: usize = 20;
 const RULES: [(PassageRule, &str); 2] =
@@ -73,57 +78,73 @@ struct Flight {
     flight_time_s: f64,
 }
 
-pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
-    let seeds: Vec<u64> = (1..=options.runs.unwrap_or(RUNS) as u64).collect();
-    let mut report = Report::default();
-    let mut rows = Vec::new();
-    for (network, is_slow) in [("as in `window`", false), ("100 ms, 20 % lost", true)] {
-        let of_both = runs::in_turn(network, &seeds, |seed| {
-            let mut scenario = Scenario::built_in("window", options.vehicles, *seed)?;
-            if is_slow {
-                (scenario.network.latency_ms, scenario.network.loss) = SLOW;
+#[derive(Args)]
+pub struct RightOfWay {
+    /// Worlds, whose seeds are 1 to N.
+    #[arg(long, value_name = "N", default_value_t = RUNS, value_parser = one_or_more())]
+    runs: usize,
+    /// Size of the swarm; the scenario's own if not given.
+    #[arg(long, value_name = "N", value_parser = one_or_more())]
+    vehicles: Option<usize>,
+}
+
+impl Experiment for RightOfWay {
+    const NAME: &'static str = "right-of-way";
+    const ABOUT: &'static str =
+        "one vehicle at a time through a window: blocks that are confirmed, and the naive rule beside them";
+
+    fn run(&self) -> anyhow::Result<Report> {
+        let seeds: Vec<u64> = (1..=self.runs as u64).collect();
+        let mut report = Report::default();
+        let mut rows = Vec::new();
+        for (network, is_slow) in [("as in `window`", false), ("100 ms, 20 % lost", true)] {
+            let of_both = runs::in_turn(network, &seeds, |seed| {
+                let mut scenario = Scenario::built_in("window", self.vehicles, *seed)?;
+                if is_slow {
+                    (scenario.network.latency_ms, scenario.network.loss) = SLOW;
+                }
+                Ok([fly(&scenario, RULES[0].0)?, fly(&scenario, RULES[1].0)?])
+            })?;
+            for (side, (_, rule)) in RULES.iter().enumerate() {
+                let flights: Vec<&Flight> = of_both.iter().map(|both| &both[side]).collect();
+                let sum = |of: fn(&Flight) -> usize| flights.iter().map(|flight| of(flight)).sum::<usize>();
+                let entries = sum(|flight| flight.passage.entries);
+                let shared = sum(|flight| flight.passage.shared);
+                let most = flights.iter().map(|flight| flight.passage.most_at_once).max().unwrap_or(0);
+                let succeeded = sum(|flight| flight.succeeded.into());
+                let collisions: u64 = flights.iter().map(|flight| flight.collisions).sum();
+                let time_s = mean(&flights.iter().map(|flight| flight.flight_time_s).collect::<Vec<_>>());
+                report.number(
+                    &format!("{rule}{}", if is_slow { "_slow_network" } else { "" }),
+                    json!({
+                        "runs": flights.len(), "succeeded": succeeded, "collisions": collisions,
+                        "entries": entries, "shared_entries": shared, "most_at_once": most, "flight_time_s": time_s,
+                    }),
+                );
+                rows.push(vec![
+                    network.to_owned(),
+                    (*rule).to_owned(),
+                    format!("{succeeded} of {}", flights.len()),
+                    collisions.to_string(),
+                    format!("{shared} of {entries}"),
+                    most.to_string(),
+                    format!("{time_s:.1} s"),
+                ]);
+                let goal = format!("{rule}, {network}: entries while another is inside");
+                let bound = if side == 0 { Bound::Exactly(0.0) } else { Bound::AtLeast(1.0) };
+                report.goal(&goal, shared as f64, bound);
             }
-            Ok([fly(&scenario, RULES[0].0)?, fly(&scenario, RULES[1].0)?])
-        })?;
-        for (side, (_, rule)) in RULES.iter().enumerate() {
-            let flights: Vec<&Flight> = of_both.iter().map(|both| &both[side]).collect();
-            let sum = |of: fn(&Flight) -> usize| flights.iter().map(|flight| of(flight)).sum::<usize>();
-            let entries = sum(|flight| flight.passage.entries);
-            let shared = sum(|flight| flight.passage.shared);
-            let most = flights.iter().map(|flight| flight.passage.most_at_once).max().unwrap_or(0);
-            let succeeded = sum(|flight| flight.succeeded.into());
-            let collisions: u64 = flights.iter().map(|flight| flight.collisions).sum();
-            let time_s = mean(&flights.iter().map(|flight| flight.flight_time_s).collect::<Vec<_>>());
-            report.number(
-                &format!("{rule}{}", if is_slow { "_slow_network" } else { "" }),
-                json!({
-                    "runs": flights.len(), "succeeded": succeeded, "collisions": collisions,
-                    "entries": entries, "shared_entries": shared, "most_at_once": most, "flight_time_s": time_s,
-                }),
-            );
-            rows.push(vec![
-                network.to_owned(),
-                (*rule).to_owned(),
-                format!("{succeeded} of {}", flights.len()),
-                collisions.to_string(),
-                format!("{shared} of {entries}"),
-                most.to_string(),
-                format!("{time_s:.1} s"),
-            ]);
-            let goal = format!("{rule}, {network}: entries while another is inside");
-            let bound = if side == 0 { Bound::Exactly(0.0) } else { Bound::AtLeast(1.0) };
-            report.goal(&goal, shared as f64, bound);
+            if let (true, Some(both)) = (is_slow, of_both.iter().max_by_key(|both| both[1].passage.shared)) {
+                report.figure("inside", inside(both));
+            }
         }
-        if let (true, Some(both)) = (is_slow, of_both.iter().max_by_key(|both| both[1].passage.shared)) {
-            report.figure("inside", inside(both));
-        }
+        report.table(
+            "Right of way at a window",
+            &["network", "rule", "all arrive", "collisions", "shared entries", "most at once", "flight time"],
+            rows,
+        );
+        Ok(report)
     }
-    report.table(
-        "Right of way at a window",
-        &["network", "rule", "all arrive", "collisions", "shared entries", "most at once", "flight time"],
-        rows,
-    );
-    Ok(report)
 }
 
 fn fly(scenario: &Scenario, rule: PassageRule) -> anyhow::Result<Flight> {
@@ -163,7 +184,7 @@ mod tests {
 
     #[test]
     fn confirmed_blocks_keep_a_passage_to_one_and_the_naive_rule_does_not() {
-        let report = run(&Options { runs: Some(3), ..Options::default() }).expect("it can be run");
+        let report = RightOfWay { runs: 3, vehicles: None }.run().expect("it can be run");
         assert!(report.is_reached(), "{report}");
         let json = report.to_json();
         assert_eq!(json["confirmed"]["most_at_once"], 1);

@@ -1,16 +1,21 @@
 //! Vector field histogram: dense cylinders that are not known before, at a speed that follows the scene (Xu 2023).
 
+use clap::Args;
 use nalgebra::Vector3;
 use serde_json::json;
+use skein_sim::cli::Controller;
+use skein_sim::fly::Trial;
+use skein_sim::scenario::Scenario;
+use skein_sim::summary::Summary;
 use skein_world::vehicle::GRAVITY_M_S2;
 use skein_world::{RigidState, Shape, VehicleModel};
 
-use super::statistics::mean;
-use super::{Bound, Figure, Line, Options, Report, Style, runs};
-use crate::cli::Controller;
-use crate::fly::Trial;
-use crate::scenario::Scenario;
-use crate::summary::Summary;
+use crate::figure::{Figure, Line, Style};
+use crate::numbers::one_or_more;
+use crate::report::{Bound, Report};
+use crate::reported::Experiment;
+use crate::runs;
+use crate::statistics::mean;
 
 const SCENARIO: &str = include_str!("vfh.toml");
 const RUNS: usize = 100;
@@ -53,21 +58,34 @@ impl Flight {
     }
 }
 
-pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
-    let seeds: Vec<u64> = (1..=options.runs.unwrap_or(RUNS) as u64).collect();
-    let flights = runs::in_turn("flights", &seeds, |seed| fly(&scenario(*seed)?))?;
-    let slow = runs::in_turn("slow flights", &seeds[..seeds.len().min(SLOW_RUNS)], |seed| {
-        let mut scenario = scenario(*seed)?;
-        scenario.cruise_speed_m_s = SLOW_M_S;
-        Ok(fly(&scenario)?.summary.flight_time_s.mean)
-    })?;
-    let mut report = Report::default();
-    judge(&mut report, &flights, &slow);
-    if let (Some(first), Some(seed)) = (flights.first(), seeds.first()) {
-        report.figure("speed", profile(first));
-        report.figure("map", map(first, &scenario(*seed)?));
+#[derive(Args)]
+pub struct Vfh {
+    /// Worlds, whose seeds are 1 to N.
+    #[arg(long, value_name = "N", default_value_t = RUNS, value_parser = one_or_more())]
+    runs: usize,
+}
+
+impl Experiment for Vfh {
+    const NAME: &'static str = "vfh";
+    const ABOUT: &'static str =
+        "dense cylinders by vector field histogram, at a speed that follows the scene (Xu 2023)";
+
+    fn run(&self) -> anyhow::Result<Report> {
+        let seeds: Vec<u64> = (1..=self.runs as u64).collect();
+        let flights = runs::in_turn("flights", &seeds, |seed| fly(&scenario(*seed)?))?;
+        let slow = runs::in_turn("slow flights", &seeds[..seeds.len().min(SLOW_RUNS)], |seed| {
+            let mut scenario = scenario(*seed)?;
+            scenario.cruise_speed_m_s = SLOW_M_S;
+            Ok(fly(&scenario)?.summary.flight_time_s.mean)
+        })?;
+        let mut report = Report::default();
+        judge(&mut report, &flights, &slow);
+        if let (Some(first), Some(seed)) = (flights.first(), seeds.first()) {
+            report.figure("speed", profile(first));
+            report.figure("map", map(first, &scenario(*seed)?));
+        }
+        Ok(report)
     }
-    Ok(report)
 }
 
 fn scenario(seed: u64) -> anyhow::Result<Scenario> {

@@ -1,6 +1,8 @@
 //! Round trips between processes over real Zenoh on the loopback interface: plain, through our queues, and as events.
 //!
-//! The other processes are this program again, in a role of its own (see `link_peer`).
+//! The other processes are this program again, in a role of its own (see [`peer`]).
+
+pub mod peer;
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Ipv4Addr, TcpListener};
@@ -8,7 +10,8 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use clap::ValueEnum as _;
+use clap::builder::RangedU64ValueParser;
+use clap::{Args, ValueEnum as _};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde::Serialize;
@@ -16,15 +19,18 @@ use serde_json::json;
 use skein_bp::script::{Op, Script};
 use skein_bp::{BThread, Bid, Context, Event, Program, ProgramConfig};
 use skein_dbp::{NodeName, facts};
+use skein_sim::cli::Exit;
 use skein_wire::vocabulary::{ADVANCE, event, of_every_vehicle};
 use skein_wire::{Key, Link as _, Topic};
 use skein_zenoh::{ZenohLink, ZenohSession};
 
-use super::link_peer::{
-    GROUND, Member, PATIENCE, PAYLOAD, PING, Role, Seen, TIME_TO_MEET, fleet, home, meet, microseconds,
+use self::peer::{
+    GROUND, Member, PATIENCE, PAYLOAD, PING, Part, Role, Seen, TIME_TO_MEET, fleet, home, meet, microseconds,
     session,
 };
-use super::quantile::quantile;
+use crate::numbers::seconds;
+use crate::quantile::quantile;
+use crate::task::Task;
 
 /// Zenoh's threads as it comes.
 const AS_IT_COMES: &str = "()";
@@ -32,16 +38,6 @@ const AS_IT_COMES: &str = "()";
 const TURNS: usize = 20;
 /// Between two blocks that are to be confirmed.
 const REST: Duration = Duration::from_millis(7);
-
-/// How much is measured.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Extent {
-    pub round_trips: usize,
-    pub homes: usize,
-    pub confirmations: usize,
-    /// For how long one process is stopped; more than a lease.
-    pub stopped: Duration,
-}
 
 /// The median and the longest but one in a hundred.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -57,48 +53,70 @@ impl Times {
     }
 }
 
-pub(super) fn run(extent: Extent, as_json: bool) -> anyhow::Result<()> {
-    let [zenoh, shared, queued, event] = round_trips(extent.round_trips)?;
-    let SwarmSeen { confirm, before, during, others_lost } = swarm(extent)?;
-    let stopped = json!({
-        "leases_lost": others_lost,
-        "longest_superstep_us": during,
-        "longest_superstep_before_us": before,
-    });
-    if as_json {
-        let object = json!({
-            "zenoh_rtt_us": zenoh,
-            "zenoh_shared_rtt_us": shared,
-            "queued_rtt_us": queued,
-            "event_rtt_us": event,
-            "ratio_p50": event.p50 / zenoh.p50,
-            "ratio_event_shared_p50": event.p50 / shared.p50,
-            "ratio_event_queued_p50": event.p50 / queued.p50,
-            "homes": extent.homes,
-            "confirm_10_homes_us": confirm,
-            "stopped": stopped,
+#[derive(Args)]
+pub struct Extent {
+    /// Round trips of each kind.
+    #[arg(long, value_name = "N", default_value_t = 4000)]
+    round_trips: usize,
+    /// Homes that confirm a block, each in a process of its own.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = RangedU64ValueParser::<usize>::new().range(2..))]
+    homes: usize,
+    /// Blocks that are confirmed.
+    #[arg(long, value_name = "N", default_value_t = 500)]
+    confirmations: usize,
+    /// Time for which one process is stopped; more than a lease.
+    #[arg(long = "stopped-s", value_name = "S", default_value = "5", value_parser = seconds)]
+    stopped: Duration,
+}
+
+impl Task for Extent {
+    const NAME: &'static str = "link";
+    const ABOUT: &'static str =
+        "Round trips between processes over Zenoh: plain, through the link's queues, and as events";
+
+    fn run(&self, as_json: bool) -> anyhow::Result<Exit> {
+        let [zenoh, shared, queued, event] = round_trips(self.round_trips)?;
+        let SwarmSeen { confirm, before, during, others_lost } = swarm(self)?;
+        let stopped = json!({
+            "leases_lost": others_lost,
+            "longest_superstep_us": during,
+            "longest_superstep_before_us": before,
         });
-        println!("{object}");
-        return Ok(());
+        if as_json {
+            let object = json!({
+                "zenoh_rtt_us": zenoh,
+                "zenoh_shared_rtt_us": shared,
+                "queued_rtt_us": queued,
+                "event_rtt_us": event,
+                "ratio_p50": event.p50 / zenoh.p50,
+                "ratio_event_shared_p50": event.p50 / shared.p50,
+                "ratio_event_queued_p50": event.p50 / queued.p50,
+                "homes": self.homes,
+                "confirm_10_homes_us": confirm,
+                "stopped": stopped,
+            });
+            println!("{object}");
+            return Ok(Exit::Done);
+        }
+        let line = |what: &str, times: Times| {
+            println!("{what:<32} median {:>7.0} us, p99 {:>7.0} us", times.p50, times.p99);
+        };
+        line("plain Zenoh, there and back", zenoh);
+        line("the same on two threads, as ours", shared);
+        line("through our queues", queued);
+        line("request to resumed b-thread", event);
+        println!(
+            "an event takes {:.2} times plain Zenoh, {:.2} times Zenoh on two threads, {:.2} times our queues",
+            event.p50 / zenoh.p50,
+            event.p50 / shared.p50,
+            event.p50 / queued.p50
+        );
+        line(&format!("a block confirmed by {} homes", self.homes), confirm);
+        println!(
+            "one of them stopped: {others_lost} leases lost among the others, longest superstep {during:.0} us (before: {before:.0} us)"
+        );
+        Ok(Exit::Done)
     }
-    let line = |what: &str, times: Times| {
-        println!("{what:<32} median {:>7.0} us, p99 {:>7.0} us", times.p50, times.p99);
-    };
-    line("plain Zenoh, there and back", zenoh);
-    line("the same on two threads, as ours", shared);
-    line("through our queues", queued);
-    line("request to resumed b-thread", event);
-    println!(
-        "an event takes {:.2} times plain Zenoh, {:.2} times Zenoh on two threads, {:.2} times our queues",
-        event.p50 / zenoh.p50,
-        event.p50 / shared.p50,
-        event.p50 / queued.p50
-    );
-    line(&format!("a block confirmed by {} homes", extent.homes), confirm);
-    println!(
-        "one of them stopped: {others_lost} leases lost among the others, longest superstep {during:.0} us (before: {before:.0} us)"
-    );
-    Ok(())
 }
 
 /// Times in microseconds over plain Zenoh, over Zenoh on the threads that ours works on, through our queues, and as events.
@@ -240,7 +258,7 @@ struct SwarmSeen {
 }
 
 /// A ground station here, and each of its homes in a process of its own; the last of them is stopped in the end.
-fn swarm(extent: Extent) -> anyhow::Result<SwarmSeen> {
+fn swarm(extent: &Extent) -> anyhow::Result<SwarmSeen> {
     let session = session(Vec::new())?;
     let ground = NodeName::new(GROUND)?;
     let mut program = Program::new(ProgramConfig::vehicle(1));
@@ -362,7 +380,7 @@ impl Peer {
         let role = role.to_possible_value().context("every role has a name")?;
         let mut command = Command::new(std::env::current_exe().context("where this program is")?);
         command.envs(runtime.map(|runtime| ("ZENOH_RUNTIME", runtime)));
-        command.args(["bench", "link-peer", role.get_name(), endpoint]);
+        command.args(["bench", Part::NAME, role.get_name(), endpoint]);
         command.args([number, homes].map(|n| n.to_string()));
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
         let sections = child.stdin.take();

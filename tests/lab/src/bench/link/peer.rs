@@ -1,4 +1,4 @@
-//! The processes that `bench link` talks to, and what both sides of it are made of.
+//! The processes that `link` talks to, and what both sides of it are made of.
 //!
 //! A peer lives until its standard input ends. Each line there ends a section of its measurements; when all is over it
 //! prints what each section saw.
@@ -8,16 +8,19 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use skein_bp::script::{Op, Script};
 use skein_bp::{Bid, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName, facts};
+use skein_sim::cli::Exit;
 use skein_wire::vocabulary::{ENTER, of_every_vehicle};
 use skein_wire::{Fleet, Key, Link as _, NodeLink, Topic};
 use skein_zenoh::{Bell, NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
 use zenoh::Wait as _;
 use zenoh::qos::CongestionControl;
+
+use crate::task::Task;
 
 /// The node that measures.
 pub(super) const GROUND: &str = "ground/main";
@@ -141,15 +144,33 @@ fn plain_zenoh(listen: &[String], connect: &[String]) -> anyhow::Result<zenoh::S
     zenoh::open(config).wait().map_err(anyhow::Error::from_boxed)
 }
 
-/// The life of a peer: the vehicle `number` of `homes`, connected to the one who measures.
-pub(super) fn run(role: Role, number: usize, homes: usize, connect: &str) -> anyhow::Result<()> {
-    let sections = sections();
-    let connect = vec![connect.to_owned()];
-    match role {
-        Role::ZenohAsk => ask_over_zenoh(number, &connect, &sections),
-        Role::ZenohEcho => echo_over_zenoh(&connect, &sections),
-        Role::Queues => echo_through_queues(connect, &sections),
-        Role::Node => be_a_node(number, homes, connect, &sections),
+#[derive(Args)]
+pub struct Part {
+    #[arg(value_enum)]
+    role: Role,
+    /// The endpoint at which the one who measures listens.
+    connect: String,
+    /// Its number among the homes, from 1.
+    number: usize,
+    homes: usize,
+}
+
+impl Task for Part {
+    const NAME: &'static str = "link-peer";
+    const ABOUT: &'static str = "A process that `link` talks to";
+    const HIDDEN: bool = true;
+
+    fn run(&self, _: bool) -> anyhow::Result<Exit> {
+        let sections = sections();
+        let Self { role, number, homes, .. } = *self;
+        let connect = vec![self.connect.clone()];
+        match role {
+            Role::ZenohAsk => ask_over_zenoh(number, &connect, &sections),
+            Role::ZenohEcho => echo_over_zenoh(&connect, &sections),
+            Role::Queues => echo_through_queues(connect, &sections),
+            Role::Node => be_a_node(number, homes, connect, &sections),
+        }?;
+        Ok(Exit::Done)
     }
 }
 

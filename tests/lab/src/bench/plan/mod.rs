@@ -1,18 +1,26 @@
 //! Searches on published maps: how often they find a way, how long it is beside the shortest, and what that takes.
 
-use std::path::Path;
+pub mod movingai;
+#[cfg(feature = "peers")]
+mod peer;
+
+use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use clap::builder::PossibleValue;
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 #[cfg(feature = "peers")]
 use serde_json::json;
 use skein_planning::global::{DStarLite, Effort, Route, Search, Unsolved};
-use skein_planning::grid::movingai::{self, Problem};
 use skein_planning::grid::{Grid, StepCosts};
+use skein_sim::cli::Exit;
 
-use super::quantile::quantile;
-use crate::cli::{PlanBench, Planner};
+use self::movingai::Problem;
 use crate::cpu_time;
+use crate::numbers::one_or_more;
+use crate::quantile::quantile;
+use crate::task::Task;
 
 /// Published lengths have six digits or more: within this share, and this many cells, a length is the published one.
 const SAME_LENGTH: (f64, f64) = (5e-6, 1e-8);
@@ -37,7 +45,7 @@ impl Spread {
 /// What came of a map's problems.
 #[derive(Debug, Serialize)]
 struct Result {
-    planner: &'static str,
+    planner: Planner,
     problems: usize,
     /// A way was found and is proven to keep the bound.
     solved: usize,
@@ -56,35 +64,81 @@ struct Result {
     ms: Spread,
 }
 
-pub(super) fn run(args: &PlanBench, as_json: bool) -> anyhow::Result<()> {
-    let (grid, problems) = match (&args.map, &args.scen) {
-        (Some(map), Some(scen)) => read(map, scen)?,
-        _ => return peers(None, as_json),
-    };
-    let problems = &problems[..args.limit.unwrap_or(usize::MAX).min(problems.len())];
-    if args.peers {
-        return peers(Some((&grid, problems)), as_json);
+/// Which search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+enum Planner {
+    /// A*: the shortest way.
+    Astar,
+    /// Weighted A*: a way within the bound.
+    Weighted,
+    /// Anytime repairing A*: better ways until one is within the bound or the budget is spent.
+    Budgeted,
+    /// D* Lite: the shortest way, from scratch.
+    DstarLite,
+}
+
+#[derive(Args)]
+pub struct Plan {
+    /// A map of the Moving AI lab's (.map), or a voxel map (.3dmap).
+    #[arg(long, value_name = "FILE", requires = "scen", required_unless_present = "peers")]
+    map: Option<PathBuf>,
+    /// Its problems, with their optimal lengths (.scen, .3dscen).
+    #[arg(long, value_name = "FILE", requires = "map")]
+    scen: Option<PathBuf>,
+    /// Which search.
+    #[arg(long, value_enum, default_value_t = Planner::Astar)]
+    planner: Planner,
+    /// Only the first so many problems.
+    #[arg(long, value_name = "N")]
+    limit: Option<usize>,
+    /// How many times the least a way of `weighted` or `budgeted` may cost.
+    #[arg(long, value_name = "X", default_value_t = 1.05, value_parser = at_least_one)]
+    bound: f64,
+    /// Most cells to expand for a problem; without end if not given, but for `budgeted`.
+    #[arg(long, value_name = "N", value_parser = one_or_more())]
+    budget: Option<usize>,
+    /// Beside the `pathfinding` crate instead, on random grids and on the map if one is given (cargo feature `peers`).
+    #[arg(long)]
+    peers: bool,
+}
+
+impl Task for Plan {
+    const NAME: &'static str = "plan";
+    const ABOUT: &'static str = "Searches on published maps, beside their published lengths";
+
+    fn run(&self, as_json: bool) -> anyhow::Result<Exit> {
+        let (grid, problems) = match (&self.map, &self.scen) {
+            (Some(map), Some(scen)) => read(map, scen)?,
+            _ => return peers(None, as_json),
+        };
+        let problems = &problems[..self.limit.unwrap_or(usize::MAX).min(problems.len())];
+        if self.peers {
+            return peers(Some((&grid, problems)), as_json);
+        }
+        let result = measure(self, &grid, problems)?;
+        if as_json {
+            println!("{}", serde_json::to_string(&result)?);
+            return Ok(Exit::Done);
+        }
+        let Result { planner, problems, solved, optimal, worst_ratio, bound, unproven, expanded, ms, .. } =
+            result;
+        let planner = planner.to_possible_value();
+        let planner = planner.as_ref().map_or("", PossibleValue::get_name);
+        println!("{planner}: {solved} of {problems} problems solved within {bound:.4} times the least");
+        println!("{optimal} of them at the published length; at worst {worst_ratio:.4} times that");
+        if unproven > 0 {
+            println!("{unproven} more found a way, but spent the budget before proving the bound");
+        }
+        for (what, Spread { median, p95, p99, max }, digits) in
+            [("cells expanded", expanded, 0), ("ms of processor time", ms, 3)]
+        {
+            println!(
+                "{what}: median {median:.digits$}, p95 {p95:.digits$}, p99 {p99:.digits$}, max {max:.digits$}"
+            );
+        }
+        Ok(Exit::Done)
     }
-    let result = measure(args, &grid, problems)?;
-    if as_json {
-        println!("{}", serde_json::to_string(&result)?);
-        return Ok(());
-    }
-    let Result { planner, problems, solved, optimal, worst_ratio, bound, unproven, expanded, ms, .. } =
-        result;
-    println!("{planner}: {solved} of {problems} problems solved within {bound:.4} times the least");
-    println!("{optimal} of them at the published length; at worst {worst_ratio:.4} times that");
-    if unproven > 0 {
-        println!("{unproven} more found a way, but spent the budget before proving the bound");
-    }
-    for (what, Spread { median, p95, p99, max }, digits) in
-        [("cells expanded", expanded, 0), ("ms of processor time", ms, 3)]
-    {
-        println!(
-            "{what}: median {median:.digits$}, p95 {p95:.digits$}, p99 {p99:.digits$}, max {max:.digits$}"
-        );
-    }
-    Ok(())
 }
 
 /// Reads a map and its problems; errors name file, line and what was expected.
@@ -98,7 +152,7 @@ fn read(map: &Path, scen: &Path) -> anyhow::Result<(Grid, Vec<Problem>)> {
     Ok((Grid { cells, costs: StepCosts::EUCLIDEAN }, problems))
 }
 
-fn measure(args: &PlanBench, grid: &Grid, problems: &[Problem]) -> anyhow::Result<Result> {
+fn measure(args: &Plan, grid: &Grid, problems: &[Problem]) -> anyhow::Result<Result> {
     let effort = effort(args);
     let mut search = Search::default();
     let (mut expanded, mut ms) = (Vec::new(), Vec::new());
@@ -117,7 +171,7 @@ fn measure(args: &PlanBench, grid: &Grid, problems: &[Problem]) -> anyhow::Resul
         }
     }
     Ok(Result {
-        planner: args.planner.name(),
+        planner: args.planner,
         problems: problems.len(),
         solved: proven.len(),
         optimal: proven.iter().filter(|(route, length)| is_length(route.cost, *length)).count(),
@@ -130,7 +184,7 @@ fn measure(args: &PlanBench, grid: &Grid, problems: &[Problem]) -> anyhow::Resul
     })
 }
 
-fn effort(args: &PlanBench) -> Effort {
+fn effort(args: &Plan) -> Effort {
     let budget = args.budget.unwrap_or(usize::MAX);
     match args.planner {
         Planner::Astar | Planner::DstarLite => Effort { budget, ..Effort::OPTIMAL },
@@ -154,6 +208,13 @@ fn solve(
     }
 }
 
+fn at_least_one(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number >= 1.0 => Ok(number),
+        _ => Err("expected a number, 1 or more".to_owned()),
+    }
+}
+
 fn is_length(found: f64, published: f64) -> bool {
     let (share, cells) = SAME_LENGTH;
     (found - published).abs() <= share * published + cells
@@ -169,17 +230,17 @@ fn worst_ratio(routes: &[(Route, f64)]) -> Option<f64> {
 }
 
 #[cfg(not(feature = "peers"))]
-fn peers(_: Option<(&Grid, &[Problem])>, _: bool) -> anyhow::Result<()> {
+fn peers(_: Option<(&Grid, &[Problem])>, _: bool) -> anyhow::Result<Exit> {
     anyhow::bail!("built without the cargo feature `peers`, which `--peers` needs")
 }
 
 #[cfg(feature = "peers")]
-fn peers(published: Option<(&Grid, &[Problem])>, as_json: bool) -> anyhow::Result<()> {
-    let cases = super::plan_peer::run(published)?;
+fn peers(published: Option<(&Grid, &[Problem])>, as_json: bool) -> anyhow::Result<Exit> {
+    let cases = peer::run(published)?;
     if as_json {
         println!("{}", json!({ "cases": cases }));
     } else {
         cases.iter().for_each(|case| println!("{case}"));
     }
-    Ok(())
+    Ok(Exit::Done)
 }

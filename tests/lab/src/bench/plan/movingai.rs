@@ -1,8 +1,8 @@
 //! Benchmark maps and problems as the Moving AI lab publishes them: `.map` and `.scen` (Sturtevant 2012) in the plane,
 //! `.3dmap` and `.3dscen` (Brewer and Sturtevant 2018) in space.
 
-use super::OccupancyGrid;
-use crate::map::VoxelIndex;
+use skein_planning::grid::OccupancyGrid;
+use skein_planning::map::VoxelIndex;
 
 /// A way to find, and how long the shortest is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,7 +11,8 @@ pub struct Problem {
     pub start: VoxelIndex,
     /// Where it ends.
     pub goal: VoxelIndex,
-    /// The published length of the shortest way, in cells, under [`StepCosts::EUCLIDEAN`](super::StepCosts::EUCLIDEAN).
+    /// The published length of the shortest way, in cells, under
+    /// [`StepCosts::EUCLIDEAN`](skein_planning::grid::StepCosts::EUCLIDEAN).
     pub length: f64,
 }
 

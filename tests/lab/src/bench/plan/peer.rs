@@ -9,11 +9,11 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use skein_planning::global::{Effort, Search};
-use skein_planning::grid::movingai::Problem;
 use skein_planning::grid::{Grid, Lattice as _, MOVES, OccupancyGrid, StepCosts, octile};
 use skein_planning::map::VoxelIndex;
 
-use super::plan::Spread;
+use super::Spread;
+use super::movingai::Problem;
 use crate::cpu_time;
 
 /// Sides of the random grids, in cells.

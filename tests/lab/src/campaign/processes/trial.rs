@@ -11,16 +11,17 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 use skein_agent::Outcome;
 use skein_dbp::NodeName;
+use skein_sim::cli::Network;
+use skein_sim::configure;
+use skein_sim::fly::{FLEET, GROUND, vehicle_name};
+use skein_sim::processes::{Processes, Setup};
+use skein_sim::scenario::{Overrides, Scenario};
+use skein_sim::world_host;
 use skein_wire::{Fleet, Key, Link as _, Topic};
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohSession};
 
 use super::cable::Cable;
-use crate::cli::Network;
-use crate::configure;
-use crate::fly::{FLEET, GROUND, vehicle_name};
 use crate::operator::Operator;
-use crate::processes::{Processes, Setup};
-use crate::scenario::{Overrides, Scenario};
 
 /// The fault comes between these times after the start, s.
 const MOMENT_S: (f64, f64) = (6.0, 30.0);
@@ -329,7 +330,7 @@ impl Run {
                     Topic::Bid { from: stranger.clone(), home: node.clone() },
                     Topic::State { node: node.clone() },
                     Topic::Occurrence { home: node.clone(), to: None },
-                    Topic::Scan { sensor: NodeName::new(crate::world_host::WORLD)?, vehicle: node.clone() },
+                    Topic::Scan { sensor: NodeName::new(world_host::WORLD)?, vehicle: node.clone() },
                 ] {
                     link.put(&Key::new(&fleet, topic), vec![round as u8; 1 + round as usize * 7]);
                 }

@@ -18,7 +18,7 @@ use skein_world::{
 
 use super::pilot::Pilot;
 use crate::cpu_time;
-use crate::mission::{LscAgent, LscMission};
+use skein_sim::mission::{LscAgent, LscMission};
 
 /// Cells of the lattice, as of the missions' starts and goals, m.
 const CELL_M: f64 = 0.5;

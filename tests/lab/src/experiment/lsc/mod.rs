@@ -7,18 +7,23 @@ mod tracking;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use clap::Args;
 use nalgebra::Vector3;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
+use skein_sim::mission::{LscAgent, LscMission};
+use skein_sim::scenario::read_world;
 use skein_world::{Aabb, Scene};
 
 use self::flight::{Flown, Space, fly};
-use super::statistics::mean;
-use super::{Bound, Figure, Line, Options, Report, Style, runs};
-use crate::mission::{LscAgent, LscMission};
-use crate::scenario::read_world;
+use crate::figure::{Figure, Line, Style};
+use crate::numbers::one_or_more;
+use crate::report::{Bound, Report};
+use crate::reported::Experiment;
+use crate::runs;
+use crate::statistics::mean;
 
 /// Families of missions: their name, where missions and worlds are, and how many there are.
 const FAMILIES: [Family; 2] = [
@@ -45,35 +50,46 @@ struct Setting {
     scene: Scene,
 }
 
-/// Flies the missions, at the height of their starts and at any; and others that nobody has published, in the same worlds.
-///
-/// # Errors
-/// No folder of missions, or something wrong in one.
-pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
-    let dir = options.dir.as_deref().context("say where LSC-DR's missions and worlds are with --dir")?;
-    let settings = settings(dir, options.runs.unwrap_or(MISSIONS_PER_FAMILY))?;
-    let planar = fly_all("planar missions", &settings, Space::Planar)?;
-    let spatial = fly_all("spatial missions", &settings, Space::Spatial)?;
-    let shuffled_settings = shuffled(&settings);
-    let shuffled = fly_all("planar missions, goals shuffled", &shuffled_settings, Space::Planar)?;
-    let mut report = Report::default();
-    report.number("missions", planar.len());
-    report.number("succeeded", succeeded(&planar));
-    report.number("planar", rows(&settings, &planar));
-    report.number("spatial_succeeded", succeeded(&spatial));
-    report.number("spatial", rows(&settings, &spatial));
-    report.number("shuffled_succeeded", succeeded(&shuffled));
-    report.number("shuffled", rows(&shuffled_settings, &shuffled));
-    table(&mut report, "At the height of the starts", &settings, &planar);
-    table(&mut report, "At any height", &settings, &spatial);
-    table(&mut report, "At the height of the starts, goals shuffled", &shuffled_settings, &shuffled);
-    goals(&mut report, &settings, &planar);
-    for (setting, flown) in settings.iter().zip(&planar) {
-        if published(&setting.name).is_some() {
-            report.figure(&setting.name, map(setting, flown));
+#[derive(Args)]
+pub struct Lsc {
+    /// The folder of LSC-DR's missions and worlds.
+    #[arg(long, value_name = "DIR")]
+    dir: Option<PathBuf>,
+    /// The first N missions of each family.
+    #[arg(long, value_name = "N", default_value_t = MISSIONS_PER_FAMILY, value_parser = one_or_more())]
+    runs: usize,
+}
+
+impl Experiment for Lsc {
+    const NAME: &'static str = "lsc";
+    const ABOUT: &'static str = "LSC-DR's ten-agent missions in forests and dense mazes (Park 2022)";
+
+    fn run(&self) -> anyhow::Result<Report> {
+        let dir = self.dir.as_deref().context("say where LSC-DR's missions and worlds are with --dir")?;
+        let settings = settings(dir, self.runs)?;
+        let planar = fly_all("planar missions", &settings, Space::Planar)?;
+        let spatial = fly_all("spatial missions", &settings, Space::Spatial)?;
+        let shuffled_settings = shuffled(&settings);
+        let shuffled = fly_all("planar missions, goals shuffled", &shuffled_settings, Space::Planar)?;
+        let mut report = Report::default();
+        report.number("missions", planar.len());
+        report.number("succeeded", succeeded(&planar));
+        report.number("planar", rows(&settings, &planar));
+        report.number("spatial_succeeded", succeeded(&spatial));
+        report.number("spatial", rows(&settings, &spatial));
+        report.number("shuffled_succeeded", succeeded(&shuffled));
+        report.number("shuffled", rows(&shuffled_settings, &shuffled));
+        table(&mut report, "At the height of the starts", &settings, &planar);
+        table(&mut report, "At any height", &settings, &spatial);
+        table(&mut report, "At the height of the starts, goals shuffled", &shuffled_settings, &shuffled);
+        goals(&mut report, &settings, &planar);
+        for (setting, flown) in settings.iter().zip(&planar) {
+            if published(&setting.name).is_some() {
+                report.figure(&setting.name, map(setting, flown));
+            }
         }
+        Ok(report)
     }
-    Ok(report)
 }
 
 /// The first missions of each family.
@@ -293,7 +309,7 @@ mod tests {
 
     #[test]
     fn without_a_folder_it_says_what_it_needs() {
-        let refused = run(&Options::default()).err().map(|error| error.to_string());
+        let refused = Lsc { dir: None, runs: 1 }.run().err().map(|error| error.to_string());
         assert!(refused.is_some_and(|error| error.contains("--dir")));
     }
 }

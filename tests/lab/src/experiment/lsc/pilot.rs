@@ -6,7 +6,7 @@ use skein_mav::{Command, Companion, CompanionConfig, Datum, FlightMode, SetPoint
 use skein_swarm::traffic::{Move, Traveller};
 
 use super::tracking::{Reference, Tracker};
-use crate::mission::LscAgent;
+use skein_sim::mission::LscAgent;
 
 /// A command that is not obeyed is repeated after this long.
 const REPEAT_AFTER: Duration = Duration::from_secs(1);

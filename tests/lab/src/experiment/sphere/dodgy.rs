@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use dodgy_3d::{Agent, AvoidanceOptions, Vec3};
 use nalgebra::Vector3;
-use skein_planning::separation::Grid;
 
+use super::grid::Grid;
 use super::{Avoidance, HULL_M, SPEED_M_S, STEP_S, Vehicle};
 
 /// Neighbours within this distance are avoided, metres.

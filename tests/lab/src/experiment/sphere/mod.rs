@@ -7,14 +7,20 @@
 
 #[cfg(feature = "peers")]
 mod dodgy;
+mod grid;
 
+use clap::Args;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use skein_planning::local::apf::limited;
-use skein_planning::separation::{FilterConfig, Grid, Motion, Neighbour, RepulsionConfig, filter, repulsion};
+use skein_planning::separation::{FilterConfig, Motion, Neighbour, RepulsionConfig, filter, repulsion};
 
-use super::{Bound, Figure, Line, Options, Report, Style};
+use self::grid::Grid;
 use crate::cpu_time;
+use crate::figure::{Figure, Line, Style};
+use crate::numbers::one_or_more;
+use crate::report::{Bound, Report};
+use crate::reported::Experiment;
 
 /// Vehicles, if none are asked for, and the radius of their sphere, metres. More vehicles have as much of the sphere each.
 const PUBLISHED: (usize, f64) = (100, 35.0);
@@ -284,46 +290,58 @@ impl Both {
     }
 }
 
-pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
-    let first = fly_both(options.vehicles.unwrap_or(PUBLISHED.0))?;
-    let many = if options.vehicles.is_none() { Some(fly_both(MANY)?) } else { None };
-    let mut report = Report::default();
-    if let Value::Object(numbers) = first.to_json() {
-        numbers.into_iter().for_each(|(name, value)| report.number(&name, value));
-    }
-    report.number("acceleration_limit_m_s2", ACCEL_M_S2);
-    if let Some(many) = &many {
-        report.number("many", many.to_json());
-    }
-    report.table(
-        "Through the middle of a sphere",
-        &[
-            "vehicles",
-            "",
-            "arrived",
-            "time (s)",
-            "least distance (m)",
-            "steps too near",
-            "CPU of a step (ms)",
-        ],
-        first.rows().into_iter().chain(many.iter().flat_map(Both::rows)),
-    );
-    report.goal("arrived", first.ours.arrived as f64, Bound::Exactly(first.vehicles as f64));
-    report.goal("least distance (m)", first.ours.min_separation_m, Bound::AtLeast(SEPARATION_M));
-    match &first.theirs {
-        Some(theirs) => {
-            let time = first.ours.time_s / theirs.time_s;
-            report.goal("time over dodgy_3d's", time, Bound::AtMost(MOST_TIME_RATIO));
-            let step = first.ours.step_ms / theirs.step_ms;
-            report.goal("CPU time of a step over dodgy_3d's", step, Bound::AtMost(1.0));
+#[derive(Args)]
+pub struct Sphere {
+    /// Vehicles; the published hundred, and a thousand besides, if not given.
+    #[arg(long, value_name = "N", value_parser = one_or_more())]
+    vehicles: Option<usize>,
+}
+
+impl Experiment for Sphere {
+    const NAME: &'static str = "sphere";
+    const ABOUT: &'static str = "a hundred vehicles through the middle of a sphere, beside ORCA";
+
+    fn run(&self) -> anyhow::Result<Report> {
+        let first = fly_both(self.vehicles.unwrap_or(PUBLISHED.0))?;
+        let many = if self.vehicles.is_none() { Some(fly_both(MANY)?) } else { None };
+        let mut report = Report::default();
+        if let Value::Object(numbers) = first.to_json() {
+            numbers.into_iter().for_each(|(name, value)| report.number(&name, value));
         }
-        None => {
-            eprintln!("no comparison: the cargo feature `peers` builds it in");
+        report.number("acceleration_limit_m_s2", ACCEL_M_S2);
+        if let Some(many) = &many {
+            report.number("many", many.to_json());
         }
+        report.table(
+            "Through the middle of a sphere",
+            &[
+                "vehicles",
+                "",
+                "arrived",
+                "time (s)",
+                "least distance (m)",
+                "steps too near",
+                "CPU of a step (ms)",
+            ],
+            first.rows().into_iter().chain(many.iter().flat_map(Both::rows)),
+        );
+        report.goal("arrived", first.ours.arrived as f64, Bound::Exactly(first.vehicles as f64));
+        report.goal("least distance (m)", first.ours.min_separation_m, Bound::AtLeast(SEPARATION_M));
+        match &first.theirs {
+            Some(theirs) => {
+                let time = first.ours.time_s / theirs.time_s;
+                report.goal("time over dodgy_3d's", time, Bound::AtMost(MOST_TIME_RATIO));
+                let step = first.ours.step_ms / theirs.step_ms;
+                report.goal("CPU time of a step over dodgy_3d's", step, Bound::AtMost(1.0));
+            }
+            None => {
+                eprintln!("no comparison: the cargo feature `peers` builds it in");
+            }
+        }
+        report.figure("sphere-separation", separation_figure(&first));
+        report.figure("sphere-ways", ways_figure(&first));
+        Ok(report)
     }
-    report.figure("sphere-separation", separation_figure(&first));
-    report.figure("sphere-ways", ways_figure(&first));
-    Ok(report)
 }
 
 fn separation_figure(both: &Both) -> Figure {

@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::{Plan, RouteCost, RouteProblem};
 use skein_planning::airspace::Airspace;
 use skein_planning::global::{Effort, Search};
 use skein_planning::grid::{Lattice, MOVES, moved};
 use skein_planning::map::VoxelIndex;
+use skein_swarm::route::{Plan, RouteCost, RouteProblem};
 
 /// How [`any_angle`] searches.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,19 +6,26 @@
 //! the same particles, drawn evenly from it, may move as far at once, and spend as many evaluations of the same cost,
 //! `Ns T = 30 x 50`. What P3 leaves open was chosen on seeds 1 to 150; the runs have the seeds from [`FIRST_SEED`] on.
 
+pub mod any_angle;
+pub mod baseline;
 mod scene;
 
 use anyhow::Context as _;
+use clap::Args;
 use serde_json::{Value, json};
 use skein_planning::airspace::Airspace;
-use skein_swarm::particle_swarm::{Objective as _, Standard, Swarm};
-use skein_swarm::route::{
-    AnyAngleConfig, Effort, Plan, Planner, RouteCost, RouteProblem, any_angle, arrive_together, plan_in_turn,
-};
+use skein_swarm::particle_swarm::{Objective as _, Swarm};
+use skein_swarm::route::{Effort, Plan, Planner, RouteCost, RouteProblem, arrive_together, plan_in_turn};
 
-use super::{Bound, Figure, Line, Options, Report, Style, runs, statistics};
-use crate::bench::quantile::quantile;
+use self::any_angle::{AnyAngleConfig, any_angle};
+use self::baseline::Baseline;
 use crate::cpu_time;
+use crate::figure::{Figure, Line, Style};
+use crate::numbers::one_or_more;
+use crate::quantile::quantile;
+use crate::report::{Bound, Report};
+use crate::reported::Experiment;
+use crate::{runs, statistics};
 
 const RUNS: usize = 150;
 const VEHICLES: usize = 20;
@@ -34,12 +41,14 @@ const FINE_M: f64 = 2.0;
 const VARIANT_RUNS: usize = 10;
 
 /// Whose routes are compared.
-const PLANNERS: [(&str, Planner); 4] = [
-    ("standard", Planner::Standard),
-    ("constriction", Planner::Constriction),
-    ("onboard", Planner::Onboard),
-    ("ground", Planner::Ground),
+const PLANNERS: [(&str, Plans); 4] = [
+    ("standard", |problem, seed| Baseline::STANDARD.plan(problem, Effort::default(), seed)),
+    ("constriction", |problem, seed| Baseline::CONSTRICTION.plan(problem, Effort::default(), seed)),
+    ("onboard", |problem, seed| Planner::Onboard.plan(problem, Effort::default(), seed)),
+    ("ground", |problem, seed| Planner::Ground.plan(problem, Effort::default(), seed)),
 ];
+/// Plans with a seed.
+type Plans = fn(&mut RouteProblem<'_>, u64) -> Plan;
 const STANDARD: usize = 0;
 const CONSTRICTION: usize = 1;
 const ONBOARD: usize = 2;
@@ -58,26 +67,40 @@ struct Run {
     reference: Fleet,
 }
 
-pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
-    let vehicles = options.vehicles.unwrap_or(VEHICLES);
-    let count = options.runs.unwrap_or(RUNS);
-    anyhow::ensure!(vehicles > 0 && count > 0, "expected at least one vehicle and one run");
-    let airspace = scene::airspace();
-    let seeds: Vec<u64> = (FIRST_SEED..).take(count).collect();
-    let done = runs::in_turn("swarm-planning", &seeds, |seed| one_run(&airspace, vehicles, *seed))?;
-    let mut report = Report::default();
-    report.number("runs", count);
-    report.number("vehicles", vehicles);
-    report.number("first_seed", FIRST_SEED);
-    let effort = Effort::default();
-    report.number("evaluations", effort.particles * effort.generations);
-    objectives(&done, &mut report);
-    times(&done, &mut report);
-    arrivals(&done, &mut report);
-    variants(&airspace, vehicles, &seeds[..count.min(VARIANT_RUNS)], &done, &mut report)?;
-    report.figure("convergence", convergence(&done));
-    report.figure("map", map(&airspace, &done[0]));
-    Ok(report)
+#[derive(Args)]
+pub struct SwarmPlanning {
+    /// Runs, each with a seed of its own.
+    #[arg(long, value_name = "N", default_value_t = RUNS, value_parser = one_or_more())]
+    runs: usize,
+    /// Vehicles of a run.
+    #[arg(long, value_name = "N", default_value_t = VEHICLES, value_parser = one_or_more())]
+    vehicles: usize,
+}
+
+impl Experiment for SwarmPlanning {
+    const NAME: &'static str = "swarm-planning";
+    const ABOUT: &'static str =
+        "twenty vehicles plan to ten targets among mountains and threats: particle swarms compared (P3)";
+
+    fn run(&self) -> anyhow::Result<Report> {
+        let Self { runs: count, vehicles } = *self;
+        let airspace = scene::airspace();
+        let seeds: Vec<u64> = (FIRST_SEED..).take(count).collect();
+        let done = runs::in_turn("swarm-planning", &seeds, |seed| one_run(&airspace, vehicles, *seed))?;
+        let mut report = Report::default();
+        report.number("runs", count);
+        report.number("vehicles", vehicles);
+        report.number("first_seed", FIRST_SEED);
+        let effort = Effort::default();
+        report.number("evaluations", effort.particles * effort.generations);
+        objectives(&done, &mut report);
+        times(&done, &mut report);
+        arrivals(&done, &mut report);
+        variants(&airspace, vehicles, &seeds[..count.min(VARIANT_RUNS)], &done, &mut report)?;
+        report.figure("convergence", convergence(&done));
+        report.figure("map", map(&airspace, &done[0]));
+        Ok(report)
+    }
 }
 
 fn one_run(airspace: &Airspace, vehicles: usize, seed: u64) -> anyhow::Result<Run> {
@@ -86,7 +109,7 @@ fn one_run(airspace: &Airspace, vehicles: usize, seed: u64) -> anyhow::Result<Ru
     };
     let by_planner = PLANNERS
         .iter()
-        .map(|(_, planner)| fleet(&|problem, seed| Some(planner.plan(problem, Effort::default(), seed))))
+        .map(|(_, plan)| fleet(&|problem, seed| Some(plan(problem, seed))))
         .collect::<anyhow::Result<_>>()?;
     let reference = fleet(&|problem, _| any_angle(problem, &AnyAngleConfig::default()))?;
     Ok(Run { by_planner, reference })
@@ -242,7 +265,7 @@ fn variants(
     }
     cases.push((WAYPOINTS, 0.5, true));
     let found = runs::in_turn("variants of the baseline", &cases, |(waypoints, max_step, on_the_way)| {
-        let motion = Standard { max_step: *max_step };
+        let motion = Baseline { max_step: *max_step, ..Baseline::STANDARD };
         let standard = |problem: &mut RouteProblem<'_>, seed| {
             let centre = on_the_way.then(|| problem.space().centre().to_vec());
             let swarm = Swarm::new(problem.space(), motion, Effort::default().particles, seed)
@@ -376,8 +399,8 @@ mod tests {
 
     #[test]
     fn a_small_run_reaches_what_a_large_one_must_and_is_the_same_again() {
-        let options = Options { runs: Some(1), vehicles: Some(6), ..Options::default() };
-        let report = run(&options).unwrap();
+        let experiment = SwarmPlanning { runs: 1, vehicles: 6 };
+        let report = experiment.run().unwrap();
         let json = report.to_json();
         let goals = json["goals"].as_array().unwrap();
         // How long it takes is not for a test of the development profile to judge.
@@ -390,6 +413,6 @@ mod tests {
         for field in ["mean", "p999", "max"] {
             assert!(json["plan_ms"][field].as_f64().unwrap() > 0.0);
         }
-        assert_eq!(untimed(&report), untimed(&run(&options).unwrap()));
+        assert_eq!(untimed(&report), untimed(&experiment.run().unwrap()));
     }
 }
