@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use serde_json::json;
 
 use crate::cli;
-use crate::fly::{interruptions, report};
+use crate::fly::{account, interruptions};
 use crate::summary::Summary;
 use crate::world_host::{WorldConfig, WorldHost};
 
@@ -23,7 +23,7 @@ pub fn run(args: &cli::Serve, as_json: bool) -> anyhow::Result<Summary> {
     while interruptions() == 0 {
         world.step();
     }
-    let summary = report::summary(&scenario, &world.account(), began.elapsed(), None);
+    let summary = account::summary(&scenario, &world.account(), began.elapsed(), None);
     if let Some(out) = &args.out {
         std::fs::create_dir_all(out).with_context(|| format!("{}: cannot be made", out.display()))?;
         let path = out.join("summary.json");

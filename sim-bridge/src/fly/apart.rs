@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use super::{TIME_TO_LAND, interruptions, report};
+use super::{TIME_TO_LAND, account, interruptions};
 use crate::cli;
 use crate::processes::{Processes, Setup};
 use crate::scenario::Scenario;
@@ -66,7 +66,7 @@ pub fn fly(
         }
     }
     let why = called_off.map(|(why, _)| why);
-    let summary = report::summary(scenario, &swarm.world().account(), began.elapsed(), why);
+    let summary = account::summary(scenario, &swarm.world().account(), began.elapsed(), why);
     swarm.end();
     Ok(summary)
 }

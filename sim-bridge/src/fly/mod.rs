@@ -1,12 +1,13 @@
 //! `fly`: a whole mission on this host, from the scenario to the summary.
 
+pub(crate) mod account;
 #[cfg(feature = "zenoh")]
 mod apart;
+mod live;
 mod plan_times;
 #[cfg(feature = "zenoh")]
 mod real;
 mod recording;
-pub(crate) mod report;
 mod setup;
 mod swarm;
 mod trace_hash;
@@ -218,7 +219,7 @@ impl<'a> Flight<'a> {
         self.recording.map(Recording::finish).transpose()?;
         let why = self.called_off.map(|called_off| called_off.why);
         let account = self.swarm.account(host.traffic());
-        let summary = report::summary(self.scenario, &account, self.began.elapsed(), why);
+        let summary = account::summary(self.scenario, &account, self.began.elapsed(), why);
         host.after_all(&mut self.swarm);
         Ok(summary)
     }
@@ -252,8 +253,8 @@ impl<'a> Flight<'a> {
         let wall = self.began.elapsed();
         match &mut self.table {
             Some(table) if table.is_due(wall) => {
-                let progress = report::progress(&self.swarm, wall, self.network_messages);
-                table.draw(wall, &progress, &report::rows(&self.swarm))
+                let progress = live::progress(&self.swarm, wall, self.network_messages);
+                table.draw(wall, &progress, &live::rows(&self.swarm))
             }
             _ => Ok(()),
         }

@@ -1,6 +1,5 @@
 //! Mission files: a route for one vehicle, for each vehicle, or for all in trail.
 
-mod apply;
 mod error;
 mod json;
 mod lsc;
@@ -12,7 +11,6 @@ use nalgebra::Vector3;
 use skein_mav::Datum;
 use skein_planning::airspace::Airspace;
 
-pub use apply::apply_missions;
 pub use error::{MissionError, Warning};
 pub use lsc::{LscAgent, LscMission};
 

@@ -12,9 +12,10 @@ mod file;
 mod forest;
 mod formation;
 mod layout;
+mod missions;
 mod mountain;
 mod open;
-pub(crate) mod placement;
+mod placement;
 mod targets;
 mod window;
 mod world_file;
@@ -31,6 +32,7 @@ use skein_world::{Aabb, Scene, VehicleModel, WindConfig};
 
 pub use error::ScenarioError;
 pub use layout::SPACING_M;
+pub use missions::apply_missions;
 pub use world_file::read_world;
 
 use crate::mission::{self, MissionSet};
@@ -272,7 +274,7 @@ impl Scenario {
             self.scene = self.scene.clone().with_datum(datum);
         }
         self.airspace.include(set.airspace);
-        if set.missions.is_empty() { Ok(()) } else { mission::apply_missions(self, set.missions) }
+        if set.missions.is_empty() { Ok(()) } else { apply_missions(self, set.missions) }
     }
 
     /// Moves each start and goal that stands too near an obstacle to the nearest clear place, and notes it.

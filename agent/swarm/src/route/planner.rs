@@ -4,7 +4,10 @@ use nalgebra::Vector3;
 
 use skein_planning::airspace::Airspace;
 
-use super::{Assessment, RouteCost, RouteError, RouteProblem, Traffic};
+use super::cost::Assessment;
+use super::problem::{RouteError, RouteProblem};
+use super::traffic::Traffic;
+use super::weights::RouteCost;
 use crate::particle_swarm::{
     Best, Improved, ImprovedConfig, Motion, Objective, Swarm, TabuConfig, TabuSwarm,
 };

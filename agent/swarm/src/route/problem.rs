@@ -2,7 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::{Assessment, RouteCost, Traffic};
+use super::cost::Assessment;
+use super::traffic::Traffic;
+use super::weights::RouteCost;
 use crate::particle_swarm::{Objective, SearchSpace, SearchSpaceError};
 use skein_planning::airspace::Airspace;
 

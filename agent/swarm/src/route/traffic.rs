@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::RouteCost;
+use super::weights::RouteCost;
 
 /// Parts into which flights are cut to compare vehicles at equal times.
 pub const PARTS: usize = 32;

@@ -3,9 +3,11 @@
 use nalgebra::Vector3;
 use skein_world::{Scene, VehicleModel};
 
-use super::{Ends, Mission};
-use crate::scenario::placement::{REACH_M, clear_place, is_clear, way_is_clear};
-use crate::scenario::{SPACING_M, Scenario, ScenarioError};
+use super::Scenario;
+use super::error::ScenarioError;
+use super::layout::SPACING_M;
+use super::placement::{REACH_M, clear_place, is_clear, way_is_clear};
+use crate::mission::{Ends, Mission};
 
 /// Clearance of the straight line from a mission's own start or goal to the place a vehicle gets instead, in metres.
 const DETOUR_CLEARANCE_M: f64 = 1.0;
