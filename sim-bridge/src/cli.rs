@@ -117,7 +117,14 @@ pub struct Configure {
     /// Folder for the files; made if missing.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// How the processes are joined.
+    #[command(flatten)]
+    pub setup: Setup,
+}
+
+/// The way in which the processes of a swarm are set up.
+#[derive(Debug, Clone, Copy, PartialEq, Args)]
+pub struct Setup {
+    /// The way in which they are joined.
     #[arg(long, value_enum, default_value_t = Network::Peer)]
     pub network: Network,
     /// The swarm takes off when an operator says so, and not as soon as it is there.
@@ -159,37 +166,25 @@ pub struct Serve {
     pub port_offset: u16,
 }
 
-/// What world and swarm are simulated.
+/// The world and the swarm in it.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct WorldArgs {
     /// A built-in scenario (see `list`), or a scenario file (.toml).
     pub scenario: String,
-    /// Size of the swarm; the scenario's own if not given.
-    #[arg(long, value_name = "N")]
-    pub vehicles: Option<usize>,
-    /// What every random number comes from.
+    #[command(flatten)]
+    pub overrides: Overrides,
+    /// The seed of every random number.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
-    /// A Gazebo world (SDF) or a list of boxes (.csv) in place of the scenario's world.
-    #[arg(long = "world", value_name = "FILE")]
-    pub world_file: Option<PathBuf>,
-    /// A QGroundControl plan or LSC mission; one that all fly in trail, or one for each vehicle.
-    #[arg(long = "mission", value_name = "FILE")]
-    pub missions: Vec<PathBuf>,
 }
 
 impl WorldArgs {
     /// Reads the scenario with its files.
     ///
     /// # Errors
-    /// What is wrong with them.
+    /// The first thing that is wrong with them.
     pub fn open(&self) -> Result<Scenario, ScenarioError> {
-        Scenario::open(&self.scenario, &self.overrides(), self.seed)
-    }
-
-    /// What the options set over the scenario.
-    pub fn overrides(&self) -> Overrides {
-        Overrides { vehicles: self.vehicles, world: self.world_file.clone(), missions: self.missions.clone() }
+        Scenario::open(&self.scenario, &self.overrides, self.seed)
     }
 }
 
@@ -248,8 +243,8 @@ mod tests {
             (Clock::Lockstep, Controller::None, 2.5, true)
         );
         let world = &fly.world;
-        assert_eq!((world.scenario.as_str(), world.vehicles, world.seed), ("open", Some(4), 7));
-        assert_eq!(world.overrides().missions, [PathBuf::from("a.plan"), PathBuf::from("b.plan")]);
+        assert_eq!((world.scenario.as_str(), world.overrides.vehicles, world.seed), ("open", Some(4), 7));
+        assert_eq!(world.overrides.missions, [PathBuf::from("a.plan"), PathBuf::from("b.plan")]);
         assert_eq!(fly.out, Some(PathBuf::from("run")));
     }
 
@@ -259,7 +254,7 @@ mod tests {
             panic!("fly is fly")
         };
         assert_eq!((fly.clock, fly.controller, fly.speed), (Clock::Real, Controller::Bp, 1.0));
-        assert_eq!(fly.world.overrides().vehicles, None);
+        assert_eq!(fly.world.overrides.vehicles, None);
     }
 
     #[test]

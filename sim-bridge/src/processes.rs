@@ -12,7 +12,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use skein_dbp::NodeName;
 
-use crate::cli::Network;
+use crate::cli::{Network, Setup};
 use crate::configure::{self, Files};
 use crate::fly::{GROUND, vehicle_name};
 use crate::scenario::Scenario;
@@ -55,17 +55,6 @@ impl Drop for Double {
     }
 }
 
-/// How the processes are set up.
-#[derive(Clone, Copy, Debug)]
-pub struct Setup {
-    /// How they are joined.
-    pub network: Network,
-    /// How much further up than by convention all network ports are.
-    pub port_offset: u16,
-    /// Whether the swarm waits on the ground for an operator.
-    pub launch_on_order: bool,
-}
-
 impl Processes {
     /// Writes their configurations into `folder`, where their logs and the recording go too, and starts them all.
     ///
@@ -82,8 +71,8 @@ impl Processes {
     /// # Errors
     /// A program that is missing, a port that is taken, a file that cannot be written.
     pub fn prepare(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result<Self> {
-        let Setup { network, port_offset, launch_on_order } = setup;
-        let files = configure::write(scenario, folder, network, port_offset, launch_on_order)?;
+        let Setup { network, port_offset, .. } = setup;
+        let files = configure::write(scenario, folder, setup)?;
         let logs = folder.join("logs");
         std::fs::create_dir_all(&logs).with_context(|| format!("{}: cannot be made", logs.display()))?;
         let router = match network {

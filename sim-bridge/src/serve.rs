@@ -6,7 +6,8 @@ use anyhow::Context as _;
 use serde_json::json;
 
 use crate::cli;
-use crate::fly::{account, interruptions};
+use crate::fly::account;
+use crate::fly::call_off::interruptions;
 use crate::summary::Summary;
 use crate::world_host::{WorldConfig, WorldHost};
 

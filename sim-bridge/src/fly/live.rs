@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use skein_agent::Outcome;
 
+use super::account::Account;
 use super::swarm::Swarm;
 use crate::table::{Progress, Row};
 
@@ -25,13 +26,15 @@ pub fn rows(swarm: &Swarm) -> Vec<Row> {
 }
 
 /// The live table's header.
-pub fn progress(swarm: &Swarm, wall: Duration, messages: u64) -> Progress {
+pub fn progress(account: &Account<'_>, wall: Duration) -> Progress {
+    let sim_time_s = account.simulation.now().as_secs_f64();
+    let has_arrived = |outcome: &&Option<Outcome>| **outcome == Some(Outcome::Complete);
     Progress {
-        sim_time_s: swarm.now().as_secs_f64(),
-        realtime_factor: swarm.now().as_secs_f64() / wall.as_secs_f64().max(1e-9),
-        events: swarm.events().occurred,
-        messages,
-        arrived: swarm.outcomes().filter(|outcome| *outcome == Some(&Outcome::Complete)).count(),
-        vehicles: swarm.agents().len(),
+        sim_time_s,
+        realtime_factor: sim_time_s / wall.as_secs_f64().max(1e-9),
+        events: account.events.occurred,
+        messages: account.network.messages,
+        arrived: account.outcomes.iter().filter(has_arrived).count(),
+        vehicles: account.outcomes.len(),
     }
 }

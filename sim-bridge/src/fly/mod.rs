@@ -3,6 +3,7 @@
 pub(crate) mod account;
 #[cfg(feature = "zenoh")]
 mod apart;
+pub(crate) mod call_off;
 mod live;
 mod plan_times;
 #[cfg(feature = "zenoh")]
@@ -14,8 +15,6 @@ mod trace_hash;
 mod trial;
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
@@ -23,6 +22,7 @@ use skein_agent::AgentConfig;
 use skein_ground::{Order, Who};
 use skein_wire::{Fleet, Network, NetworkConfig};
 
+use self::call_off::{CalledOff, interruptions};
 pub use self::{
     recording::Recording,
     setup::{FLEET, GROUND, agent_configs, ground_config, simulation_config, vehicle_name},
@@ -36,8 +36,6 @@ use crate::{
     table::LiveTable,
 };
 
-/// After its time limit a mission is ordered to land, and has this long to do so.
-const TIME_TO_LAND: Duration = Duration::from_secs(60);
 /// A run that was interrupted this often ends at once, with its files finished.
 const PATIENCE: u32 = 2;
 
@@ -148,17 +146,6 @@ impl Host for Lockstep {
     }
 }
 
-/// How often the user has asked to stop, with Ctrl-C.
-static INTERRUPTIONS: LazyLock<Arc<AtomicU32>> = LazyLock::new(|| {
-    let count = Arc::new(AtomicU32::new(0));
-    let counter = Arc::clone(&count);
-    // Without a handler Ctrl-C ends the process, as it does by itself.
-    let _ = ctrlc::set_handler(move || {
-        counter.fetch_add(1, Ordering::Relaxed);
-    });
-    count
-});
-
 /// A mission under way.
 struct Flight<'a> {
     scenario: &'a Scenario,
@@ -168,13 +155,6 @@ struct Flight<'a> {
     began: Instant,
     /// Why the swarm was ordered to land before its mission was over.
     called_off: Option<CalledOff>,
-    network_messages: u64,
-}
-
-/// The mission ended before it was over.
-struct CalledOff {
-    why: String,
-    at: Duration,
 }
 
 impl<'a> Flight<'a> {
@@ -186,19 +166,12 @@ impl<'a> Flight<'a> {
         recording: Option<Recording>,
         table: Option<LiveTable<std::io::Stderr>>,
     ) -> anyhow::Result<Self> {
-        LazyLock::force(&INTERRUPTIONS);
+        // From now on Ctrl-C calls off.
+        interruptions();
         let simulation = skein_world::Simulation::new(simulation_config(scenario));
         let ground = ground_config(scenario, Fleet::new(setup::FLEET)?, controller);
         let swarm = Swarm::new(simulation, agents, ground, links)?;
-        Ok(Self {
-            scenario,
-            swarm,
-            recording,
-            table,
-            began: Instant::now(),
-            called_off: None,
-            network_messages: 0,
-        })
+        Ok(Self { scenario, swarm, recording, table, began: Instant::now(), called_off: None })
     }
 
     /// Steps until the mission is over.
@@ -212,8 +185,7 @@ impl<'a> Flight<'a> {
             }
             if happenings.ticked {
                 self.look_after_limits();
-                self.network_messages = host.traffic().messages;
-                self.draw()?;
+                self.draw(host.traffic())?;
             }
         }
         self.recording.map(Recording::finish).transpose()?;
@@ -229,40 +201,29 @@ impl<'a> Flight<'a> {
         let landed = self.swarm.is_grounded();
         match &self.called_off {
             None => landed && self.swarm.is_over(),
-            Some(called_off) => landed || now > called_off.at + TIME_TO_LAND || interruptions() >= PATIENCE,
+            Some(called_off) => landed || called_off.is_out_of_time(now) || interruptions() >= PATIENCE,
         }
     }
 
     fn look_after_limits(&mut self) {
         let now = self.swarm.now();
-        let why = if interruptions() > 0 {
-            "interrupted"
-        } else if now.as_secs_f64() > self.scenario.time_limit_s {
-            "the time limit was reached"
-        } else {
-            return;
-        };
-        if self.called_off.is_none() {
+        if self.called_off.is_none()
+            && let Some(why) = call_off::reason(now, self.scenario.time_limit_s)
+        {
             self.called_off = Some(CalledOff { why: why.to_owned(), at: now });
             // All are vehicles that there are.
             let _ = self.swarm.order(&Order::Land(Who::All));
         }
     }
 
-    fn draw(&mut self) -> std::io::Result<()> {
+    fn draw(&mut self, network: Traffic) -> std::io::Result<()> {
         let wall = self.began.elapsed();
         match &mut self.table {
             Some(table) if table.is_due(wall) => {
-                let progress = live::progress(&self.swarm, wall, self.network_messages);
+                let progress = live::progress(&self.swarm.account(network), wall);
                 table.draw(wall, &progress, &live::rows(&self.swarm))
             }
             _ => Ok(()),
         }
     }
-}
-
-/// How often the user has asked to stop.
-pub(crate) fn interruptions() -> u32 {
-    LazyLock::force(&INTERRUPTIONS);
-    INTERRUPTIONS.load(Ordering::Relaxed)
 }

@@ -5,9 +5,8 @@ use std::time::Duration;
 use skein_agent::AgentConfig;
 use skein_dbp::Happened;
 
-use super::{
-    Flight, Happenings, Host, Lockstep, Swarm, agent_configs, interruptions, memory_links, memory_network,
-};
+use super::call_off::interruptions;
+use super::{Flight, Happenings, Host, Lockstep, Swarm, agent_configs, memory_links, memory_network};
 use crate::cli::Controller;
 use crate::scenario::Scenario;
 use crate::summary::{Summary, Traffic};

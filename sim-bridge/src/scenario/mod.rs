@@ -22,6 +22,7 @@ mod world_file;
 
 use std::path::{Path, PathBuf};
 
+use clap::Args;
 use nalgebra::Vector3;
 use serde::Deserialize;
 use skein_agent::Planners;
@@ -185,14 +186,17 @@ pub enum Who {
     Vehicle(usize),
 }
 
-/// What a command line sets over a scenario.
-#[derive(Debug, Clone, Default)]
+/// The options of a command line that go over a scenario.
+#[derive(Debug, Clone, Default, PartialEq, Args)]
 pub struct Overrides {
-    /// Size of the swarm.
+    /// Size of the swarm; the scenario's own if not given.
+    #[arg(long, value_name = "N")]
     pub vehicles: Option<usize>,
-    /// A world file instead of the scenario's own world.
+    /// A Gazebo world (SDF) or a list of boxes (.csv) in place of the scenario's world.
+    #[arg(long, value_name = "FILE")]
     pub world: Option<PathBuf>,
-    /// Mission files: one that all fly in trail, or one for each vehicle.
+    /// A QGroundControl plan or LSC mission; one that all fly in trail, or one for each vehicle.
+    #[arg(long = "mission", value_name = "FILE")]
     pub missions: Vec<PathBuf>,
 }
 

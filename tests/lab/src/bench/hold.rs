@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use clap::Args;
 use serde_json::json;
-use skein_sim::cli::{Exit, Network};
-use skein_sim::processes::{Processes, Setup};
+use skein_sim::cli::{Exit, Network, Setup};
+use skein_sim::processes::Processes;
 use skein_sim::scenario::{Overrides, Scenario};
 
 use crate::operator::Operator;
