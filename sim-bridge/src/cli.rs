@@ -10,7 +10,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::scenario::{Overrides, Scenario, ScenarioError};
 
-/// How a program ends.
+/// The end of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
     /// Done.
@@ -46,7 +46,6 @@ impl From<Exit> for ExitCode {
     after_help = "Exit codes: 0 done, 1 mission or check failed, 2 wrong usage or input."
 )]
 pub struct Cli {
-    /// What to do.
     #[command(subcommand)]
     pub command: Command,
     /// Print one JSON object on standard output and nothing else there.
@@ -54,7 +53,6 @@ pub struct Cli {
     pub json: bool,
 }
 
-/// What `skein-sim` does.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum Command {
     /// Fly a whole mission on this host: world, vehicles, agents and ground.
@@ -75,13 +73,12 @@ pub enum Command {
 /// Options of `fly`.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct Fly {
-    /// What is flown.
     #[command(flatten)]
     pub world: WorldArgs,
     /// Real time over Zenoh, or in memory as fast as the processor allows.
     #[arg(long, value_enum, default_value_t = Clock::Real)]
     pub clock: Clock,
-    /// How many times faster than the clock on the wall; `--clock real` only.
+    /// Speed-up over the clock on the wall; `--clock real` only.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
     pub speed: f64,
     /// What decides on board: behavioural programs, one sequential loop that hears no orders, or nothing (the vehicles stay
@@ -97,10 +94,10 @@ pub struct Fly {
     /// World, ground station and each agent in a process of its own; `--clock real` only.
     #[arg(long)]
     pub processes: bool,
-    /// How the processes are joined.
+    /// The way in which the processes are joined.
     #[arg(long, value_enum, default_value_t = Network::Peer, requires = "processes")]
     pub network: Network,
-    /// Where the console is served, on this computer only; `--clock real` only. Port 0 is any that is free.
+    /// Address of the console, on this computer only; `--clock real` only. Port 0 is any that is free.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8700")]
     pub console: SocketAddr,
     /// Use network ports so much further up, beside another swarm on this computer.
@@ -111,7 +108,6 @@ pub struct Fly {
 /// Options of `configure`.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct Configure {
-    /// What will be flown.
     #[command(flatten)]
     pub world: WorldArgs,
     /// Folder for the files; made if missing.
@@ -135,7 +131,7 @@ pub struct Setup {
     pub port_offset: u16,
 }
 
-/// How processes are joined over Zenoh.
+/// The way in which processes are joined over Zenoh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Network {
     /// Each with every other one.
@@ -149,13 +145,12 @@ pub enum Network {
 /// Options of `serve`.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct Serve {
-    /// What is hosted.
     #[command(flatten)]
     pub world: WorldArgs,
-    /// How many times faster than the clock on the wall.
+    /// Speed-up over the clock on the wall.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
     pub speed: f64,
-    /// How the world is joined to the other nodes (see sim-bridge/world.toml).
+    /// The world's link to the other nodes (see sim-bridge/world.toml).
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// Folder for summary.json; made if missing.
@@ -188,7 +183,7 @@ impl WorldArgs {
     }
 }
 
-/// What time a run follows.
+/// The time that a run follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Clock {
     /// The clock on the wall, over Zenoh.
@@ -197,7 +192,7 @@ pub enum Clock {
     Lockstep,
 }
 
-/// What decides on board.
+/// The decider on board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Controller {
     /// Behavioural programs.

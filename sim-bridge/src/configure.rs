@@ -16,26 +16,24 @@ use crate::fly::{FLEET, GROUND, agent_configs, ground_config};
 use crate::scenario::Scenario;
 use crate::world_host::WORLD;
 
-/// Where nodes listen for each other: the world, the ground station or a router, and from there on the vehicles.
+/// The ports of nodes for one another: the world, the ground station or a router, and from there on the vehicles.
 const WORLD_PORT: u16 = 7446;
 const GROUND_PORT: u16 = 7447;
 const FIRST_VEHICLE_PORT: u16 = 7450;
-/// Where the console is served.
 const CONSOLE_PORT: u16 = 8700;
-/// Where vehicle 0's agent listens for its autopilot.
+/// The port of vehicle 0's agent for its autopilot.
 const COMPANION_PORT: u16 = 14540;
 
 const AGENT: &str = include_str!("../../agent/agent.toml");
 const GROUND_STATION: &str = include_str!("../../ground/ground.toml");
 const WORLD_EXAMPLE: &str = include_str!("../world.toml");
 
-/// Where the router listens, or the ground station in its place.
+/// The port of the router, or of the ground station in its place.
 #[must_use]
 pub fn router_port(port_offset: u16) -> u16 {
     GROUND_PORT + port_offset
 }
 
-/// Where the console is served.
 #[must_use]
 pub fn console(port_offset: u16) -> SocketAddr {
     (Ipv4Addr::LOCALHOST, CONSOLE_PORT + port_offset).into()
@@ -55,7 +53,7 @@ pub struct Files {
 /// Writes the files, and says how to start the swarm.
 ///
 /// # Errors
-/// What is wrong with the scenario; a file that cannot be written.
+/// A fault in the scenario; a file that cannot be written.
 pub fn run(args: &cli::Configure, as_json: bool) -> anyhow::Result<()> {
     let scenario = args.world.open()?;
     let files = write(&scenario, &args.out, args.setup)?;
@@ -123,7 +121,7 @@ pub fn write(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result
     Ok(Files { world, ground, agents: agents.collect::<anyhow::Result<_>>()? })
 }
 
-/// What is known of the airspace, in an agent's configuration.
+/// The airspace in an agent's configuration.
 fn airspace_tables(agent: &AgentConfig) -> anyhow::Result<String> {
     let airspace = AirspaceTable::of(&agent.airspace);
     if airspace == AirspaceTable::default() {

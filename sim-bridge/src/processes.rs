@@ -18,9 +18,9 @@ use crate::fly::{GROUND, vehicle_name};
 use crate::scenario::Scenario;
 use crate::world_host::{WorldConfig, WorldHost};
 
-/// How long a process that was asked to end may take.
+/// Patience with a process that was asked to end.
 const TIME_TO_END: Duration = Duration::from_secs(5);
-/// How long a router may take to listen.
+/// Patience with a router until it listens.
 const TIME_TO_LISTEN: Duration = Duration::from_secs(10);
 
 /// The processes of a swarm. They end with this.
@@ -43,7 +43,6 @@ struct Running {
 /// A second process of a node. It ends with this.
 pub struct Double {
     child: Child,
-    /// Where it writes what it has to say.
     pub log: PathBuf,
 }
 
@@ -130,13 +129,13 @@ impl Processes {
         Ok(Double { child: spawn(command, &log)?, log })
     }
 
-    /// Where configurations, logs and the recording are.
+    /// The folder of configurations, logs and the recording.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// How much further up than by convention all network ports are.
+    /// The distance of all network ports from the usual ones.
     #[must_use]
     pub fn port_offset(&self) -> u16 {
         self.port_offset
@@ -170,7 +169,7 @@ impl Processes {
         Ok(())
     }
 
-    /// Where a node writes what it has to say.
+    /// The log of a node.
     #[must_use]
     pub fn log_of(&self, node: &NodeName) -> PathBuf {
         self.logs.join(format!("{}.log", node.as_str().replace('/', "-")))
@@ -186,7 +185,7 @@ impl Processes {
         &self.world
     }
 
-    /// Where the console is served.
+    /// The address of the console.
     #[must_use]
     pub fn console(&self) -> SocketAddr {
         configure::console(self.port_offset)

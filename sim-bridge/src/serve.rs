@@ -14,7 +14,7 @@ use crate::world_host::{WorldConfig, WorldHost};
 /// Hosts the world until Ctrl-C, and says what came of it.
 ///
 /// # Errors
-/// What is wrong with the scenario or the configuration; a port that is taken.
+/// A fault in the scenario or the configuration; a port that is taken.
 pub fn run(args: &cli::Serve, as_json: bool) -> anyhow::Result<Summary> {
     let scenario = args.world.open()?;
     let config = args.config.as_deref().map_or_else(|| Ok(WorldConfig::default()), WorldConfig::read)?;

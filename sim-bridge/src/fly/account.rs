@@ -9,15 +9,15 @@ use super::setup::vehicle_name;
 use crate::scenario::Scenario;
 use crate::summary::{self, Collisions, EventCounts, PlanTimes, Spread, Summary, Traffic, VehicleSummary};
 
-/// What is known of a run at its end.
+/// The facts of a run at its end.
 pub struct Account<'a> {
     /// The truth of it.
     pub simulation: &'a Simulation,
-    /// How each vehicle's mission ended, by its agent's word.
+    /// The end of each vehicle's mission, by its agent's word.
     pub outcomes: Vec<Option<Outcome>>,
-    /// What each agent made its set-points from, where that is known.
+    /// The inputs of each agent's set-points, where they are known.
     pub set_points: Vec<SetPointRecord>,
-    /// How long plans took, where that is known.
+    /// The times of plans, where they are known.
     pub plan_times_ms: &'a [f64],
     /// Events of all nodes.
     pub events: EventCounts,
@@ -27,7 +27,7 @@ pub struct Account<'a> {
     pub trace_hash: String,
 }
 
-/// What came of the run; `called_off` is why it was ended before it was over.
+/// The summary of the run; `called_off` is the reason why it was ended before it was over.
 pub fn summary(
     scenario: &Scenario,
     account: &Account<'_>,

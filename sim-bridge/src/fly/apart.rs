@@ -13,7 +13,7 @@ use crate::summary::Summary;
 use crate::table::{LiveTable, Row};
 use crate::world_host::WorldHost;
 
-/// What the nodes say and how they are is looked at this often.
+/// Time between two looks at the nodes.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// Flies a scenario with a process for each node. Their configurations, logs and the recording go to `out`.

@@ -14,7 +14,6 @@ pub struct CalledOff {
 }
 
 impl CalledOff {
-    /// Whether those still in the air had the time to land.
     pub fn is_out_of_time(&self, now: Duration) -> bool {
         now > self.at + TIME_TO_LAND
     }

@@ -42,7 +42,7 @@ const PATIENCE: u32 = 2;
 /// Flies the mission that the command line asks for, writes its files, and says what came of it.
 ///
 /// # Errors
-/// What is wrong with the scenario or the output folder; a failed mission is no error but a [`Summary`] that says so.
+/// A fault in the scenario or the output folder; a failed mission is no error but a [`Summary`] that says so.
 pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
     let scenario = args.world.open()?;
     let out = args.out.clone().unwrap_or_else(|| default_folder(&scenario));
@@ -126,7 +126,7 @@ trait Host {
     /// Once the mission is over and told of.
     fn after_all(&mut self, _: &mut Swarm) {}
 
-    /// What has passed between the nodes.
+    /// The messages between the nodes so far.
     fn traffic(&self) -> Traffic;
 }
 

@@ -41,16 +41,16 @@ struct Vehicle {
     link: Box<dyn Link>,
 }
 
-/// What happened in one step that somebody may want to record.
+/// The events and messages of one step, for a recording.
 #[derive(Debug, Default)]
 pub struct Happenings {
     /// Selections at their homes, by node.
     pub selections: Vec<Happened>,
     /// Lidar scans, by vehicle.
     pub scans: Vec<(usize, LidarScan)>,
-    /// What each autopilot has said.
+    /// MAVLink from each autopilot.
     pub mavlink: Vec<Vec<u8>>,
-    /// Whether agents and ground ticked.
+    /// Agents and ground ticked in this step.
     pub ticked: bool,
 }
 
@@ -162,7 +162,7 @@ impl Swarm {
         &self.ground
     }
 
-    /// Whether every vehicle's mission has ended and it stands on the ground.
+    /// Every mission has ended, or its vehicle has crashed.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.vehicles.iter().zip(0..).all(|(vehicle, index)| {
@@ -171,7 +171,6 @@ impl Swarm {
         })
     }
 
-    /// Whether no vehicle is in the air.
     #[must_use]
     pub fn is_grounded(&self) -> bool {
         (0..self.vehicles.len())
@@ -194,12 +193,12 @@ impl Swarm {
         self.vehicles.iter().map(|vehicle| &vehicle.agent)
     }
 
-    /// How each vehicle's mission ended, as far as it has.
+    /// The end of each vehicle's mission, as far as it has come.
     pub fn outcomes(&self) -> impl Iterator<Item = Option<&Outcome>> {
         self.agents().map(AgentCore::outcome)
     }
 
-    /// What may be said of the run so far; `network` is what its nodes have sent.
+    /// The account of the run so far; `network` is the traffic of its nodes.
     #[must_use]
     pub fn account(&self, network: Traffic) -> Account<'_> {
         Account {
@@ -224,7 +223,6 @@ impl Swarm {
         self.stopwatch.map_or(Duration::ZERO, |watch| watch.total)
     }
 
-    /// What the referee has seen so far.
     #[must_use]
     pub fn truth(&self) -> Truth {
         self.simulation.truth()

@@ -22,7 +22,6 @@ pub struct Trial<'a> {
     clock: Option<fn() -> Duration>,
 }
 
-/// What came of a trial.
 #[derive(Debug, Clone)]
 pub struct Flown {
     /// As of any flight.
@@ -54,7 +53,7 @@ impl<'a> Trial<'a> {
     /// Flies; `watch` sees the swarm after each tick of its agents, and what has happened in it.
     ///
     /// # Errors
-    /// What is wrong with an agent's configuration; or the user has interrupted it.
+    /// A fault in an agent's configuration; or the user has interrupted it.
     pub fn fly(self, watch: &mut Watch<'_>) -> anyhow::Result<Flown> {
         let network = memory_network(self.scenario);
         let links = memory_links(&network, self.scenario);

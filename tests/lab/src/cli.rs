@@ -45,7 +45,6 @@ pub fn command() -> Command {
         .subcommands(kinds)
 }
 
-/// Whether the result is asked for as JSON.
 #[must_use]
 pub fn is_json(arguments: &ArgMatches) -> bool {
     arguments.get_flag(JSON)

@@ -5,10 +5,10 @@ use std::time::Duration;
 use anyhow::Context as _;
 use nix::time::{ClockId, clock_gettime};
 
-/// What this thread has used so far.
+/// The time of this thread so far.
 ///
 /// # Errors
-/// What the operating system says.
+/// The operating system's error.
 pub fn this_thread() -> anyhow::Result<Duration> {
     read(ClockId::CLOCK_THREAD_CPUTIME_ID)
 }
@@ -19,10 +19,10 @@ pub fn this_thread_or_nothing() -> Duration {
     this_thread().unwrap_or_default()
 }
 
-/// What this process has used so far, in all its threads.
+/// The time of this process so far, in all its threads.
 ///
 /// # Errors
-/// What the operating system says.
+/// The operating system's error.
 pub fn this_process() -> anyhow::Result<Duration> {
     read(ClockId::CLOCK_PROCESS_CPUTIME_ID)
 }
@@ -30,7 +30,7 @@ pub fn this_process() -> anyhow::Result<Duration> {
 /// Does something, and tells how many milliseconds of this thread's time it took.
 ///
 /// # Errors
-/// What the operating system says.
+/// The operating system's error.
 pub fn measured_ms<T>(work: impl FnOnce() -> T) -> anyhow::Result<(T, f64)> {
     let since = this_thread()?;
     let done = work();

@@ -7,13 +7,13 @@ use plotters::prelude::*;
 /// A figure.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Figure {
-    /// What the horizontal axis shows, with its unit.
+    /// Title of the horizontal axis, with its unit.
     pub x: String,
-    /// What the vertical axis shows, with its unit.
+    /// Title of the vertical axis, with its unit.
     pub y: String,
-    /// Whether a metre is as long on both axes, as in a map.
+    /// A metre is as long on both axes.
     pub is_map: bool,
-    /// What is drawn, in this order.
+    /// Drawn in this order.
     pub lines: Vec<Line>,
 }
 
@@ -22,13 +22,11 @@ pub struct Figure {
 pub struct Line {
     /// Its name in the legend; none if empty.
     pub name: String,
-    /// How it is drawn.
     pub style: Style,
-    /// What is drawn, in the axes' units.
+    /// In the axes' units.
     pub points: Vec<(f64, f64)>,
 }
 
-/// How a line is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Style {
     /// From point to point.
@@ -58,7 +56,7 @@ impl Figure {
     /// Draws it.
     ///
     /// # Errors
-    /// What the drawing library says.
+    /// The drawing library's error.
     pub fn to_svg(&self) -> anyhow::Result<String> {
         let mut svg = String::new();
         {
@@ -119,7 +117,7 @@ impl Figure {
         root.present()
     }
 
-    /// What the axes span: all points, with a little room, and of a map as much both ways as its shape asks.
+    /// The span of the axes: all points, with a little room, and of a map as much both ways as its shape asks.
     fn ranges(&self) -> (Range<f64>, Range<f64>) {
         let points = || self.lines.iter().flat_map(|line| &line.points);
         let across = span(points().map(|point| point.0));

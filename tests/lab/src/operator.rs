@@ -7,7 +7,7 @@ use anyhow::{Context as _, ensure};
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket, stream::MaybeTlsStream};
 
-/// How long the console, a swarm, or an answer may take.
+/// Patience with the console, a swarm, or an answer.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A connection to a console.

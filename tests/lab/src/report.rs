@@ -1,4 +1,4 @@
-//! What came of an experiment.
+//! The report of an experiment.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use crate::figure::Figure;
 
-/// What came of an experiment: numbers, tables, figures, and how the numbers compare with what must be reached.
+/// The results of an experiment: numbers, tables, figures, and goals.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
     numbers: Map<String, Value>,
@@ -18,7 +18,7 @@ pub struct Report {
     goals: Vec<Goal>,
 }
 
-/// What a number must be.
+/// A goal for a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bound {
     /// This or less.
@@ -91,7 +91,6 @@ impl Report {
         self.goals.push(Goal { what: what.to_owned(), found, bound });
     }
 
-    /// Whether all that must be reached was reached.
     #[must_use]
     pub fn is_reached(&self) -> bool {
         self.goals.iter().all(|goal| goal.bound.holds(goal.found))
@@ -117,7 +116,7 @@ impl Report {
     /// Writes `report.json` and the figures into a folder, made if missing. Returns what was written.
     ///
     /// # Errors
-    /// What could not be written, and why.
+    /// The file that cannot be written.
     pub fn write(&self, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
         std::fs::create_dir_all(folder).with_context(|| {
             format!("{}: cannot be made; name another folder with --out", folder.display())

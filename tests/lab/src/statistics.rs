@@ -1,4 +1,4 @@
-//! What many numbers say together.
+//! Statistics of samples.
 
 /// Arithmetic mean; not a number of none.
 #[must_use]

@@ -32,9 +32,9 @@ pub use self::space::{SearchSpace, SearchSpaceError};
 pub use self::swarm::{Best, Flock, Motion, Mover, Swarm};
 pub use self::tabu::{TabuConfig, TabuSwarm};
 
-/// What is to be minimised.
+/// A function to be minimised.
 pub trait Objective {
-    /// Where it is defined.
+    /// Its domain.
     fn space(&self) -> &SearchSpace;
 
     /// Its value at a position in the space, one number for each dimension; if that is not below `limit`, any number that is

@@ -1,4 +1,4 @@
-//! What a route costs (P3).
+//! The cost of a route (P3).
 
 use nalgebra::Vector3;
 
@@ -30,7 +30,7 @@ pub struct Assessment {
 }
 
 impl Assessment {
-    /// Whether the route violates nothing.
+    /// The route violates nothing.
     #[must_use]
     pub fn is_feasible(&self) -> bool {
         self.violation_m <= 0.0

@@ -1,4 +1,4 @@
-//! Who plans a route, and how.
+//! The planners of routes.
 
 use nalgebra::Vector3;
 
@@ -21,7 +21,7 @@ pub enum Planner {
     Ground,
 }
 
-/// How much is spent on a plan: `particles * generations` evaluations.
+/// The effort for a plan: `particles * generations` evaluations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Effort {
     /// `Ns`.
@@ -42,7 +42,6 @@ impl Default for Effort {
 pub struct Plan {
     /// Start, waypoints, goal (ENU, metres).
     pub route: Vec<Vector3<f64>>,
-    /// What it costs.
     pub assessment: Assessment,
     /// The least cost found until the end of each generation, metres.
     pub convergence_m: Vec<f64>,

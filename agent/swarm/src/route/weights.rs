@@ -38,13 +38,13 @@ pub struct RouteCost {
     pub influence_m: f64,
     /// Separation from other vehicles that is required, metres.
     pub least_separation_m: f64,
-    /// How long a vehicle can fly, seconds.
+    /// Seconds that a vehicle can fly.
     pub endurance_s: f64,
     /// Share of the endurance that is kept in reserve.
     pub reserve: f64,
-    /// What it costs to use the whole reserve, metres.
+    /// Cost of the whole reserve, metres.
     pub reserve_weight_m: f64,
-    /// What a metre of violation costs, metres.
+    /// Cost of a metre of violation, metres.
     pub violation_weight: f64,
     /// Distance of the samples at which the clearance is looked at, metres, where mountains are near.
     pub sample_m: f64,
@@ -73,7 +73,7 @@ impl Default for RouteCost {
 }
 
 impl RouteCost {
-    /// How long a leg takes, seconds.
+    /// The time of a leg, seconds.
     pub(super) fn leg_s(&self, way: &Vector3<f64>) -> f64 {
         (way.norm() / self.cruise_m_s).max(way.z.abs() / self.climb_m_s)
     }

@@ -177,7 +177,7 @@ fn events_per_s(mut program: Program, cpu_time: Duration) -> anyhow::Result<f64>
     }
 }
 
-/// What the verifier did.
+/// The verifier's work.
 struct Verified {
     states: usize,
     time_s: f64,

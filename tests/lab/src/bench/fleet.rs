@@ -1,4 +1,4 @@
-//! What a node costs as the fleet grows: memory and messages, over the network in memory.
+//! The cost of a node as the fleet grows: memory and messages, over the network in memory.
 //!
 //! Every vehicle asks leave to move ten times a second at its own home, claims a passage of its own from time to time by
 //! a block at every other home, and tells its state ten times a second; the ground station launches them one after
@@ -26,12 +26,12 @@ const TICK: Duration = Duration::from_millis(20);
 const CYCLE: Duration = Duration::from_millis(100);
 /// Between two claims of a vehicle.
 const CLAIM_EVERY: Duration = Duration::from_secs(10);
-/// How long it is in its passage.
+/// Time that a vehicle is in its passage.
 const PASSING: Duration = Duration::from_secs(2);
-/// When the swarm is held, and until when.
+/// The swarm is held from the one to the other.
 const HELD: (Duration, Duration) = (Duration::from_secs(10), Duration::from_secs(15));
 
-/// What one node of a fleet costs, on average.
+/// The cost of one node of a fleet, on average.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Cost {
     nodes: usize,
@@ -41,7 +41,7 @@ struct Cost {
     sent_bytes_per_s: f64,
     received_messages_per_s: f64,
     received_bytes_per_s: f64,
-    /// What its b-threads have seen happen, anywhere.
+    /// Events that its b-threads have seen happen, anywhere.
     events_per_s: f64,
 }
 

@@ -27,7 +27,7 @@ use crate::task::Task;
 
 /// Neighbours around the vehicle.
 const NEIGHBOURS: usize = 20;
-/// How far away they are, metres.
+/// Their least and greatest distance, metres.
 const AROUND_M: [f64; 2] = [3.0, 9.0];
 /// Navigation cycles begin this often.
 const CYCLE: Duration = Duration::from_millis(100);
@@ -241,7 +241,7 @@ impl<'a> Flight<'a> {
     }
 }
 
-/// What the set-point asks for; the bench keeps its height.
+/// The velocity that the set-point asks for; the bench keeps its height.
 fn velocity(set_point: &SetPoint) -> Vector3<f64> {
     match *set_point {
         SetPoint::Planar { vx, vy, .. } => Vector3::new(vx, vy, 0.0),

@@ -9,7 +9,7 @@ use skein_sim::cli::Exit;
 
 use crate::task::Task;
 
-/// How many failing stories are shrunk and told.
+/// Failing stories that are shrunk and told.
 const TOLD: usize = 3;
 
 #[derive(Args)]

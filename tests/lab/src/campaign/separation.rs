@@ -61,7 +61,7 @@ pub struct Separation {
     /// Share of messages that are lost.
     #[arg(long, value_name = "SHARE", default_value_t = 0.3, value_parser = share)]
     loss: f64,
-    /// How long bids hold elsewhere without being renewed: several times as long as a message takes there and back.
+    /// Lease of bids that are not renewed: several times as long as a message takes there and back.
     #[arg(long, value_name = "MS", default_value_t = 4000.0, value_parser = within(100.0..=10_000.0))]
     lease_ms: f64,
     /// Flights at once; as many as this computer has processors if not given.

@@ -19,7 +19,7 @@ const RUNS: usize = 50;
 /// In forests vehicles fly side by side, so others show what keeps them apart: in one all meet in the middle, in one all want
 /// through the same window. A number beside each says how many times fewer worlds of it are flown, for these differ little.
 const SCENARIOS: [(&str, usize); 3] = [("forest", 1), ("antipodal", 5), ("window", 5)];
-/// Who has not arrived after this has failed, s: three times what a vehicle needs.
+/// A vehicle that has not arrived by then has failed, s: three times what one needs.
 const TIME_LIMIT_S: f64 = 120.0;
 
 const VARIANTS: [(&str, Planners); 8] = [
@@ -108,7 +108,7 @@ impl Experiment for Ablation {
     }
 }
 
-/// What came of one variant.
+/// The results of one variant.
 struct Found {
     worlds: usize,
     succeeded: usize,

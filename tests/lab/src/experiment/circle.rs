@@ -106,7 +106,7 @@ impl Experiment for Circle {
     }
 }
 
-/// Where the vehicle shall be `since_s` after it was first sent to the circle.
+/// The place where the vehicle shall be `since_s` after it was first sent to the circle.
 fn reference(since_s: f64) -> Vector2<f64> {
     let angle = (since_s - JOINING_S).max(0.0) * SPEED_M_S / RADIUS_M;
     Vector2::new(angle.cos(), angle.sin()) * RADIUS_M

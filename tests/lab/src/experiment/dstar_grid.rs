@@ -26,7 +26,7 @@ use crate::runs;
 const MARKERS: usize = 10;
 /// Its blocked cells, a reconstruction: the paper's picture is not legible.
 const BLOCKED: [usize; 9] = [24, 32, 33, 34, 42, 45, 46, 47, 57];
-/// Where the published routes lead from and to.
+/// The ends of the published routes.
 const ENDS: [usize; 2] = [3, 66];
 /// The published routes, by the cells' numbers, row by row from 1.
 const PLAIN: [usize; 7] = [3, 14, 25, 35, 44, 55, 66];
@@ -35,14 +35,14 @@ const ELIDED: [usize; 7] = [3, 4, 26, 44, 54, 65, 66];
 
 /// The map that changes, in cells of one metre.
 const SIZE: [usize; 3] = [200, 200, 40];
-/// How far from the vehicle they may be, m.
+/// Most distance of a change from the vehicle, m.
 const REACH_M: f64 = 10.0;
 /// The vehicle moves on by a cell after so many changes.
 const CHANGES_PER_STEP: usize = 4;
 const RUNS: usize = 1;
 /// Changes from one line of progress to the next.
 const CHANGES_PER_LINE: usize = 100;
-/// How many times as fast as a fresh search planning again must be, by the medians.
+/// Least speed-up of planning again over a fresh search, by the medians.
 const SPEEDUP: f64 = 10.0;
 /// Two sums of the same costs in different order differ by less.
 const SAME_COST: f64 = 1e-6;
@@ -197,7 +197,7 @@ fn all_cells() -> impl Iterator<Item = VoxelIndex> {
     (0..nx * ny * nz).map(move |n| VoxelIndex { x: n % nx, y: n / nx % ny, z: n / (nx * ny) })
 }
 
-/// What planning again took after each change, in milliseconds of processor time.
+/// Times to plan again after each change, in milliseconds of processor time.
 #[derive(Debug, Default)]
 struct Times {
     again: Vec<f64>,
@@ -344,7 +344,7 @@ impl fmt::Display for Spread {
     }
 }
 
-/// What came of all changes in a world that a seed has made.
+/// The results of all changes in a world that a seed has made.
 struct Run {
     world: World,
     seed: u64,
@@ -369,7 +369,7 @@ impl Run {
         Ok(Run { world, seed, times, again, fresh })
     }
 
-    /// How many times as fast planning again is, by the medians.
+    /// The speed-up of planning again, by the medians.
     fn speedup(&self) -> f64 {
         self.fresh.median / self.again.median
     }

@@ -15,7 +15,7 @@ use crate::reported::Experiment;
 use crate::{runs, statistics};
 
 const RUNS: usize = 5;
-/// How long a vehicle that does nothing is waited for, s: twice as long as one that flies needs.
+/// Patience with a vehicle that does nothing, s: twice as long as one that flies needs.
 const PATIENCE_S: f64 = 90.0;
 /// A program whose word is older than this does not run.
 const SILENT: Duration = Duration::from_millis(500);
@@ -34,7 +34,6 @@ const CASES: [Case; 4] = [
     Case { loaded: false, obstacles: false, navigates: false },
 ];
 
-/// What came of one flight.
 struct Outcome {
     /// The vehicles' programs ran from the beginning to the end.
     ran: bool,
@@ -124,7 +123,7 @@ fn fly(case: &Case, vehicles: usize, seed: u64) -> anyhow::Result<Outcome> {
     })
 }
 
-/// How long the ground station has heard nothing of a vehicle's program, since all had first been heard.
+/// The time for which the ground station has heard nothing of a vehicle's program, since all had first been heard.
 #[derive(Default)]
 struct Silence {
     longest: Option<Duration>,

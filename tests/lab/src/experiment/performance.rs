@@ -20,7 +20,7 @@ const RUNS: usize = 500;
 /// Most that b-threads may cost, in per cent of what the sequential loop needs, with 95 % confidence.
 const MOST_COST_PERCENT: f64 = 1.0;
 
-/// What was published of a navigator.
+/// The published figures of a navigator.
 struct Published {
     navigation_s: f64,
     simulation_s: f64,

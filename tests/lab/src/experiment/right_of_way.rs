@@ -28,7 +28,7 @@ const SLOW: (f64, f64) = (100.0, 0.2);
 /// Two places nearer than this, per axis, are in one passage, metres.
 const SAME_PASSAGE_M: f64 = 3.0;
 
-/// Who was in the passage.
+/// The vehicles in the passage.
 #[derive(Debug, Clone, Default)]
 struct Passage {
     inside: BTreeMap<NodeName, [f64; 3]>,
@@ -36,7 +36,7 @@ struct Passage {
     /// Entries into a passage that somebody else was in.
     shared: usize,
     most_at_once: usize,
-    /// How many were inside from when on, seconds.
+    /// Times of changes, seconds, and the number inside from then on.
     over_time: Vec<(f64, f64)>,
 }
 
@@ -163,7 +163,7 @@ fn fly(scenario: &Scenario, rule: PassageRule) -> anyhow::Result<Flight> {
     })
 }
 
-/// How many are inside over the time of one flight, by rule.
+/// The number inside over the time of one flight, by rule.
 fn inside(both: &[Flight; 2]) -> Figure {
     let line = |((_, rule), flight): (&(PassageRule, &str), &Flight)| Line {
         name: (*rule).to_owned(),

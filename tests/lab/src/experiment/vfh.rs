@@ -27,7 +27,7 @@ const SLOW_RUNS: usize = 10;
 const MOST_PITCH_DEG: f64 = 5.0;
 /// The autopilot's mode in which it flies the planner's set-points.
 const PLANNED_MODE: &str = "offboard";
-/// How many times faster it must be.
+/// Least speed-up.
 const LEAST_RATIO: f64 = 2.0;
 
 /// One flight, at every tick in the air.
@@ -41,7 +41,7 @@ struct Moment {
     time_s: f64,
     position: Vector3<f64>,
     speed_m_s: f64,
-    /// Whether the planner's set-points are flown: the autopilot takes off and lands by itself.
+    /// The planner's set-points are flown: the autopilot takes off and lands by itself.
     planned: bool,
     /// Angle between the thrust and what would keep the velocity as it is.
     tilt_deg: f64,

@@ -247,13 +247,13 @@ impl Events {
     }
 }
 
-/// What was seen in a fleet of many processes.
+/// The observations in a fleet of many processes.
 struct SwarmSeen {
     confirm: Times,
     /// Longest superstep in microseconds, before and while one process was stopped.
     before: f64,
     during: f64,
-    /// How many leases the others lost among themselves meanwhile.
+    /// Leases that the others lost among themselves meanwhile.
     others_lost: usize,
 }
 
@@ -333,7 +333,7 @@ const CONFIRM: &str = "confirm";
 struct Confirm {
     ground: NodeName,
     blocking: bool,
-    /// When the last block was stated.
+    /// Time of the last block.
     stated: Duration,
     until: Duration,
 }
@@ -405,7 +405,7 @@ impl Peer {
         Ok(sections.flush()?)
     }
 
-    /// What it has seen in each section.
+    /// Ends it, and returns its observations in each section.
     fn end(mut self) -> anyhow::Result<Vec<Seen>> {
         self.sections = None;
         let mut said = String::new();

@@ -32,14 +32,13 @@ const ZENOH_PING: &str = "skein-bench/ping";
 const ZENOH_PONG: &str = "skein-bench/pong";
 /// As long as a bid or an occurrence of one short event.
 pub(super) const PAYLOAD: usize = 100;
-/// How long a peer may take to answer for the first time.
+/// Patience with a peer's first answer.
 pub(super) const TIME_TO_MEET: Duration = Duration::from_secs(20);
-/// How long an answer may take before it counts as lost.
+/// An answer that takes longer counts as lost.
 pub(super) const PATIENCE: Duration = Duration::from_secs(1);
 /// A peer looks this often whether it is to end, if nothing comes.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// What a peer does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Role {
     /// Measures round trips over plain Zenoh: as many as its number in each section.
@@ -52,7 +51,7 @@ pub enum Role {
     Node,
 }
 
-/// What one node saw in one section.
+/// The observations of one node in one section.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Seen {
     /// Whom it lost, and which homes let go of its blocks.
@@ -90,7 +89,6 @@ impl Member {
         })
     }
 
-    /// How long it has been up.
     pub fn up(&self) -> Duration {
         self.began.elapsed()
     }

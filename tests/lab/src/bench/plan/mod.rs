@@ -25,7 +25,7 @@ use crate::task::Task;
 /// Published lengths have six digits or more: within this share, and this many cells, a length is the published one.
 const SAME_LENGTH: (f64, f64) = (5e-6, 1e-8);
 
-/// What a search took.
+/// The spread of a measure over many searches.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Spread {
     pub median: f64,
@@ -42,7 +42,7 @@ impl Spread {
     }
 }
 
-/// What came of a map's problems.
+/// The results of a map's problems.
 #[derive(Debug, Serialize)]
 struct Result {
     planner: Planner,
@@ -92,7 +92,7 @@ pub struct Plan {
     /// Only the first so many problems.
     #[arg(long, value_name = "N")]
     limit: Option<usize>,
-    /// How many times the least a way of `weighted` or `budgeted` may cost.
+    /// Most cost of a way of `weighted` or `budgeted`, as a multiple of the least.
     #[arg(long, value_name = "X", default_value_t = 1.05, value_parser = at_least_one)]
     bound: f64,
     /// Most cells to expand for a problem; without end if not given, but for `budgeted`.

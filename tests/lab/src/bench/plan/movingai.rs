@@ -7,22 +7,19 @@ use skein_planning::map::VoxelIndex;
 /// A way to find, and how long the shortest is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Problem {
-    /// Where it begins.
     pub start: VoxelIndex,
-    /// Where it ends.
     pub goal: VoxelIndex,
     /// The published length of the shortest way, in cells, under
     /// [`StepCosts::EUCLIDEAN`](skein_planning::grid::StepCosts::EUCLIDEAN).
     pub length: f64,
 }
 
-/// What is wrong with a file.
+/// A fault in a file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: found {found}, expected {expected}")]
 pub struct FormatError {
     /// The line, from 1.
     pub line: usize,
-    /// What stands there.
     pub found: String,
     pub expected: String,
 }

@@ -20,7 +20,7 @@ use crate::cpu_time;
 const SIDE: usize = 100;
 /// Share of their cells that is blocked.
 const BLOCKED: f64 = 0.2;
-/// How many of them are crossed from corner to corner.
+/// Grids that are crossed from corner to corner.
 const GRIDS: u64 = 20;
 /// Two sums of the same costs in different order differ by less.
 const SAME_COST: f64 = 1e-6;

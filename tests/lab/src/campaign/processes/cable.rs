@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How often a cut cable is looked at.
+/// Time between two looks at a cut cable.
 const LOOK: Duration = Duration::from_millis(5);
 
 /// Forwards TCP connections from its own port to another, unless it is cut.
@@ -38,7 +38,6 @@ impl Cable {
         Ok(Self { port, cut })
     }
 
-    /// Where to connect.
     pub fn port(&self) -> u16 {
         self.port
     }

@@ -25,16 +25,15 @@ use crate::operator::Operator;
 
 /// The fault comes between these times after the start, s.
 const MOMENT_S: (f64, f64) = (6.0, 30.0);
-/// How long a process or the world is stopped, and a cable cut.
+/// Time for which a process or the world is stopped, or a cable cut.
 const PAUSE: Duration = Duration::from_secs(3);
 /// A run that takes longer has failed.
 const TIME_LIMIT: Duration = Duration::from_secs(150);
-/// How near to the window's middle plane a vehicle is inside it, m.
+/// Distance from the window's middle plane up to which a vehicle is inside it, m.
 const WINDOW_DEPTH_M: f64 = 0.8;
 /// A vehicle that holds is slower than this, m/s.
 const HOLDS_M_S: f64 = 0.5;
 
-/// What goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Fault {
     /// Nothing.
@@ -95,7 +94,7 @@ impl Fault {
         if self == Self::NodeCut { "window" } else { "forest" }
     }
 
-    /// Whether every vehicle is to complete its mission all the same.
+    /// Every vehicle is to complete its mission all the same.
     fn is_survived_by_all(self) -> bool {
         matches!(self, Self::None | Self::GroundRestarted | Self::WorldPaused | Self::NodeCut | Self::Garbage)
     }
@@ -104,20 +103,18 @@ impl Fault {
 /// One run.
 #[derive(Debug, Clone)]
 pub struct Trial {
-    /// What went wrong.
     pub fault: Fault,
     /// From which the world, the moment and the victim come.
     pub seed: u64,
-    /// When, s.
+    /// Time of the fault, s.
     pub at_s: f64,
-    /// What should not have come of it.
     pub violations: Vec<String>,
 }
 
 /// Flies once with one fault. Configurations, logs and the recording stay in `folder`.
 ///
 /// # Errors
-/// What keeps the swarm from being started at all.
+/// The swarm cannot be started at all.
 pub fn run(
     fault: Fault,
     seed: u64,
@@ -215,7 +212,7 @@ impl Run {
         self.until(|_| Instant::now() >= until);
     }
 
-    /// What must hold at every step.
+    /// Judges what must hold at every step.
     fn look(&mut self) {
         if !self.watches_window {
             return;

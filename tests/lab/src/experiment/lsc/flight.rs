@@ -27,7 +27,7 @@ const CELL_M: f64 = 0.5;
 const TICKS_PER_STEP: u64 = 28;
 /// The agents' tick in steps of the world: 20 ms.
 const STEPS_PER_TICK: u64 = 5;
-/// How often each speaks before a step; it plans every time but the first.
+/// Turns of each to speak before a step; it plans in every one but the first.
 const ROUNDS: usize = 3;
 /// Range of radio, m.
 const RADIO_RANGE_M: f64 = 3.0;
@@ -48,7 +48,6 @@ const MOST_BEFORE_S: f64 = 30.0;
 /// Tracks are kept ten times a second, in steps of the world.
 const STEPS_PER_TRACK_POINT: u64 = 25;
 
-/// Whether vehicles may use height.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Space {
     /// At the height of their starts.
@@ -56,7 +55,7 @@ pub enum Space {
     Spatial,
 }
 
-/// What came of a mission.
+/// The result of a mission.
 #[derive(Debug, Clone, Default)]
 pub struct Flown {
     /// Why it failed; `None` if it did not.
@@ -79,14 +78,14 @@ pub struct Flown {
     pub max_error_m: f64,
     /// CPU time of each plan, ms.
     pub plan_ms: Vec<f64>,
-    /// Where each vehicle was, world ENU, m.
+    /// The track of each vehicle, world ENU, m.
     pub tracks: Vec<Vec<Vector3<f64>>>,
 }
 
 /// Flies a mission.
 ///
 /// # Errors
-/// What keeps it from being flown at all.
+/// The mission cannot be flown at all.
 pub fn fly(mission: &LscMission, scene: &Scene, space: Space, seed: u64) -> anyhow::Result<Flown> {
     Flight::new(mission, scene, space, seed)?.run()
 }
@@ -247,7 +246,7 @@ impl Flight {
         }
     }
 
-    /// What the agents say goes to the autopilots.
+    /// Passes the agents' MAVLink to the autopilots.
     fn deliver(&mut self) {
         for (index, pilot) in self.pilots.iter_mut().enumerate() {
             self.simulation.send(index, &pilot.take_output());
@@ -312,7 +311,7 @@ impl Flight {
     }
 }
 
-/// Where one can fly.
+/// The places where one can fly.
 fn roads(mission: &LscMission, scene: &Scene, space: Space) -> anyhow::Result<Roads> {
     let agents = || mission.agents.iter();
     let through = agents().map(|agent| agent.start).next().context("a mission without agents")?;

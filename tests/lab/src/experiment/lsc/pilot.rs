@@ -20,7 +20,7 @@ pub struct Pilot {
     companion: Companion,
     tracker: Tracker,
     agent: LscAgent,
-    /// Whether its height is given by the mission and never changes.
+    /// Its height is given by the mission and never changes.
     level: bool,
     asked: Option<Duration>,
 }
@@ -110,7 +110,7 @@ impl Pilot {
         self.companion.telemetry().velocity.map_or(f64::INFINITY, |velocity| velocity.value.norm())
     }
 
-    /// How it has kept to its limits, and to its itinerary.
+    /// Its record of limits and itinerary.
     pub fn tracker(&self) -> &Tracker {
         &self.tracker
     }

@@ -18,12 +18,12 @@ const FREQUENCY_RAD_S: f64 = 5.0;
 const DAMPING: f64 = 0.6;
 /// Steps of integration in a tick.
 const SUBSTEPS: u8 = 10;
-/// How quickly a position error is flown off, 1/s.
+/// Rate at which a position error is flown off, 1/s.
 const POSITION_GAIN: f64 = 3.0;
 /// Share of a velocity error that the command takes up.
 const VELOCITY_GAIN: f64 = 0.8;
 
-/// Where a vehicle is to be, and how fast it is to move there.
+/// The place where a vehicle is to be, and its velocity there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reference {
     /// World ENU, m.
@@ -39,7 +39,7 @@ impl Reference {
     }
 }
 
-/// What a vehicle does of what it is told.
+/// A model of a vehicle's answer to commands.
 #[derive(Debug, Clone)]
 struct Answer {
     /// Positions of the itinerary that are still without effect, the oldest first.
@@ -121,7 +121,7 @@ impl Tracker {
         self.error_m
     }
 
-    /// Where the vehicle should be by now, world ENU, m.
+    /// The place where the vehicle should be by now, world ENU, m.
     pub fn expected(&self) -> Vector3<f64> {
         self.expected.position
     }

@@ -137,7 +137,6 @@ fn neighbour(at: usize, vehicle: &Vehicle) -> Neighbour {
     }
 }
 
-/// What came of a flight.
 #[derive(Debug, Clone, Default)]
 struct Flight {
     arrived: usize,
@@ -151,7 +150,7 @@ struct Flight {
     step_ms: f64,
     /// The least distance after each step, metres.
     separation_m: Vec<(f64, f64)>,
-    /// Where some of the vehicles were, seen from above, metres.
+    /// The tracks of some of the vehicles, seen from above, metres.
     ways: Vec<Vec<(f64, f64)>>,
 }
 

@@ -8,7 +8,7 @@ use skein_planning::grid::{Lattice, MOVES, moved};
 use skein_planning::map::VoxelIndex;
 use skein_swarm::route::{Plan, RouteCost, RouteProblem};
 
-/// How [`any_angle`] searches.
+/// The parameters of [`any_angle`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnyAngleConfig {
     /// Distance between neighbours of the lattice, metres.
@@ -63,7 +63,7 @@ impl<'a> LegLattice<'a> {
         self.airspace.lower + Vector3::new(cell.x as f64, cell.y as f64, cell.z as f64) * self.pitch_m
     }
 
-    /// What a leg costs; `None` if it violates something.
+    /// The cost of a leg; `None` if it violates something.
     fn leg_m(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<f64> {
         let leg = self.cost.assess_leg(from, to, self.airspace);
         leg.is_feasible().then_some(leg.cost_m)

@@ -33,14 +33,14 @@ const VEHICLES: usize = 20;
 const FIRST_SEED: u64 = 10_001;
 /// Inner waypoints of a route: in 2000 m one every 182 m, so that it can bend around the smallest zone, 200 m.
 const WAYPOINTS: usize = 10;
-/// How much slower than at cruise a vehicle may fly to arrive together with others.
+/// Factor by which a vehicle may fly slower than at cruise to arrive together with others.
 const SLOWEST: f64 = 2.0;
 /// Feasibility is judged by samples of the terrain this far apart, metres.
 const FINE_M: f64 = 2.0;
 /// Runs of each variant of the baseline.
 const VARIANT_RUNS: usize = 10;
 
-/// Whose routes are compared.
+/// The planners that are compared.
 const PLANNERS: [(&str, Plans); 4] = [
     ("standard", |problem, seed| Baseline::STANDARD.plan(problem, Effort::default(), seed)),
     ("constriction", |problem, seed| Baseline::CONSTRICTION.plan(problem, Effort::default(), seed)),
@@ -388,7 +388,7 @@ fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
 mod tests {
     use super::*;
 
-    /// What a report says but for how long it took.
+    /// A report without the times it took.
     fn untimed(report: &Report) -> Value {
         let mut json = report.to_json();
         if let Some(fields) = json.as_object_mut() {

@@ -20,9 +20,9 @@ const TARGETS: [[f64; 3]; 10] = [
     [2000.0, 1800.0, 650.0],
     [2000.0, 2000.0, 580.0],
 ];
-/// Where each mountain is, and its height, metres.
+/// The place of each mountain, and its height, metres.
 const MOUNTAINS: [[f64; 3]; 2] = [[500.0, 1500.0, 400.0], [500.0, 500.0, 200.0]];
-/// Where each threat zone is, and its radius, metres.
+/// The place of each threat zone, and its radius, metres.
 const THREATS: [[f64; 3]; 4] =
     [[1000.0, 1000.0, 400.0], [500.0, 500.0, 200.0], [500.0, 1200.0, 200.0], [1500.0, 500.0, 200.0]];
 /// Chosen: `sx` and `sy` of the mountains, metres.
