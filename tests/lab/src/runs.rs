@@ -1,10 +1,10 @@
-//! Many runs of an experiment, two at a time.
+//! Many runs, a few at a time.
 
 use std::io::IsTerminal as _;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Runs at once.
+/// Runs of an experiment at once.
 const THREADS: usize = 2;
 
 /// Does `run` with each of `cases` and gives back what came of each, in their order. A terminal shows how far it is.
@@ -12,6 +12,29 @@ const THREADS: usize = 2;
 /// # Errors
 /// The first error, in the order of the cases; the others are not begun any more once there is one.
 pub fn in_turn<C: Sync, R: Send>(
+    what: &str,
+    cases: &[C],
+    run: impl Fn(&C) -> anyhow::Result<R> + Sync,
+) -> anyhow::Result<Vec<R>> {
+    at_once(THREADS, what, cases, run)
+}
+
+/// The same with so many runs at once; as many as this computer has processors if `None`.
+///
+/// # Errors
+/// As [`in_turn`].
+pub fn by_jobs<C: Sync, R: Send>(
+    jobs: Option<usize>,
+    what: &str,
+    cases: &[C],
+    run: impl Fn(&C) -> anyhow::Result<R> + Sync,
+) -> anyhow::Result<Vec<R>> {
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    at_once(jobs.unwrap_or(processors).max(1), what, cases, run)
+}
+
+fn at_once<C: Sync, R: Send>(
+    threads: usize,
     what: &str,
     cases: &[C],
     run: impl Fn(&C) -> anyhow::Result<R> + Sync,
@@ -34,7 +57,7 @@ pub fn in_turn<C: Sync, R: Send>(
         }
     };
     std::thread::scope(|scope| {
-        for _ in 0..THREADS.min(cases.len()) {
+        for _ in 0..threads.min(cases.len()) {
             scope.spawn(work);
         }
     });

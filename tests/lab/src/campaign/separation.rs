@@ -1,9 +1,6 @@
 //! `campaign separation`: swarms that hear one another late and not always, in lockstep; nobody may touch anybody, or anything.
 
-use std::io::{IsTerminal as _, Write as _};
 use std::ops::RangeInclusive;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use clap::Args;
 use serde::Serialize;
@@ -13,6 +10,7 @@ use skein_sim::fly::Trial;
 use skein_sim::scenario::{Network, Scenario};
 use skein_sim::summary::Summary;
 
+use crate::runs;
 use crate::task::Task;
 
 /// One flight of the campaign.
@@ -114,32 +112,10 @@ impl Task for Separation {
 /// Every scenario with every seed, in that order whichever ends first.
 fn fly_all(args: &Separation) -> anyhow::Result<Vec<Run>> {
     let seeds = args.from..args.from + args.seeds;
-    let flights: Vec<(&str, u64)> = args
-        .scenarios
-        .iter()
-        .flat_map(|scenario| seeds.clone().map(move |seed| (scenario.as_str(), seed)))
-        .collect();
-    let (next, results) = (AtomicU64::new(0), Mutex::new(Vec::new()));
-    let processors = std::thread::available_parallelism().map_or(1, usize::from);
-    let work = || {
-        while let Some((at, (scenario, seed))) = {
-            let at = next.fetch_add(1, Ordering::Relaxed);
-            usize::try_from(at).ok().and_then(|at| Some((at, *flights.get(at)?)))
-        } {
-            let run = fly_one(args, scenario, seed);
-            let mut results = results.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-            results.push((at, run));
-            tell(results.len(), flights.len());
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 0..args.jobs.unwrap_or(processors).max(1) {
-            scope.spawn(work);
-        }
-    });
-    let mut results = results.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    results.sort_by_key(|(at, _)| *at);
-    results.into_iter().map(|(_, run)| run).collect()
+    let scenarios = args.scenarios.iter();
+    let flights: Vec<(&str, u64)> =
+        scenarios.flat_map(|name| seeds.clone().map(move |seed| (name.as_str(), seed))).collect();
+    runs::by_jobs(args.jobs, "flights", &flights, |(scenario, seed)| fly_one(args, scenario, *seed))
 }
 
 fn fly_one(args: &Separation, scenario: &str, seed: u64) -> anyhow::Result<Run> {
@@ -147,15 +123,6 @@ fn fly_one(args: &Separation, scenario: &str, seed: u64) -> anyhow::Result<Run> 
     scenario.network = Network { latency_ms: args.latency_ms, loss: args.loss, lease_ms: args.lease_ms };
     scenario.validate()?;
     Ok(Run::of(Trial::new(&scenario, Controller::Bp).fly(&mut |_, _| {})?.summary))
-}
-
-fn tell(done: usize, of: usize) {
-    let mut stderr = std::io::stderr().lock();
-    if stderr.is_terminal() {
-        // Nobody misses a line of progress that cannot be written.
-        let _ = write!(stderr, "\r{done} of {of} flights");
-        let _ = if done == of { writeln!(stderr) } else { stderr.flush() };
-    }
 }
 
 fn within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
