@@ -9,16 +9,16 @@ use skein_world::Scene;
 use crate::mission::{self, MissionSet};
 use crate::scenario::{Overrides, Scenario, ScenarioError, read_world};
 
-/// What was found in a sound file.
+/// The findings in a sound file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Findings {
     /// The file, or the name of the built-in scenario.
     pub file: String,
     /// `scenario`, `world` or `mission`.
     pub kind: &'static str,
-    /// What it holds, in words.
+    /// Its content, in words.
     pub holds: String,
-    /// What of it is read over or gives way.
+    /// Parts that have no effect or give way.
     pub warnings: Vec<String>,
 }
 
@@ -33,7 +33,7 @@ impl fmt::Display for Findings {
 /// else a scenario.
 ///
 /// # Errors
-/// What is wrong with it: with file, line and what was expected.
+/// The first fault: with file, line and what was expected.
 pub fn check(file: &Path) -> Result<Findings, ScenarioError> {
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase());
     let (kind, holds, warnings) = match extension.as_deref() {

@@ -11,31 +11,29 @@ use serde_json::json;
 use skein_agent::{AgentConfig, AirspaceTable};
 use skein_bp::script::Assignment;
 
-use crate::cli::{self, Network};
+use crate::cli::{self, Network, Setup};
 use crate::fly::{FLEET, GROUND, agent_configs, ground_config};
 use crate::scenario::Scenario;
 use crate::world_host::WORLD;
 
-/// Where nodes listen for each other: the world, the ground station or a router, and from there on the vehicles.
+/// The ports of nodes for one another: the world, the ground station or a router, and from there on the vehicles.
 const WORLD_PORT: u16 = 7446;
 const GROUND_PORT: u16 = 7447;
 const FIRST_VEHICLE_PORT: u16 = 7450;
-/// Where the console is served.
 const CONSOLE_PORT: u16 = 8700;
-/// Where vehicle 0's agent listens for its autopilot.
+/// The port of vehicle 0's agent for its autopilot.
 const COMPANION_PORT: u16 = 14540;
 
 const AGENT: &str = include_str!("../../agent/agent.toml");
 const GROUND_STATION: &str = include_str!("../../ground/ground.toml");
 const WORLD_EXAMPLE: &str = include_str!("../world.toml");
 
-/// Where the router listens, or the ground station in its place.
+/// The port of the router, or of the ground station in its place.
 #[must_use]
 pub fn router_port(port_offset: u16) -> u16 {
     GROUND_PORT + port_offset
 }
 
-/// Where the console is served.
 #[must_use]
 pub fn console(port_offset: u16) -> SocketAddr {
     (Ipv4Addr::LOCALHOST, CONSOLE_PORT + port_offset).into()
@@ -55,10 +53,10 @@ pub struct Files {
 /// Writes the files, and says how to start the swarm.
 ///
 /// # Errors
-/// What is wrong with the scenario; a file that cannot be written.
+/// A fault in the scenario; a file that cannot be written.
 pub fn run(args: &cli::Configure, as_json: bool) -> anyhow::Result<()> {
     let scenario = args.world.open()?;
-    let files = write(&scenario, &args.out, args.network, args.port_offset, args.launch_on_order)?;
+    let files = write(&scenario, &args.out, args.setup)?;
     if as_json {
         println!("{}", json!({ "world": files.world, "ground": files.ground, "agents": files.agents }));
     } else {
@@ -69,30 +67,29 @@ pub fn run(args: &cli::Configure, as_json: bool) -> anyhow::Result<()> {
 
 fn instructions(args: &cli::Configure, files: &Files) -> String {
     let mut text = String::from("Start each in a terminal of its own, in any order:\n\n");
-    if args.network == Network::Zenohd {
-        let port = router_port(args.port_offset);
+    let cli::Configure { world: cli::WorldArgs { scenario, overrides, seed }, setup, .. } = args;
+    if setup.network == Network::Zenohd {
+        let port = router_port(setup.port_offset);
         let _ = writeln!(text, "  zenohd --listen tcp/127.0.0.1:{port} --no-multicast-scouting");
     }
-    let mut world = format!("  skein-sim serve {} --seed {}", args.world.scenario, args.world.seed);
-    if let Some(vehicles) = args.world.vehicles {
+    let mut world = format!("  skein-sim serve {scenario} --seed {seed}");
+    if let Some(vehicles) = overrides.vehicles {
         let _ = write!(world, " --vehicles {vehicles}");
     }
-    for (option, files) in
-        [("--world", args.world.world_file.as_slice()), ("--mission", &args.world.missions)]
-    {
+    for (option, files) in [("--world", overrides.world.as_slice()), ("--mission", &overrides.missions)] {
         for file in files {
             let _ = write!(world, " {option} {}", file.display());
         }
     }
-    if args.port_offset > 0 {
-        let _ = write!(world, " --port-offset {}", args.port_offset);
+    if setup.port_offset > 0 {
+        let _ = write!(world, " --port-offset {}", setup.port_offset);
     }
     let _ = writeln!(text, "{world} --config {}", files.world.display());
     let _ = writeln!(text, "  skein-ground serve --config {}", files.ground.display());
     for agent in &files.agents {
         let _ = writeln!(text, "  skein-agent run --config {}", agent.display());
     }
-    let _ = writeln!(text, "\nThe console is then at http://{}.", console(args.port_offset));
+    let _ = writeln!(text, "\nThe console is then at http://{}.", console(setup.port_offset));
     text
 }
 
@@ -100,27 +97,20 @@ fn instructions(args: &cli::Configure, files: &Files) -> String {
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write(
-    scenario: &Scenario,
-    folder: &Path,
-    network: Network,
-    port_offset: u16,
-    launch_on_order: bool,
-) -> anyhow::Result<Files> {
+pub fn write(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result<Files> {
     std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
     let save = |name: &str, text: String| {
         let path = folder.join(name);
         std::fs::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
         anyhow::Ok(path)
     };
-    let plan = Plan { network, port_offset };
     let agents = agent_configs(scenario, cli::Controller::Bp);
-    let world = save("world.toml", plan.world())?;
+    let world = save("world.toml", setup.world())?;
     let muster = ground_config(scenario, skein_wire::Fleet::new(FLEET)?, cli::Controller::Bp).muster;
-    let ground = save("ground.toml", plan.ground(&agents, muster, launch_on_order))?;
+    let ground = save("ground.toml", setup.ground(&agents, muster))?;
     let agents = (0..).zip(&agents).map(|(index, agent)| {
         let stem = agent.node.replace('/', "-");
-        let mut text = plan.agent(index, agent) + &airspace_tables(agent)?;
+        let mut text = setup.agent(index, agent) + &airspace_tables(agent)?;
         for assignment in &agent.scripts {
             let file = format!("{stem}-{}.json", assignment.name());
             save(&file, serde_json::to_string_pretty(&assignment.script)?)?;
@@ -131,7 +121,7 @@ pub fn write(
     Ok(Files { world, ground, agents: agents.collect::<anyhow::Result<_>>()? })
 }
 
-/// What is known of the airspace, in an agent's configuration.
+/// The airspace in an agent's configuration.
 fn airspace_tables(agent: &AgentConfig) -> anyhow::Result<String> {
     let airspace = AirspaceTable::of(&agent.airspace);
     if airspace == AirspaceTable::default() {
@@ -148,13 +138,7 @@ fn script_table(file: &str, assignment: &Assignment) -> String {
     format!("\n[[script]]\nfile = {file:?}\nwith = {{ {} }}\nas = {name:?}\n", with.join(", "))
 }
 
-/// Who listens where, and how they are joined.
-struct Plan {
-    network: Network,
-    port_offset: u16,
-}
-
-impl Plan {
+impl Setup {
     fn endpoint(&self, port: u16) -> String {
         format!("tcp/127.0.0.1:{}", port + self.port_offset)
     }
@@ -182,13 +166,13 @@ impl Plan {
         self.join(template, WORLD_PORT, vec![]).0
     }
 
-    fn ground(&self, agents: &[AgentConfig], muster: bool, launch_on_order: bool) -> String {
+    fn ground(&self, agents: &[AgentConfig], muster: bool) -> String {
         let vehicles: Vec<&str> = agents.iter().map(|agent| agent.node.as_str()).collect();
         let template = Template(GROUND_STATION.to_owned())
             .set("", "fleet", &FLEET)
             .set("", "node", &GROUND.as_str())
             .set("", "vehicles", &vehicles)
-            .set("", "launch", &if launch_on_order { "on_order" } else { "at_start" })
+            .set("", "launch", &if self.launch_on_order { "on_order" } else { "at_start" })
             .set("", "muster", &muster)
             .set("", "console", &console(self.port_offset).to_string())
             .set("", "record", &".");
@@ -268,20 +252,20 @@ mod tests {
         let scenario = Scenario::open("window", &crate::scenario::Overrides::default(), 3).unwrap();
         let agents = agent_configs(&scenario, cli::Controller::Bp);
         for network in [Network::Peer, Network::Router, Network::Zenohd] {
-            let plan = Plan { network, port_offset: 100 };
-            let agent: toml::Table = plan.agent(1, &agents[1]).parse().unwrap();
+            let setup = Setup { network, port_offset: 100, launch_on_order: false };
+            let agent: toml::Table = setup.agent(1, &agents[1]).parse().unwrap();
             assert_eq!(agent["mission"]["waypoints"].as_array().unwrap().len(), agents[1].waypoints.len());
             assert_eq!(agent["autopilot"]["link"].as_str(), Some("udp:127.0.0.1:14641"));
             assert_eq!(agent["envelope"].as_table().unwrap().len(), 7);
             assert_eq!(agent["planners"]["global"].as_str(), Some("astar"));
             assert_eq!(agent["planners"]["local"].as_str(), Some("apf"));
-            let ground: toml::Table = plan.ground(&agents, true, false).parse().unwrap();
+            let ground: toml::Table = setup.ground(&agents, true).parse().unwrap();
             assert_eq!(ground["vehicles"].as_array().unwrap().len(), agents.len());
             assert_eq!(
                 (ground["muster"].as_bool(), ground["launch"].as_str()),
                 (Some(true), Some("at_start"))
             );
-            let world: toml::Table = plan.world().parse().unwrap();
+            let world: toml::Table = setup.world().parse().unwrap();
             let mode = |table: &toml::Table| table["network"]["mode"].as_str().unwrap().to_owned();
             let modes = [mode(&world), mode(&ground), mode(&agent)];
             match network {

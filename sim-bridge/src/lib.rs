@@ -3,20 +3,14 @@
 //! [`fly`] hosts a whole swarm in one process, or starts one process for each of its nodes; `serve` hosts the world alone,
 //! for agents and MAVLink clients in other processes. All take a [`scenario`].
 
-pub mod bench;
-pub mod campaign;
 pub mod check;
 pub mod cli;
 #[cfg(feature = "zenoh")]
 pub mod configure;
-mod cpu_time;
-pub mod experiment;
 pub mod fly;
 #[cfg(feature = "zenoh")]
 mod mavlink_ports;
 pub mod mission;
-#[cfg(feature = "zenoh")]
-pub mod operator;
 #[cfg(feature = "zenoh")]
 pub mod processes;
 pub mod scenario;

@@ -38,7 +38,7 @@ fn run(cli: &Cli) -> anyhow::Result<Exit> {
         Command::Fly(args) => {
             let summary = fly::run(args)?;
             show(&summary, cli.json)?;
-            Ok(if summary.succeeded { Exit::Done } else { Exit::Failed })
+            Ok(Exit::of(summary.succeeded))
         }
         #[cfg(feature = "zenoh")]
         Command::Serve(args) => {
@@ -48,15 +48,6 @@ fn run(cli: &Cli) -> anyhow::Result<Exit> {
         }
         #[cfg(feature = "zenoh")]
         Command::Configure(args) => skein_sim::configure::run(args, cli.json).map(|()| Exit::Done),
-        Command::Campaign { what } => {
-            let sound = skein_sim::campaign::run(what, cli.json)?;
-            Ok(if sound { Exit::Done } else { Exit::Failed })
-        }
-        Command::Experiment(args) => {
-            let reached = skein_sim::experiment::run(args, cli.json)?;
-            Ok(if reached { Exit::Done } else { Exit::Failed })
-        }
-        Command::Bench { what } => skein_sim::bench::run(what, cli.json).map(|()| Exit::Done),
         #[cfg(not(feature = "zenoh"))]
         Command::Serve(_) | Command::Configure(_) => {
             anyhow::bail!("built without the cargo feature `zenoh`, which this needs")

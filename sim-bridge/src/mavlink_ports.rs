@@ -15,7 +15,7 @@ use anyhow::Context as _;
 
 const COMPANION: (u16, u16) = (14580, 14540);
 const GROUND: (u16, u16) = (18570, 14550);
-/// Who has been silent for longer is no longer sent to.
+/// Silence after which nothing is sent to a client any more.
 const SILENT_AFTER: Duration = Duration::from_secs(10);
 /// Largest datagram taken in; MAVLink's frames are at most 280 bytes.
 const DATAGRAM: usize = 2048;
@@ -59,12 +59,12 @@ impl MavlinkPorts {
         }
     }
 
-    /// Where ground stations listen for all vehicles.
+    /// The port at which ground stations listen for all vehicles.
     pub fn audience(&self) -> Option<SocketAddr> {
         self.vehicles.first().map(|[_, ground]| ground.audience)
     }
 
-    /// Where the companion link of vehicle `index` listens.
+    /// The port of the companion link of vehicle `index`.
     pub fn companion_port(&self, index: usize) -> Option<u16> {
         self.vehicles.get(index).map(|[companion, _]| companion.listens_on)
     }
@@ -74,9 +74,9 @@ impl MavlinkPorts {
 struct Port {
     socket: UdpSocket,
     listens_on: u16,
-    /// Who is spoken to unasked.
+    /// The address that is spoken to unasked.
     audience: SocketAddr,
-    /// Whether it is spoken to even while others speak.
+    /// It is spoken to even while others speak.
     always: bool,
     clients: Vec<(SocketAddr, Instant)>,
 }

@@ -12,15 +12,15 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use skein_dbp::NodeName;
 
-use crate::cli::Network;
+use crate::cli::{Network, Setup};
 use crate::configure::{self, Files};
 use crate::fly::{GROUND, vehicle_name};
 use crate::scenario::Scenario;
 use crate::world_host::{WorldConfig, WorldHost};
 
-/// How long a process that was asked to end may take.
+/// Patience with a process that was asked to end.
 const TIME_TO_END: Duration = Duration::from_secs(5);
-/// How long a router may take to listen.
+/// Patience with a router until it listens.
 const TIME_TO_LISTEN: Duration = Duration::from_secs(10);
 
 /// The processes of a swarm. They end with this.
@@ -43,7 +43,6 @@ struct Running {
 /// A second process of a node. It ends with this.
 pub struct Double {
     child: Child,
-    /// Where it writes what it has to say.
     pub log: PathBuf,
 }
 
@@ -53,17 +52,6 @@ impl Drop for Double {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
-}
-
-/// How the processes are set up.
-#[derive(Clone, Copy, Debug)]
-pub struct Setup {
-    /// How they are joined.
-    pub network: Network,
-    /// How much further up than by convention all network ports are.
-    pub port_offset: u16,
-    /// Whether the swarm waits on the ground for an operator.
-    pub launch_on_order: bool,
 }
 
 impl Processes {
@@ -82,8 +70,8 @@ impl Processes {
     /// # Errors
     /// A program that is missing, a port that is taken, a file that cannot be written.
     pub fn prepare(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result<Self> {
-        let Setup { network, port_offset, launch_on_order } = setup;
-        let files = configure::write(scenario, folder, network, port_offset, launch_on_order)?;
+        let Setup { network, port_offset, .. } = setup;
+        let files = configure::write(scenario, folder, setup)?;
         let logs = folder.join("logs");
         std::fs::create_dir_all(&logs).with_context(|| format!("{}: cannot be made", logs.display()))?;
         let router = match network {
@@ -141,13 +129,13 @@ impl Processes {
         Ok(Double { child: spawn(command, &log)?, log })
     }
 
-    /// Where configurations, logs and the recording are.
+    /// The folder of configurations, logs and the recording.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// How much further up than by convention all network ports are.
+    /// The distance of all network ports from the usual ones.
     #[must_use]
     pub fn port_offset(&self) -> u16 {
         self.port_offset
@@ -181,7 +169,7 @@ impl Processes {
         Ok(())
     }
 
-    /// Where a node writes what it has to say.
+    /// The log of a node.
     #[must_use]
     pub fn log_of(&self, node: &NodeName) -> PathBuf {
         self.logs.join(format!("{}.log", node.as_str().replace('/', "-")))
@@ -197,7 +185,7 @@ impl Processes {
         &self.world
     }
 
-    /// Where the console is served.
+    /// The address of the console.
     #[must_use]
     pub fn console(&self) -> SocketAddr {
         configure::console(self.port_offset)

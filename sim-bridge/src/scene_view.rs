@@ -3,7 +3,7 @@
 use skein_wire::{Form, Solid};
 use skein_world::{Obstacle, Scene, Shape};
 
-/// What stands in `scene`; planes without end are left out.
+/// The obstacles of `scene`; planes without end are left out.
 #[must_use]
 pub fn view(scene: &Scene) -> skein_wire::Scene {
     let solid = |obstacle: &Obstacle| {

@@ -6,14 +6,15 @@ use anyhow::Context as _;
 use serde_json::json;
 
 use crate::cli;
-use crate::fly::{interruptions, report};
+use crate::fly::account;
+use crate::fly::call_off::interruptions;
 use crate::summary::Summary;
 use crate::world_host::{WorldConfig, WorldHost};
 
 /// Hosts the world until Ctrl-C, and says what came of it.
 ///
 /// # Errors
-/// What is wrong with the scenario or the configuration; a port that is taken.
+/// A fault in the scenario or the configuration; a port that is taken.
 pub fn run(args: &cli::Serve, as_json: bool) -> anyhow::Result<Summary> {
     let scenario = args.world.open()?;
     let config = args.config.as_deref().map_or_else(|| Ok(WorldConfig::default()), WorldConfig::read)?;
@@ -23,7 +24,7 @@ pub fn run(args: &cli::Serve, as_json: bool) -> anyhow::Result<Summary> {
     while interruptions() == 0 {
         world.step();
     }
-    let summary = report::summary(&scenario, &world.account(), began.elapsed(), None);
+    let summary = account::summary(&scenario, &world.account(), began.elapsed(), None);
     if let Some(out) = &args.out {
         std::fs::create_dir_all(out).with_context(|| format!("{}: cannot be made", out.display()))?;
         let path = out.join("summary.json");

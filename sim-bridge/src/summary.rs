@@ -1,4 +1,4 @@
-//! What a run came to: `summary.json` and the table at its end.
+//! The result of a run: `summary.json` and the table at its end.
 
 use std::fmt::Write as _;
 use std::io;
@@ -13,11 +13,10 @@ use serde::{Deserialize, Serialize};
 pub struct Summary {
     /// Name of the scenario.
     pub scenario: String,
-    /// What every random number came from.
+    /// The source of every random number.
     pub seed: u64,
-    /// How many vehicles took part.
     pub vehicles: usize,
-    /// Whether every vehicle reached its goal and landed, without a collision.
+    /// Every vehicle reached its goal and landed, without a collision.
     pub succeeded: bool,
     /// Why not; `None` on success.
     pub reason: Option<String>,
@@ -77,7 +76,7 @@ impl Spread {
     }
 }
 
-/// How long path planning took, in milliseconds on the wall; 0 where nothing was planned.
+/// Times of path planning, in milliseconds on the wall; 0 where nothing was planned.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlanTimes {
     pub mean: f64,
@@ -114,7 +113,7 @@ pub struct Traffic {
     pub bytes: u64,
 }
 
-/// How a vehicle's mission ended.
+/// The end of a vehicle's mission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
@@ -142,12 +141,10 @@ impl Outcome {
     }
 }
 
-/// How one vehicle fared.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct VehicleSummary {
     /// Name of its node, such as `uav/3`.
     pub id: String,
-    /// How its mission ended.
     pub outcome: Outcome,
     /// Why it did not arrive; `None` if it did.
     pub reason: Option<String>,

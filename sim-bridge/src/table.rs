@@ -28,9 +28,7 @@ pub struct Row {
     pub vehicle: String,
     /// Flight mode of its autopilot.
     pub mode: String,
-    /// What it is doing.
     pub task: String,
-    /// What its program waits for.
     pub waiting_for: String,
     /// Share of the battery's energy left, 0 to 1.
     pub battery: Option<f64>,
@@ -38,7 +36,7 @@ pub struct Row {
     pub nearest: Option<(String, f64)>,
 }
 
-/// How far the run is.
+/// The progress of a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Progress {
     pub sim_time_s: f64,
@@ -87,7 +85,7 @@ impl<W: Write> LiveTable<W> {
         Self { out, width: width.map(|w| w.max(LEAST_WIDTH)), drawn: 0, last: None }
     }
 
-    /// Whether a picture is due; `wall` is the wall time since the run began.
+    /// A picture is due; `wall` is the wall time since the run began.
     pub fn is_due(&self, wall: Duration) -> bool {
         let period = if self.width.is_some() { REDRAW } else { PROGRESS };
         self.last.is_none_or(|last| wall >= last + period)

@@ -12,7 +12,8 @@ use skein_wire::{Fleet, Key, Link as _, MissionState, Payload, Scan, State, Topi
 use skein_world::{LidarScan, STEP, Simulation};
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
 
-use crate::fly::{FLEET, report, simulation_config, vehicle_name};
+use crate::fly::account::Account;
+use crate::fly::{FLEET, simulation_config, vehicle_name};
 use crate::mavlink_ports::MavlinkPorts;
 use crate::scenario::Scenario;
 use crate::scene_view;
@@ -20,7 +21,7 @@ use crate::summary::{EventCounts, Traffic};
 
 /// The world's node name unless configured otherwise.
 pub const WORLD: &str = "sim/world";
-/// Where the world listens unless configured otherwise.
+/// The world's endpoint unless configured otherwise.
 const LISTEN: &str = "tcp/127.0.0.1:7446";
 /// The scene is told this often, for ground stations that start late.
 const SCENE_PERIOD: Duration = Duration::from_secs(1);
@@ -71,7 +72,7 @@ pub struct WorldHost {
     heard: BTreeMap<NodeName, State>,
     events: EventCounts,
     traffic: Traffic,
-    /// When the world's time 0 would have been.
+    /// The moment of the world's time 0.
     began: Instant,
     speed: f64,
     lost: Duration,
@@ -167,7 +168,7 @@ impl WorldHost {
         }
     }
 
-    /// How each vehicle's mission ended, as far as it has, by its agent's word.
+    /// The end of each vehicle's mission, as far as it has come, by its agent's word.
     fn outcomes(&self) -> impl Iterator<Item = Option<Outcome>> + '_ {
         (0..self.scan_keys.len()).map(|index| {
             let state = self.heard.get(&vehicle_name(index))?;
@@ -179,7 +180,7 @@ impl WorldHost {
         })
     }
 
-    /// Whether every mission has ended, and nobody is in the air.
+    /// Every mission has ended, and nobody is in the air.
     #[must_use]
     pub fn is_over(&self) -> bool {
         let crashed = |index| self.simulation.vehicle(index).is_some_and(|vehicle| vehicle.crashed);
@@ -187,17 +188,16 @@ impl WorldHost {
             && self.outcomes().enumerate().all(|(index, outcome)| outcome.is_some() || crashed(index))
     }
 
-    /// Whether nobody is in the air.
     #[must_use]
     pub fn is_grounded(&self) -> bool {
         (0..self.scan_keys.len())
             .all(|index| self.simulation.vehicle(index).is_none_or(|vehicle| !vehicle.airborne))
     }
 
-    /// What may be said of the run so far.
+    /// The account of the run so far.
     #[must_use]
-    pub fn account(&self) -> report::Account<'_> {
-        report::Account {
+    pub fn account(&self) -> Account<'_> {
+        Account {
             simulation: &self.simulation,
             outcomes: self.outcomes().collect(),
             set_points: Vec::new(),
@@ -219,7 +219,7 @@ impl WorldHost {
         self.heard.get(&vehicle_name(index))
     }
 
-    /// Where other nodes can connect to this one.
+    /// Endpoints at which other nodes can connect to this one.
     #[must_use]
     pub fn locators(&self) -> &[String] {
         &self.locators

@@ -35,23 +35,6 @@ fn no_vehicles_is_no_swarm() {
 }
 
 #[test]
-fn a_network_that_cannot_be_is_refused_by_its_option() {
-    for (option, value) in [
-        ("--lease-ms", "-5"),
-        ("--lease-ms", "NaN"),
-        ("--latency-ms", "-5"),
-        ("--latency-ms", "1e300"),
-        ("--loss", "1"),
-    ] {
-        let given = format!("{option}={value}");
-        assert_refused(
-            &["campaign", "separation", "--seeds", "1", &given],
-            &[option, "expected a number from"],
-        );
-    }
-}
-
-#[test]
 fn malformed_files_are_refused_by_file_and_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let scenario = write(folder.path(), "bad.toml", "name = \"bad\"\ncruise_speed_m_s = \"fast\"\n");
@@ -140,21 +123,4 @@ fn ctrl_c_lands_everyone_and_finishes_the_files() {
     }
     let bytes = std::fs::read(recording).expect("a recording");
     assert!(bytes.ends_with(b"\x89MCAP0\r\n"), "the recording ends as MCAP files do");
-}
-
-#[test]
-fn a_network_campaign_counts_its_seeds_events_and_faults() {
-    let output = skein_sim(&["campaign", "network", "--seeds", "2", "--json"]);
-    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
-    assert_eq!(output.status.code(), Some(0), "{report}");
-    assert_eq!((report["seeds"].as_u64(), report["violations"].as_u64()), (Some(2), Some(0)), "{report}");
-    assert!(report["events"].as_u64() >= Some(1000), "{report}");
-    assert!(report["faults"]["lost"].is_u64() && report["failing_seeds"].is_array(), "{report}");
-}
-
-#[cfg(not(feature = "mutants"))]
-#[test]
-fn a_plain_build_breaks_no_promise() {
-    assert_refused(&["campaign", "network", "--break", "G3"], &["--features mutants", "--break G3"]);
-    assert_refused(&["campaign", "network", "--break", "G10"], &["G10", "G9"]);
 }

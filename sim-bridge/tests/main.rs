@@ -2,7 +2,6 @@
 
 #![allow(clippy::expect_used, clippy::unwrap_used)] // A test fails by panicking.
 
-mod benchmarks;
 mod command_line;
 mod generators;
 mod missions;

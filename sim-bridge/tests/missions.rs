@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use skein_mav::Datum;
-use skein_sim::mission::{Ends, Mission, MissionSet, Waypoint, apply_missions};
-use skein_sim::scenario::{Overrides, SPACING_M, Scenario, ScenarioError};
+use skein_sim::mission::{Ends, Mission, MissionSet, Waypoint};
+use skein_sim::scenario::{Overrides, SPACING_M, Scenario, ScenarioError, apply_missions};
 
 const HOME: Datum = Datum { latitude_rad: 0.827_246, longitude_rad: 0.149_149, height_m: 488.0 };
 

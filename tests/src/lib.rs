@@ -7,7 +7,7 @@ use std::time::Duration;
 use skein_dbp::NodeName;
 use skein_sim::cli::{self, Clock, Controller, Fly, WorldArgs};
 use skein_sim::fly::{self, Happenings, Links, Swarm};
-use skein_sim::scenario::Scenario;
+use skein_sim::scenario::{Overrides, Scenario};
 use skein_sim::summary::Summary;
 use skein_wire::{Fleet, Link, Network, NetworkConfig};
 use skein_world::Simulation;
@@ -16,13 +16,7 @@ use skein_world::Simulation;
 #[must_use]
 pub fn flight(scenario: &str, seed: u64) -> Fly {
     Fly {
-        world: WorldArgs {
-            scenario: scenario.to_owned(),
-            vehicles: None,
-            seed,
-            world_file: None,
-            missions: Vec::new(),
-        },
+        world: WorldArgs { scenario: scenario.to_owned(), overrides: Overrides::default(), seed },
         clock: Clock::Lockstep,
         speed: 1.0,
         controller: Controller::Bp,

@@ -4,9 +4,25 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use skein_swarm::particle_swarm::{
-    Best, Constriction, Improved, ImprovedConfig, Motion, Mover, Objective, SearchSpace, SearchSpaceError,
-    Standard, Swarm, TabuConfig, TabuSwarm,
+    Best, Improved, ImprovedConfig, Motion, Mover, Objective, SearchSpace, SearchSpaceError, Swarm,
+    TabuConfig, TabuSwarm,
 };
+
+/// A swarm whose numbers never change: its inertia, and `c1 = c2`.
+struct Plain(f64, f64);
+
+const STANDARD: Plain = Plain(0.9, 2.0);
+const CONSTRICTION: Plain = Plain(0.729, 1.494);
+
+impl Motion for Plain {
+    fn accelerate(&mut self, mover: Mover<'_>, _: &SearchSpace, rng: &mut ChaCha8Rng) {
+        mover.attract(self.0, self.1, self.1, rng);
+    }
+
+    fn max_step(&self) -> f64 {
+        0.5
+    }
+}
 
 /// A function with a known least value, and what it was asked.
 struct Function {
@@ -63,8 +79,8 @@ fn best(algorithm: usize, function: &mut Function, seed: u64, pieces: &[usize]) 
     }
     let space = function.space.clone();
     match algorithm {
-        0 => of(Swarm::new(&space, Standard::default(), 20, seed), function, pieces),
-        1 => of(Swarm::new(&space, Constriction::default(), 20, seed), function, pieces),
+        0 => of(Swarm::new(&space, STANDARD, 20, seed), function, pieces),
+        1 => of(Swarm::new(&space, CONSTRICTION, 20, seed), function, pieces),
         2 => {
             let motion = Improved::new(&space, ImprovedConfig::default());
             of(Swarm::new(&space, motion, 20, seed), function, pieces)
@@ -141,7 +157,7 @@ fn the_improved_swarm_escapes_once_it_hardly_moves() {
 fn a_swarm_begins_where_it_is_told_to() {
     let mut bowl = Function::new(2, 0.0, 4.0, square);
     let places: [&[f64]; 2] = [&[4.0, 4.0], &[99.0, 0.0]];
-    let mut swarm = Swarm::new(&bowl.space.clone(), Standard::default(), 5, 1).starting_at(places);
+    let mut swarm = Swarm::new(&bowl.space.clone(), STANDARD, 5, 1).starting_at(places);
     swarm.run(&mut bowl, 2);
     assert_eq!(bowl.asked, [0.0, 36.0 + 16.0], "99 is outside, and brought to 10");
 }

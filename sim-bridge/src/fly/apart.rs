@@ -3,15 +3,17 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use super::{TIME_TO_LAND, interruptions, report};
-use crate::cli;
-use crate::processes::{Processes, Setup};
+use super::call_off::{self, CalledOff};
+use super::setup::vehicle_name;
+use super::{account, live};
+use crate::cli::{self, Setup};
+use crate::processes::Processes;
 use crate::scenario::Scenario;
 use crate::summary::Summary;
-use crate::table::{LiveTable, Progress, Row};
+use crate::table::{LiveTable, Row};
 use crate::world_host::WorldHost;
 
-/// What the nodes say and how they are is looked at this often.
+/// Time between two looks at the nodes.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// Flies a scenario with a process for each node. Their configurations, logs and the recording go to `out`.
@@ -26,7 +28,7 @@ pub fn fly(
     table.note(&format!("console: http://{}", swarm.console()))?;
     let mut table = (!args.headless).then_some(table);
     let began = Instant::now();
-    let mut called_off: Option<(String, Duration)> = None;
+    let mut called_off: Option<CalledOff> = None;
     let mut look_due = Duration::ZERO;
     loop {
         swarm.step();
@@ -35,62 +37,37 @@ pub fn fly(
             continue;
         }
         look_due = now + LOOK;
+        let wall = began.elapsed();
         if let Some(table) = &mut table
-            && table.is_due(began.elapsed())
+            && table.is_due(wall)
         {
-            table.draw(
-                began.elapsed(),
-                &progress(swarm.world(), began.elapsed()),
-                &rows(swarm.world(), scenario),
-            )?;
+            let world = swarm.world();
+            table.draw(wall, &live::progress(&world.account(), wall), &rows(world, scenario))?;
         }
         let is_over = match &called_off {
             None => swarm.world().is_over(),
-            Some((_, at)) => swarm.world().is_grounded() || now > *at + TIME_TO_LAND,
+            Some(called_off) => swarm.world().is_grounded() || called_off.is_out_of_time(now),
         };
         if is_over {
             break;
         }
         if called_off.is_none() {
-            let why = if interruptions() > 0 {
-                Some("interrupted".to_owned())
-            } else if now.as_secs_f64() > scenario.time_limit_s {
-                Some("the time limit was reached".to_owned())
-            } else {
-                swarm.ended()
-            };
-            if let Some(why) = why {
+            let limit = call_off::reason(now, scenario.time_limit_s).map(str::to_owned);
+            if let Some(why) = limit.or_else(|| swarm.ended()) {
                 swarm.call_off();
-                called_off = Some((why, now));
+                called_off = Some(CalledOff { why, at: now });
             }
         }
     }
-    let why = called_off.map(|(why, _)| why);
-    let summary = report::summary(scenario, &swarm.world().account(), began.elapsed(), why);
+    let why = called_off.map(|called_off| called_off.why);
+    let summary = account::summary(scenario, &swarm.world().account(), began.elapsed(), why);
     swarm.end();
     Ok(summary)
 }
 
-fn progress(world: &WorldHost, wall: Duration) -> Progress {
-    let account = world.account();
-    let sim_time_s = world.simulation().now().as_secs_f64();
-    Progress {
-        sim_time_s,
-        realtime_factor: sim_time_s / wall.as_secs_f64().max(1e-9),
-        events: account.events.occurred,
-        messages: account.network.messages,
-        arrived: account
-            .outcomes
-            .iter()
-            .filter(|outcome| **outcome == Some(skein_agent::Outcome::Complete))
-            .count(),
-        vehicles: account.outcomes.len(),
-    }
-}
-
 fn rows(world: &WorldHost, scenario: &Scenario) -> Vec<Row> {
     let row = |index| {
-        let vehicle = super::vehicle_name(index).to_string();
+        let vehicle = vehicle_name(index).to_string();
         match world.heard(index) {
             None => Row { vehicle, task: "not heard yet".to_owned(), ..Row::default() },
             Some(state) => Row {

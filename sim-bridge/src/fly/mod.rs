@@ -1,20 +1,20 @@
 //! `fly`: a whole mission on this host, from the scenario to the summary.
 
+pub(crate) mod account;
 #[cfg(feature = "zenoh")]
 mod apart;
+pub(crate) mod call_off;
+mod live;
 mod plan_times;
 #[cfg(feature = "zenoh")]
 mod real;
 mod recording;
-pub(crate) mod report;
 mod setup;
 mod swarm;
 mod trace_hash;
 mod trial;
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
@@ -22,11 +22,11 @@ use skein_agent::AgentConfig;
 use skein_ground::{Order, Who};
 use skein_wire::{Fleet, Network, NetworkConfig};
 
-pub(crate) use self::swarm::scan_for_agent;
+use self::call_off::{CalledOff, interruptions};
 pub use self::{
     recording::Recording,
     setup::{FLEET, GROUND, agent_configs, ground_config, simulation_config, vehicle_name},
-    swarm::{Happenings, Links, Swarm},
+    swarm::{Happenings, Links, Swarm, scan_for_agent},
     trial::{Flown, Trial},
 };
 use crate::{
@@ -36,15 +36,13 @@ use crate::{
     table::LiveTable,
 };
 
-/// After its time limit a mission is ordered to land, and has this long to do so.
-const TIME_TO_LAND: Duration = Duration::from_secs(60);
 /// A run that was interrupted this often ends at once, with its files finished.
 const PATIENCE: u32 = 2;
 
 /// Flies the mission that the command line asks for, writes its files, and says what came of it.
 ///
 /// # Errors
-/// What is wrong with the scenario or the output folder; a failed mission is no error but a [`Summary`] that says so.
+/// A fault in the scenario or the output folder; a failed mission is no error but a [`Summary`] that says so.
 pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
     let scenario = args.world.open()?;
     let out = args.out.clone().unwrap_or_else(|| default_folder(&scenario));
@@ -81,14 +79,6 @@ pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
     let path = out.join("summary.json");
     summary.write(&path).with_context(|| format!("{}: cannot be written", path.display()))?;
     Ok(summary)
-}
-
-/// Flies a scenario as fast as the processor allows, shows nothing and writes no file.
-///
-/// # Errors
-/// What is wrong with the scenario.
-pub(crate) fn in_memory(scenario: &Scenario) -> anyhow::Result<Summary> {
-    in_lockstep(scenario, cli::Controller::Bp, None, None)
 }
 
 fn in_lockstep(
@@ -136,7 +126,7 @@ trait Host {
     /// Once the mission is over and told of.
     fn after_all(&mut self, _: &mut Swarm) {}
 
-    /// What has passed between the nodes.
+    /// The messages between the nodes so far.
     fn traffic(&self) -> Traffic;
 }
 
@@ -156,17 +146,6 @@ impl Host for Lockstep {
     }
 }
 
-/// How often the user has asked to stop, with Ctrl-C.
-static INTERRUPTIONS: LazyLock<Arc<AtomicU32>> = LazyLock::new(|| {
-    let count = Arc::new(AtomicU32::new(0));
-    let counter = Arc::clone(&count);
-    // Without a handler Ctrl-C ends the process, as it does by itself.
-    let _ = ctrlc::set_handler(move || {
-        counter.fetch_add(1, Ordering::Relaxed);
-    });
-    count
-});
-
 /// A mission under way.
 struct Flight<'a> {
     scenario: &'a Scenario,
@@ -176,13 +155,6 @@ struct Flight<'a> {
     began: Instant,
     /// Why the swarm was ordered to land before its mission was over.
     called_off: Option<CalledOff>,
-    network_messages: u64,
-}
-
-/// The mission ended before it was over.
-struct CalledOff {
-    why: String,
-    at: Duration,
 }
 
 impl<'a> Flight<'a> {
@@ -194,19 +166,12 @@ impl<'a> Flight<'a> {
         recording: Option<Recording>,
         table: Option<LiveTable<std::io::Stderr>>,
     ) -> anyhow::Result<Self> {
-        LazyLock::force(&INTERRUPTIONS);
+        // From now on Ctrl-C calls off.
+        interruptions();
         let simulation = skein_world::Simulation::new(simulation_config(scenario));
         let ground = ground_config(scenario, Fleet::new(setup::FLEET)?, controller);
         let swarm = Swarm::new(simulation, agents, ground, links)?;
-        Ok(Self {
-            scenario,
-            swarm,
-            recording,
-            table,
-            began: Instant::now(),
-            called_off: None,
-            network_messages: 0,
-        })
+        Ok(Self { scenario, swarm, recording, table, began: Instant::now(), called_off: None })
     }
 
     /// Steps until the mission is over.
@@ -220,14 +185,13 @@ impl<'a> Flight<'a> {
             }
             if happenings.ticked {
                 self.look_after_limits();
-                self.network_messages = host.traffic().messages;
-                self.draw()?;
+                self.draw(host.traffic())?;
             }
         }
         self.recording.map(Recording::finish).transpose()?;
         let why = self.called_off.map(|called_off| called_off.why);
         let account = self.swarm.account(host.traffic());
-        let summary = report::summary(self.scenario, &account, self.began.elapsed(), why);
+        let summary = account::summary(self.scenario, &account, self.began.elapsed(), why);
         host.after_all(&mut self.swarm);
         Ok(summary)
     }
@@ -237,40 +201,29 @@ impl<'a> Flight<'a> {
         let landed = self.swarm.is_grounded();
         match &self.called_off {
             None => landed && self.swarm.is_over(),
-            Some(called_off) => landed || now > called_off.at + TIME_TO_LAND || interruptions() >= PATIENCE,
+            Some(called_off) => landed || called_off.is_out_of_time(now) || interruptions() >= PATIENCE,
         }
     }
 
     fn look_after_limits(&mut self) {
         let now = self.swarm.now();
-        let why = if interruptions() > 0 {
-            "interrupted"
-        } else if now.as_secs_f64() > self.scenario.time_limit_s {
-            "the time limit was reached"
-        } else {
-            return;
-        };
-        if self.called_off.is_none() {
+        if self.called_off.is_none()
+            && let Some(why) = call_off::reason(now, self.scenario.time_limit_s)
+        {
             self.called_off = Some(CalledOff { why: why.to_owned(), at: now });
             // All are vehicles that there are.
             let _ = self.swarm.order(&Order::Land(Who::All));
         }
     }
 
-    fn draw(&mut self) -> std::io::Result<()> {
+    fn draw(&mut self, network: Traffic) -> std::io::Result<()> {
         let wall = self.began.elapsed();
         match &mut self.table {
             Some(table) if table.is_due(wall) => {
-                let progress = report::progress(&self.swarm, wall, self.network_messages);
-                table.draw(wall, &progress, &report::rows(&self.swarm))
+                let progress = live::progress(&self.swarm.account(network), wall);
+                table.draw(wall, &progress, &live::rows(&self.swarm))
             }
             _ => Ok(()),
         }
     }
-}
-
-/// How often the user has asked to stop.
-pub(crate) fn interruptions() -> u32 {
-    LazyLock::force(&INTERRUPTIONS);
-    INTERRUPTIONS.load(Ordering::Relaxed)
 }

@@ -1,11 +1,11 @@
-//! How long plans take: measured around the agents, which have no clock themselves.
+//! The time that plans take: measured around the agents, which have no clock themselves.
 
 use std::time::{Duration, Instant};
 
 use skein_dbp::Happened;
 use skein_wire::vocabulary::PLAN;
 
-/// How long each plan took: the wall times of the agent's ticks that worked on it, together.
+/// The time of each plan: the wall times of the agent's ticks that worked on it, together.
 #[derive(Debug, Default)]
 pub struct PlanTimes {
     /// Of each vehicle, what its plan has taken up to now.

@@ -26,11 +26,11 @@ use crate::{
     table::LiveTable,
 };
 
-/// Where other nodes can join.
+/// The port at which other nodes can join.
 const ZENOH_PORT: u16 = 7447;
-/// How long whoever looks on may see how the mission ended.
+/// Time to see the end of the mission in the console.
 const LAST_LOOK: Duration = Duration::from_secs(1);
-/// How long the two sessions may take to find each other.
+/// Patience with the two sessions until they find each other.
 const TIME_TO_CONNECT: Duration = Duration::from_secs(10);
 
 /// Flies in real time, `--speed` times as fast.

@@ -1,4 +1,4 @@
-//! What of a flight is recorded, and when.
+//! The recording of a flight.
 
 use std::path::Path;
 use std::time::Duration;
@@ -95,7 +95,7 @@ impl Recording {
         Ok(())
     }
 
-    /// What the vehicles have told the ground station of themselves.
+    /// The vehicles' states and boards, as the ground station has heard them.
     fn told(&mut self, now: Duration, station: &GroundCore) -> Result<(), RecorderError> {
         for state in station.roster().filter_map(|(_, state)| state) {
             self.recorder.state(now, state)?;

@@ -23,7 +23,7 @@ const RETURN_ALTITUDE_M: f64 = 3.0;
 /// Vehicles return at so many heights, this far apart, m.
 const RETURN_LEVELS: (usize, f64) = (4, 1.0);
 
-/// Who lands nearer than this to where another stands needs it gone, m.
+/// A goal nearer than this to where another vehicle stands needs that one gone, m.
 const ROOM_TO_LAND_M: f64 = 1.5;
 
 /// The ground station's node name.
@@ -121,7 +121,7 @@ fn scripts_of(scenario: &Scenario, number: usize) -> Vec<Assignment> {
     own.map(|script| script.assignment.clone()).collect()
 }
 
-/// Whether a vehicle's goal is where another stands before it takes off.
+/// Some vehicle's goal is where another stands before it takes off.
 fn swaps_places(scenario: &Scenario) -> bool {
     let vehicles = &scenario.vehicles;
     vehicles.iter().enumerate().any(|(index, one)| {

@@ -10,8 +10,7 @@ use skein_ground::{GroundConfig, GroundCore, Order, UnknownVehicle};
 use skein_wire::{Link, MemoryStore};
 use skein_world::{LidarScan, Simulation, Truth};
 
-use super::{plan_times::PlanTimes, report::Account, trace_hash::TraceHash};
-use crate::cpu_time;
+use super::{account::Account, plan_times::PlanTimes, trace_hash::TraceHash};
 use crate::summary::{EventCounts, Traffic};
 
 /// Agents and ground tick once in so many steps of the world: every 20 ms.
@@ -27,7 +26,14 @@ pub struct Swarm {
     trace: TraceHash,
     events: EventCounts,
     plan_times: PlanTimes,
-    agents_cpu: Duration,
+    stopwatch: Option<Stopwatch>,
+}
+
+/// The time that the agents take, by somebody's clock.
+#[derive(Clone, Copy)]
+struct Stopwatch {
+    clock: fn() -> Duration,
+    total: Duration,
 }
 
 struct Vehicle {
@@ -35,16 +41,16 @@ struct Vehicle {
     link: Box<dyn Link>,
 }
 
-/// What happened in one step that somebody may want to record.
+/// The events and messages of one step, for a recording.
 #[derive(Debug, Default)]
 pub struct Happenings {
     /// Selections at their homes, by node.
     pub selections: Vec<Happened>,
     /// Lidar scans, by vehicle.
     pub scans: Vec<(usize, LidarScan)>,
-    /// What each autopilot has said.
+    /// MAVLink from each autopilot.
     pub mavlink: Vec<Vec<u8>>,
-    /// Whether agents and ground ticked.
+    /// Agents and ground ticked in this step.
     pub ticked: bool,
 }
 
@@ -71,7 +77,7 @@ impl Swarm {
             vehicles,
             ground: GroundCore::durable(ground, Box::new(MemoryStore::default())),
             plan_times: PlanTimes::default(),
-            agents_cpu: Duration::ZERO,
+            stopwatch: None,
             ground_link: links.ground,
             steps: 0,
             trace: TraceHash::default(),
@@ -93,9 +99,7 @@ impl Swarm {
         for (index, scan) in &happenings.scans {
             if let Some(vehicle) = self.vehicles.get_mut(*index) {
                 let scan = scan_for_agent(scan);
-                let began = cpu_time();
-                vehicle.agent.sense(now, &scan);
-                self.agents_cpu += cpu_time().saturating_sub(began);
+                timed(&mut self.stopwatch, || vehicle.agent.sense(now, &scan));
             }
         }
         if self.steps.is_multiple_of(STEPS_PER_TICK) {
@@ -118,9 +122,8 @@ impl Swarm {
         keep_own(&mut heard, self.ground.name());
         selections.append(&mut heard);
         for (index, vehicle) in self.vehicles.iter_mut().enumerate() {
-            let (began, cpu_began) = (Instant::now(), cpu_time());
-            vehicle.agent.tick(now, vehicle.link.as_mut());
-            self.agents_cpu += cpu_time().saturating_sub(cpu_began);
+            let began = Instant::now();
+            timed(&mut self.stopwatch, || vehicle.agent.tick(now, vehicle.link.as_mut()));
             let mut heard = vehicle.agent.take_selections();
             self.plan_times.take_in(index, began, &heard, vehicle.agent.is_planning());
             self.simulation.send(index, &vehicle.agent.take_mavlink());
@@ -159,7 +162,7 @@ impl Swarm {
         &self.ground
     }
 
-    /// Whether every vehicle's mission has ended and it stands on the ground.
+    /// Every mission has ended, or its vehicle has crashed.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.vehicles.iter().zip(0..).all(|(vehicle, index)| {
@@ -168,7 +171,6 @@ impl Swarm {
         })
     }
 
-    /// Whether no vehicle is in the air.
     #[must_use]
     pub fn is_grounded(&self) -> bool {
         (0..self.vehicles.len())
@@ -191,12 +193,12 @@ impl Swarm {
         self.vehicles.iter().map(|vehicle| &vehicle.agent)
     }
 
-    /// How each vehicle's mission ended, as far as it has.
+    /// The end of each vehicle's mission, as far as it has come.
     pub fn outcomes(&self) -> impl Iterator<Item = Option<&Outcome>> {
         self.agents().map(AgentCore::outcome)
     }
 
-    /// What may be said of the run so far; `network` is what its nodes have sent.
+    /// The account of the run so far; `network` is the traffic of its nodes.
     #[must_use]
     pub fn account(&self, network: Traffic) -> Account<'_> {
         Account {
@@ -210,13 +212,17 @@ impl Swarm {
         }
     }
 
-    /// Processor time that the agents have used so far, together.
-    #[must_use]
-    pub fn agents_cpu(&self) -> Duration {
-        self.agents_cpu
+    /// Measures the time of all agents together by this clock from now on.
+    pub fn time_agents(&mut self, clock: fn() -> Duration) {
+        self.stopwatch = Some(Stopwatch { clock, total: Duration::ZERO });
     }
 
-    /// What the referee has seen so far.
+    /// The time that the agents have taken since [`time_agents`](Self::time_agents).
+    #[must_use]
+    pub fn agents_time(&self) -> Duration {
+        self.stopwatch.map_or(Duration::ZERO, |watch| watch.total)
+    }
+
     #[must_use]
     pub fn truth(&self) -> Truth {
         self.simulation.truth()
@@ -243,9 +249,12 @@ pub struct Links {
     pub ground: Box<dyn Link>,
 }
 
-/// What this thread has used so far; a system that does not tell makes all cost nothing.
-fn cpu_time() -> Duration {
-    cpu_time::this_thread().unwrap_or_default()
+fn timed(stopwatch: &mut Option<Stopwatch>, act: impl FnOnce()) {
+    let began = stopwatch.map(|watch| (watch.clock)());
+    act();
+    if let (Some(watch), Some(began)) = (stopwatch, began) {
+        watch.total += (watch.clock)().saturating_sub(began);
+    }
 }
 
 /// Remote b-threads are named `node#bthread`.
@@ -258,9 +267,9 @@ fn keep_own(selections: &mut Vec<Happened>, node: &NodeName) {
     selections.retain(|selection| selection.home == *node);
 }
 
-/// What the agent gets of a scan: all but the true pose, which it never learns.
-/// A scan of the world as a vehicle takes it in.
-pub(crate) fn scan_for_agent(scan: &LidarScan) -> Scan {
+/// The part of a scan that an agent gets: all but the true pose, which it never learns.
+#[must_use]
+pub fn scan_for_agent(scan: &LidarScan) -> Scan {
     Scan {
         stamp: scan.stamp,
         angle_min: scan.angle_min,

@@ -1,15 +1,13 @@
-//! A flight of an experiment: in lockstep, neither recorded nor shown.
+//! A flight in lockstep, neither recorded nor shown, for whoever looks on.
 
 use std::time::Duration;
 
 use skein_agent::AgentConfig;
 use skein_dbp::Happened;
 
-use super::{
-    Flight, Happenings, Host, Lockstep, Swarm, agent_configs, interruptions, memory_links, memory_network,
-};
+use super::call_off::interruptions;
+use super::{Flight, Happenings, Host, Lockstep, Swarm, agent_configs, memory_links, memory_network};
 use crate::cli::Controller;
-use crate::cpu_time;
 use crate::scenario::Scenario;
 use crate::summary::{Summary, Traffic};
 
@@ -21,23 +19,21 @@ pub struct Trial<'a> {
     scenario: &'a Scenario,
     controller: Controller,
     agents: Vec<AgentConfig>,
+    clock: Option<fn() -> Duration>,
 }
 
-/// What came of a trial.
 #[derive(Debug, Clone)]
 pub struct Flown {
     /// As of any flight.
     pub summary: Summary,
-    /// Processor time of all its agents together.
-    pub agents_cpu: Duration,
-    /// Processor time of the whole: world, autopilots, agents and ground station.
-    pub whole_cpu: Duration,
+    /// Time of all its agents together, if a clock was given.
+    pub agents_time: Duration,
 }
 
 impl<'a> Trial<'a> {
     #[must_use]
     pub fn new(scenario: &'a Scenario, controller: Controller) -> Self {
-        Self { scenario, controller, agents: agent_configs(scenario, controller) }
+        Self { scenario, controller, agents: agent_configs(scenario, controller), clock: None }
     }
 
     /// Changes every agent's configuration.
@@ -47,23 +43,32 @@ impl<'a> Trial<'a> {
         self
     }
 
+    /// Measures the agents' time by this clock.
+    #[must_use]
+    pub fn timed_by(mut self, clock: fn() -> Duration) -> Self {
+        self.clock = Some(clock);
+        self
+    }
+
     /// Flies; `watch` sees the swarm after each tick of its agents, and what has happened in it.
     ///
     /// # Errors
-    /// What is wrong with an agent's configuration; or the user has interrupted it.
+    /// A fault in an agent's configuration; or the user has interrupted it.
     pub fn fly(self, watch: &mut Watch<'_>) -> anyhow::Result<Flown> {
-        let began = cpu_time::this_thread()?;
         let network = memory_network(self.scenario);
         let links = memory_links(&network, self.scenario);
-        let flight = Flight::new(self.scenario, self.controller, self.agents, links, None, None)?;
-        let mut agents_cpu = Duration::ZERO;
+        let mut flight = Flight::new(self.scenario, self.controller, self.agents, links, None, None)?;
+        if let Some(clock) = self.clock {
+            flight.swarm.time_agents(clock);
+        }
+        let mut agents_time = Duration::ZERO;
         let mut watch = |swarm: &Swarm, selections: &[Happened]| {
-            agents_cpu = swarm.agents_cpu();
+            agents_time = swarm.agents_time();
             watch(swarm, selections);
         };
         let summary = flight.fly(&mut Watched { lockstep: Lockstep(network), watch: &mut watch })?;
         anyhow::ensure!(interruptions() == 0, "interrupted");
-        Ok(Flown { summary, agents_cpu, whole_cpu: cpu_time::this_thread()?.saturating_sub(began) })
+        Ok(Flown { summary, agents_time })
     }
 }
 

@@ -1,4 +1,4 @@
-//! What can be wrong with a mission file.
+//! Faults in a mission file.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,6 @@ pub enum MissionError {
         line: usize,
         /// Column from 1.
         column: usize,
-        /// What the parser met.
         message: String,
     },
     /// JSON, but not what a mission says in this place.
@@ -30,9 +29,7 @@ pub enum MissionError {
         line: usize,
         /// Path of the value, such as `mission.items[3].params[4]`.
         field: String,
-        /// What should be there.
         expected: String,
-        /// What is there.
         found: String,
     },
     /// Neither of the formats that are read.
@@ -52,7 +49,7 @@ pub struct Warning {
     pub file: String,
     /// Line from 1.
     pub line: usize,
-    /// What is read over, and what happens instead.
+    /// The part that has no effect, and what happens instead.
     pub message: String,
 }
 

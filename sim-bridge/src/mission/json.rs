@@ -38,7 +38,7 @@ impl<'a> Document<'a> {
         Node { document: self, value: &self.root, path: Vec::new() }
     }
 
-    /// What errors call the document.
+    /// The document's name in errors.
     pub fn file(&self) -> &str {
         self.file
     }
@@ -146,7 +146,7 @@ impl<'a> Node<'a> {
         self.value.is_null()
     }
 
-    /// Whether it is an array or object without content.
+    /// It is an array or object without content.
     pub fn is_empty(&self) -> bool {
         match self.value {
             Value::Array(array) => array.is_empty(),

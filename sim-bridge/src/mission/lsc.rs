@@ -9,7 +9,6 @@ use super::{Ends, Mission, MissionError, MissionSet, Waypoint};
 /// A mission as the experiment sets it: who flies from where to where, within which bounds and limits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LscMission {
-    /// Where vehicles may fly.
     pub bounds: Aabb,
     pub agents: Vec<LscAgent>,
 }
@@ -17,9 +16,9 @@ pub struct LscMission {
 /// One vehicle of an [`LscMission`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LscAgent {
-    /// Where it hovers before, world ENU, m.
+    /// Its first hover, world ENU, m.
     pub start: Vector3<f64>,
-    /// Where it hovers in the end, world ENU, m.
+    /// Its last hover, world ENU, m.
     pub goal: Vector3<f64>,
     /// Radius of the vehicle, m.
     pub radius_m: f64,

@@ -1,6 +1,5 @@
 //! Mission files: a route for one vehicle, for each vehicle, or for all in trail.
 
-mod apply;
 mod error;
 mod json;
 mod lsc;
@@ -12,7 +11,6 @@ use nalgebra::Vector3;
 use skein_mav::Datum;
 use skein_planning::airspace::Airspace;
 
-pub use apply::apply_missions;
 pub use error::{MissionError, Warning};
 pub use lsc::{LscAgent, LscMission};
 
@@ -21,32 +19,29 @@ use json::Document;
 /// A route for one vehicle, in the world's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mission {
-    /// Where the vehicle stands before and where a return ends: ENU, metres, on the ground.
+    /// The place before take-off, and the end of a return: ENU, metres, on the ground.
     pub home: Vector3<f64>,
-    /// Where to fly.
     pub waypoints: Vec<Waypoint>,
-    /// What comes after the last waypoint.
     pub ends: Ends,
     /// Height above the ground at which the take-off ends, where the file says.
     pub takeoff_height_m: Option<f64>,
     /// Name of a built-in vehicle model, where the file says.
     pub model: Option<String>,
-    /// Whether start and goal are part of an experiment's setting, and must stay where the file puts them.
+    /// Start and goal are part of an experiment's setting, and must stay where the file puts them.
     pub exact: bool,
 }
 
 /// A place to fly to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Waypoint {
-    /// Where: ENU, metres.
+    /// ENU, metres.
     pub position: Vector3<f64>,
-    /// How long to stay, in seconds.
+    /// The stay there, in seconds.
     pub hold_s: f64,
     /// Speed on the way there, in m/s, where the file says.
     pub speed_m_s: Option<f64>,
 }
 
-/// What comes after the last waypoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ends {
     /// Land under it.
@@ -55,16 +50,16 @@ pub enum Ends {
     Return,
 }
 
-/// What one mission file holds, or several together.
+/// The content of one mission file, or of several together.
 #[derive(Debug, Clone, Default)]
 pub struct MissionSet {
     /// One mission that all fly in trail, or one for each vehicle.
     pub missions: Vec<Mission>,
-    /// What was read over.
+    /// Parts of the files that have no effect.
     pub warnings: Vec<Warning>,
     /// No-fly zones of the files' geofences.
     pub airspace: Airspace,
-    /// Where the world's origin is on the earth, where a file spoke of latitudes.
+    /// The world's origin on the earth, where a file spoke of latitudes.
     pub datum: Option<Datum>,
 }
 

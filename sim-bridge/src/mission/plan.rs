@@ -7,7 +7,7 @@ use skein_planning::airspace::{Airspace, KeepOut, NoFlyPrism, NoFlyZone};
 use super::json::Node;
 use super::{Ends, Mission, MissionError, MissionSet, Warning, Waypoint};
 
-/// How far from the world's datum a plan's home may lie for the plan to mean that place, in metres.
+/// Distance from the world's datum up to which a plan's home means that place, in metres.
 const SAME_PLACE_M: f64 = 10_000.0;
 /// A take-off item this near to home takes off from home, in metres.
 const AT_HOME_M: f64 = 1.0;
@@ -63,7 +63,7 @@ struct Reader {
     home: Geodetic,
     mission: Mission,
     speed_m_s: Option<f64>,
-    /// Whether a landing or a return has been read: nothing flies after it.
+    /// A landing or a return has been read: nothing flies after it.
     ended: bool,
     /// The zones of the geofence.
     airspace: Airspace,
@@ -122,7 +122,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Where a latitude and a longitude are.
+    /// The place of a latitude and a longitude.
     fn corner(&self, node: &Node<'_>) -> Result<Vector2<f64>, MissionError> {
         let [latitude, longitude] = node.numbers::<2>()?;
         if latitude.abs() > 90.0 || longitude.abs() > 180.0 {
@@ -206,7 +206,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Where the item's latitude and longitude are (height 0); `None` where it gives none, which means "here".
+    /// The place of the item's latitude and longitude (height 0); `None` where it gives none, which means "here".
     fn place(&self, item: &Node<'_>) -> Result<Option<Vector3<f64>>, MissionError> {
         let (latitude, longitude) = (parameter(item, 4)?, parameter(item, 5)?);
         if latitude.is_null() || longitude.is_null() {

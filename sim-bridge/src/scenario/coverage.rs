@@ -13,7 +13,7 @@ pub struct Coverage {
     /// Corners of the area in order, on the ground (ENU, metres).
     #[serde(deserialize_with = "ground_points")]
     area_m: Vec<Vector3<f64>>,
-    /// How wide a strip a vehicle sees, in metres.
+    /// Width of the strip that a vehicle sees, in metres.
     #[serde(deserialize_with = "positive")]
     swath_m: f64,
     /// Height of the lines above the ground, in metres.

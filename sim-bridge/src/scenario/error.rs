@@ -1,4 +1,4 @@
-//! What can be wrong with a scenario, in words that name the input at fault and what to do about it.
+//! Faults in a scenario, in words that name the input at fault and the remedy.
 
 use std::path::PathBuf;
 
@@ -14,7 +14,6 @@ pub enum ScenarioError {
     /// Neither a built-in name nor a file.
     #[error("unknown scenario `{name}`: expected one of {known}, or the path of a scenario file (.toml)")]
     Unknown {
-        /// What was asked for.
         name: String,
         /// The built-in names, separated by commas.
         known: String,
@@ -33,7 +32,6 @@ pub enum ScenarioError {
         column: usize,
         /// Path of the field, such as `vehicle[2].start_m`; empty at top level.
         field: String,
-        /// What was found and what was expected.
         message: String,
     },
     /// Fields that are sound alone but not together.
@@ -43,7 +41,6 @@ pub enum ScenarioError {
         file: String,
         /// Path of the field.
         field: String,
-        /// What is wrong and what to do.
         message: String,
     },
     /// A world file that cannot be read as SDF.
@@ -69,7 +66,6 @@ pub enum ScenarioError {
     /// More vehicles than MAVLink system numbers.
     #[error("{vehicles} vehicles are too many: expected at most {limit}")]
     TooManyVehicles {
-        /// What was asked for.
         vehicles: usize,
         /// The largest swarm.
         limit: usize,
@@ -79,7 +75,6 @@ pub enum ScenarioError {
     TooFewDescribed {
         /// Name of the scenario.
         scenario: String,
-        /// What was asked for.
         wanted: usize,
         /// `[[vehicle]]` tables in the file.
         described: usize,
@@ -100,9 +95,8 @@ pub enum ScenarioError {
         vehicle: usize,
         /// Name of the obstacle.
         obstacle: String,
-        /// Where: ENU, metres.
+        /// ENU, metres.
         position: Vector3<f64>,
-        /// How deep the hull reaches into it, in metres.
         overlap_m: f64,
     },
     /// A start or waypoint out of the world.
@@ -112,7 +106,7 @@ pub enum ScenarioError {
         vehicle: usize,
         /// `start`, `goal` or `waypoint 2`.
         what: String,
-        /// Where: ENU, metres.
+        /// ENU, metres.
         position: Vector3<f64>,
         /// Lowest corner of the world.
         min: Vector3<f64>,
@@ -126,7 +120,7 @@ pub enum ScenarioError {
         vehicle: usize,
         /// `goal` or `waypoint 2`.
         what: String,
-        /// Where: ENU, metres.
+        /// ENU, metres.
         position: Vector3<f64>,
     },
     /// A goal or waypoint where nobody may fly.
@@ -136,7 +130,7 @@ pub enum ScenarioError {
         vehicle: usize,
         /// `goal` or `waypoint 2`.
         what: String,
-        /// Where: ENU, metres.
+        /// ENU, metres.
         position: Vector3<f64>,
     },
     /// Two vehicles that would stand in one another.
@@ -152,7 +146,7 @@ pub enum ScenarioError {
         second: usize,
         /// Horizontal distance, in metres.
         distance_m: f64,
-        /// What their hulls need, in metres.
+        /// The need of their hulls, in metres.
         least_m: f64,
     },
     /// A vehicle without a way.
@@ -168,9 +162,8 @@ pub enum ScenarioError {
         vehicle: usize,
         /// `start` or `goal`.
         what: &'static str,
-        /// Where one was wanted: ENU, metres.
+        /// ENU, metres.
         near: Vector3<f64>,
-        /// How far was searched, in metres.
         reach_m: f64,
     },
 }

@@ -19,7 +19,7 @@ pub fn share<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error
     number(deserializer, "a number from 0 to below 1", |v| (0.0..1.0).contains(&v))
 }
 
-/// What a message takes, in milliseconds.
+/// The time that a message takes, in milliseconds.
 pub fn latency_ms<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     number(deserializer, "a number from 0 to 60000", |v| (0.0..=60_000.0).contains(&v))
 }

@@ -30,14 +30,14 @@ use crate::mission;
 
 const DEFAULT_VEHICLES: usize = 4;
 const DEFAULT_MODEL: &str = "x500";
-/// How much later the next vehicle takes off, with a little to spare, in seconds.
+/// Time between two take-offs, with a little to spare, in seconds.
 const LAUNCH_S: f64 = 3.0;
 const DEFAULT_CRUISE_SPEED_M_S: f64 = 3.0;
 const DEFAULT_TAKEOFF_HEIGHT_M: f64 = 3.0;
 
 /// A parsed scenario file with the place it came from.
 pub struct ScenarioFile {
-    /// What errors call it.
+    /// Its name in errors.
     file: String,
     table: FileTable,
 }
@@ -311,7 +311,7 @@ impl ScenarioFile {
         Ok(())
     }
 
-    /// Whether routes are planned from a task for the whole swarm.
+    /// Routes are planned from a task for the whole swarm.
     fn has_task(&self) -> bool {
         let table = &self.table;
         table.coverage.is_some() || table.formation.is_some() || table.targets.is_some()
@@ -485,7 +485,6 @@ impl ScenarioFile {
         }
     }
 
-    /// What is known of the airspace.
     fn airspace(&self) -> Result<Airspace, ScenarioError> {
         let checked = self.table.airspace.check();
         checked.map_err(|error| self.contradiction(format!("airspace.{}", error.field), error.problem))

@@ -27,7 +27,6 @@ pub struct Forest {
     /// Thickest trunk's radius, in metres.
     #[serde(deserialize_with = "positive")]
     pub max_radius_m: f64,
-    /// How high the trunks stand, in metres.
     #[serde(deserialize_with = "positive")]
     pub tree_height_m: f64,
     /// Bark to bark between neighbouring trunks, in metres, as far as the density leaves room.
@@ -71,7 +70,7 @@ struct Trunk {
 }
 
 impl Forest {
-    /// Whether the parameters fit one another; else the field at fault and what is wrong with it.
+    /// Checks that the parameters fit one another; else names the field at fault and its fault.
     pub fn check(&self) -> Result<(), (&'static str, String)> {
         if self.min_radius_m > self.max_radius_m {
             return Err(("min_radius_m", format!("expected at most max_radius_m, {}", self.max_radius_m)));
@@ -112,7 +111,7 @@ impl Forest {
         }
     }
 
-    /// How many vehicles stand side by side along an edge.
+    /// The number of vehicles side by side along an edge.
     fn rows(&self, vehicles: usize) -> usize {
         let room = (self.width_m / SPACING_M) as usize;
         vehicles.min(room.max(1))

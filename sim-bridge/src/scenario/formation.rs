@@ -14,7 +14,7 @@ pub struct Formation {
     /// Distance between neighbours, in metres.
     #[serde(deserialize_with = "positive")]
     spacing_m: f64,
-    /// Where the first vehicle flies, from above the place where it stands (ENU, metres).
+    /// The way of the first vehicle, from above the place where it stands (ENU, metres).
     #[serde(deserialize_with = "points")]
     leader_m: Vec<Vector3<f64>>,
 }

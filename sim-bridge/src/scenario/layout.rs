@@ -1,4 +1,4 @@
-//! What a generator makes: obstacles, bounds and one route for each vehicle.
+//! The product of a generator: obstacles, bounds and one route for each vehicle.
 
 use std::f64::consts::PI;
 
@@ -10,15 +10,15 @@ use skein_world::{Aabb, Obstacle};
 /// Least distance between any two starts, and between any two goals, in metres.
 pub const SPACING_M: f64 = 3.0;
 
-/// How far above and below the nominal height the generators spread goals, in metres.
+/// Most by which goals are above or below the nominal height, in metres.
 pub const HEIGHT_SPREAD_M: f64 = 0.5;
 
 /// A vehicle's way through a generated world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Route {
-    /// Where it stands before take-off: ENU, metres, on the ground.
+    /// ENU, metres, on the ground.
     pub start: Vector3<f64>,
-    /// Where it hovers before it lands: ENU, metres.
+    /// The place of its last hover: ENU, metres.
     pub goal: Vector3<f64>,
 }
 
@@ -39,7 +39,7 @@ pub struct Layout {
     pub bounds: Aabb,
     /// One route a vehicle.
     pub routes: Vec<Route>,
-    /// What a user should know, such as a parameter that had to give way.
+    /// Notes for the user, such as on a parameter that had to give way.
     pub notes: Vec<String>,
 }
 
@@ -74,7 +74,7 @@ pub fn circle_radius(count: usize, spacing: f64) -> f64 {
     if count < 2 { 0.0 } else { spacing / 2.0 / (PI / count as f64).sin() }
 }
 
-/// Whether the straight lines of two routes cross, seen from above.
+/// The straight lines of two routes cross, seen from above.
 pub fn cross(a: &Route, b: &Route) -> bool {
     let side = |p: &Vector3<f64>, q: &Vector3<f64>, r: &Vector3<f64>| {
         (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x)
@@ -83,7 +83,6 @@ pub fn cross(a: &Route, b: &Route) -> bool {
         && side(&b.start, &b.goal, &a.start) * side(&b.start, &b.goal, &a.goal) < 0.0
 }
 
-/// How many pairs of routes cross.
 pub fn crossing_pairs(routes: &[Route]) -> usize {
     let mut pairs = 0;
     for (i, a) in routes.iter().enumerate() {

@@ -12,15 +12,17 @@ mod file;
 mod forest;
 mod formation;
 mod layout;
+mod missions;
 mod mountain;
 mod open;
-pub(crate) mod placement;
+mod placement;
 mod targets;
 mod window;
 mod world_file;
 
 use std::path::{Path, PathBuf};
 
+use clap::Args;
 use nalgebra::Vector3;
 use serde::Deserialize;
 use skein_agent::Planners;
@@ -31,6 +33,7 @@ use skein_world::{Aabb, Scene, VehicleModel, WindConfig};
 
 pub use error::ScenarioError;
 pub use layout::SPACING_M;
+pub use missions::apply_missions;
 pub use world_file::read_world;
 
 use crate::mission::{self, MissionSet};
@@ -64,21 +67,21 @@ pub struct Scenario {
     pub name: String,
     /// One line for people.
     pub about: String,
-    /// What every random number of the run comes from.
+    /// The source of every random number of the run.
     pub seed: u64,
     /// Obstacles and bounds.
     pub scene: Scene,
     /// Terrain, threats and no-fly zones that every vehicle knows; its box counts for nothing.
     pub airspace: Airspace,
-    /// Whether the bounds are part of the scenario; otherwise they grow to hold a mission.
+    /// The bounds are part of the scenario; otherwise they grow to hold a mission.
     pub fixed_bounds: bool,
     /// The vehicles; vehicle `i` is `uav/{i + 1}`.
     pub vehicles: Vec<VehiclePlan>,
-    /// Whether nobody sets out before everybody is in the air.
+    /// Nobody sets out before everybody is in the air.
     pub muster: bool,
     /// Speed the vehicles aim for between waypoints.
     pub cruise_speed_m_s: f64,
-    /// How they plan on board.
+    /// The planners on board.
     pub planners: Planners,
     /// Height above the ground at which a take-off ends.
     pub takeoff_height_m: f64,
@@ -86,28 +89,26 @@ pub struct Scenario {
     pub time_limit_s: f64,
     /// Air that moves.
     pub wind: WindConfig,
-    /// What an operator says during the mission, in order of time.
+    /// The operator's orders, by time.
     pub orders: Vec<Order>,
     /// Scripts that run on vehicles from the start.
     pub scripts: Vec<VehicleScript>,
-    /// What the in-memory network does to messages.
     pub network: Network,
-    /// What the user should be told: parameters that gave way, parts of files that were not understood.
+    /// Notes for the user: parameters that gave way, parts of files that were not understood.
     pub notes: Vec<String>,
 }
 
-/// What one vehicle is and is to do.
+/// A vehicle and its task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VehiclePlan {
-    /// Where it stands before take-off: ENU, metres, on the ground.
+    /// Its place before take-off: ENU, metres, on the ground.
     pub start: Vector3<f64>,
     /// Heading at the start: radians counter-clockwise from east.
     pub yaw: f64,
-    /// Where to fly: ENU, metres. It lands under the last.
+    /// ENU, metres. It lands under the last.
     pub waypoints: Vec<Vector3<f64>>,
-    /// How fast it flies, as a share of the scenario's cruise speed: above 0, at most 1.
+    /// Its speed as a share of the scenario's cruise speed: above 0, at most 1.
     pub pace: f64,
-    /// What it is made of.
     pub model: VehicleModel,
 }
 
@@ -118,7 +119,7 @@ impl VehiclePlan {
     }
 }
 
-/// What the in-memory network does to messages, and how the nodes are set up for it.
+/// The in-memory network's treatment of messages, and the nodes' lease for it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Network {
@@ -140,16 +141,14 @@ impl Default for Network {
     }
 }
 
-/// What an operator says at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Order {
-    /// When, in simulated seconds.
+    /// Simulated seconds since the start.
     pub at_s: f64,
     pub order: OrderKind,
     pub who: Who,
 }
 
-/// What an operator can say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OrderKind {
@@ -183,14 +182,17 @@ pub enum Who {
     Vehicle(usize),
 }
 
-/// What a command line sets over a scenario.
-#[derive(Debug, Clone, Default)]
+/// The options of a command line that go over a scenario.
+#[derive(Debug, Clone, Default, PartialEq, Args)]
 pub struct Overrides {
-    /// Size of the swarm.
+    /// Size of the swarm; the scenario's own if not given.
+    #[arg(long, value_name = "N")]
     pub vehicles: Option<usize>,
-    /// A world file instead of the scenario's own world.
+    /// A Gazebo world (SDF) or a list of boxes (.csv) in place of the scenario's world.
+    #[arg(long, value_name = "FILE")]
     pub world: Option<PathBuf>,
-    /// Mission files: one that all fly in trail, or one for each vehicle.
+    /// A QGroundControl plan or LSC mission; one that all fly in trail, or one for each vehicle.
+    #[arg(long = "mission", value_name = "FILE")]
     pub missions: Vec<PathBuf>,
 }
 
@@ -272,7 +274,7 @@ impl Scenario {
             self.scene = self.scene.clone().with_datum(datum);
         }
         self.airspace.include(set.airspace);
-        if set.missions.is_empty() { Ok(()) } else { mission::apply_missions(self, set.missions) }
+        if set.missions.is_empty() { Ok(()) } else { apply_missions(self, set.missions) }
     }
 
     /// Moves each start and goal that stands too near an obstacle to the nearest clear place, and notes it.
@@ -434,7 +436,7 @@ fn note_move(notes: &mut Vec<String>, index: usize, what: &str, from: Vector3<f6
     }
 }
 
-/// Where on earth a world says it is; `None` where it has the datum of worlds that do not say.
+/// The place on earth that a world states; `None` where it has the datum of worlds that state none.
 fn stated_datum(scene: &Scene) -> Option<Datum> {
     let unsaid = *Scene::new("", Vec::new()).datum();
     Some(*scene.datum()).filter(|datum| *datum != unsaid)

@@ -28,7 +28,7 @@ impl Default for Open {
 
 /// Side by side distance within a group, in metres: [`SPACING_M`] and room for [`JITTER_M`].
 const PITCH_M: f64 = SPACING_M + 2.0 * JITTER_M;
-/// How far a start or goal strays from its place in the row, in metres.
+/// Distance that a start or goal strays from its place in the row, in metres.
 const JITTER_M: f64 = 0.5;
 /// From the outermost start or goal to the world's bounds, in metres.
 const MARGIN_M: f64 = 10.0;

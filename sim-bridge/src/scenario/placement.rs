@@ -9,7 +9,7 @@ use super::layout::{SPACING_M, on_circle};
 
 /// Least distance from a chosen start or goal to any obstacle, in metres.
 pub const CLEARANCE_M: f64 = 1.5;
-/// How far [`clear_place`] looks, in metres.
+/// Reach of [`clear_place`], in metres.
 pub const REACH_M: f64 = 40.0;
 
 /// Step between the rings of the search and along probed lines, in metres.
@@ -17,7 +17,7 @@ const STEP_M: f64 = 0.5;
 /// From a chosen place to the sides of the world, in metres.
 const BOUNDS_MARGIN_M: f64 = 1.0;
 
-/// Whether a vehicle can climb from the ground under `place` to its height (at least `height_m`), or land there.
+/// A vehicle can climb from the ground under `place` to its height (at least `height_m`), or land there.
 pub fn is_clear(scene: &Scene, place: &Vector3<f64>, height_m: f64) -> bool {
     let foot = Vector3::new(place.x, place.y, 0.0);
     let top = Vector3::new(place.x, place.y, place.z.max(height_m));
@@ -25,7 +25,7 @@ pub fn is_clear(scene: &Scene, place: &Vector3<f64>, height_m: f64) -> bool {
         && way_is_clear(scene, &foot, &top, CLEARANCE_M)
 }
 
-/// Whether every point between two places is `clearance_m` from all obstacles.
+/// Every point between two places is `clearance_m` from all obstacles.
 pub fn way_is_clear(scene: &Scene, from: &Vector3<f64>, to: &Vector3<f64>, clearance_m: f64) -> bool {
     let steps = ((to - from).norm() / STEP_M).ceil().max(1.0) as usize;
     (0..=steps).all(|i| {

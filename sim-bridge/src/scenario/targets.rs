@@ -14,16 +14,16 @@ use super::field::{ground_points, points, positive};
 
 /// Inner waypoints of a route.
 const WAYPOINTS: usize = 6;
-/// How far routes stay out of threat and no-fly zones: what a vehicle strays from its route, and its hull, in metres.
+/// Distance of routes from threat and no-fly zones: a vehicle's stray from its route, and its hull, in metres.
 const MARGIN_M: f64 = 1.5;
-/// How many times slower than at cruise a vehicle may fly so that all arrive together.
+/// Factor by which a vehicle may fly slower than at cruise so that all arrive together.
 const SLOWEST: f64 = 2.0;
 
 /// The `[targets]` table.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Targets {
-    /// Where to fly (ENU, metres). Vehicles that share a target arrive in a line across their way.
+    /// The targets (ENU, metres). Vehicles that share one arrive in a line across their way.
     #[serde(deserialize_with = "points")]
     places_m: Vec<Vector3<f64>>,
     /// The two ends of the line on which the vehicles stand, evenly, before they take off.
@@ -120,7 +120,7 @@ impl Targets {
     }
 }
 
-/// What routes keep clear of: the round zones grown by the margin, in the bounds without it.
+/// The airspace of the routes: the round zones grown by the margin, in the bounds without it.
 fn keeping_off(airspace: &Airspace, bounds: &Aabb) -> Airspace {
     let inset = Vector3::repeat(MARGIN_M);
     let threat = |zone: &ThreatZone| ThreatZone { radius_m: zone.radius_m + MARGIN_M, ..*zone };

@@ -43,13 +43,13 @@ impl Default for Window {
 
 /// Side by side distance of vehicles in a group, in metres: [`SPACING_M`] and room for [`JITTER_M`].
 const PITCH_M: f64 = SPACING_M + 2.0 * JITTER_M;
-/// How far a start or goal strays from its place in the row, in metres.
+/// Distance that a start or goal strays from its place in the row, in metres.
 const JITTER_M: f64 = 0.5;
 /// Goals stand this far behind the starts, so that who has arrived is in nobody's way, in metres.
 const GOALS_BEHIND_M: f64 = 4.0;
 /// From the outermost goal to the world's bounds, in metres.
 const MARGIN_M: f64 = 5.0;
-/// How far the wall reaches beyond the bounds, in metres.
+/// Length of the wall beyond the bounds, in metres.
 const OVERLAP_M: f64 = 1.0;
 
 impl Window {

@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use crate::sensors::{Battery, MotorCommands};
 use crate::vehicle::{GRAVITY_M_S2, VehicleModel};
 
 /// The simulation's time step: 250 per second.
@@ -44,6 +43,22 @@ impl Touchdown {
         self.descent_m_s > 3.0 || self.tilt_rad > std::f64::consts::FRAC_PI_3
     }
 }
+
+/// State of the energy store.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Battery {
+    /// Energy left, 0..1 of full.
+    pub fraction: f64,
+    /// Voltage, V.
+    pub voltage_v: f64,
+}
+
+/// Thrust demanded of each rotor as a share (0..1) of its full thrust.
+///
+/// Order: front-right, rear-left (counter-clockwise seen from above), front-left, rear-right
+/// (clockwise).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MotorCommands(pub [f64; 4]);
 
 /// A quadrotor as physics sees it: six degrees of freedom, rotors that lag, drag against the air,
 /// a battery that empties, and the ground (z = 0) to stand on.

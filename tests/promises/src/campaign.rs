@@ -8,33 +8,28 @@ use crate::run::{Settings, run};
 use crate::shrink::{Shrunk, shrink};
 use crate::story::{Faults, Story};
 
-/// What a campaign runs.
 #[derive(Clone, Copy, Debug)]
 pub struct Campaign {
     /// The first seed.
     pub from: u64,
-    /// How many seeds.
     pub seeds: u64,
-    /// How many threads.
+    /// Threads.
     pub jobs: usize,
-    /// How many failing stories are shrunk.
+    /// Failing stories that are shrunk.
     pub shrunk: usize,
-    /// How each story is played.
     pub settings: Settings,
 }
 
-/// What came of a campaign.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
-    /// How many seeds were run.
     pub seeds: u64,
     /// Steps of nodes, each of which was judged.
     pub steps: u64,
-    /// What occurred at its home.
+    /// Events, each counted at its home.
     pub occurrences: u64,
     /// The fewest occurrences, and the least simulated time, of any seed that broke nothing.
     pub least: Option<(u64, std::time::Duration)>,
-    /// What went wrong.
+    /// The faults that were injected.
     pub faults: Faults,
     /// The seeds that broke a promise, in order.
     pub failures: Vec<Failure>,
@@ -44,7 +39,6 @@ pub struct Report {
 #[derive(Clone, Debug)]
 pub struct Failure {
     pub seed: u64,
-    /// What it breaks.
     pub violation: Violation,
     /// The same in short, for the first few.
     pub shrunk: Option<Shrunk>,

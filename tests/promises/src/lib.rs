@@ -19,6 +19,7 @@ mod oracle;
 pub mod programs;
 mod promise;
 mod run;
+mod seconds;
 mod shrink;
 mod story;
 mod tap;

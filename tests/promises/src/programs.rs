@@ -7,7 +7,7 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet, Program};
 use skein_dbp::{NodeName, facts};
 
-use crate::story::Seconds;
+use crate::seconds::Seconds;
 
 /// What one b-thread does, for ever.
 #[derive(Clone, Debug, PartialEq)]

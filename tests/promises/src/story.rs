@@ -9,6 +9,7 @@ use skein_dbp::{LIFT, NodeName, Roster};
 use skein_wire::NetworkConfig;
 
 use crate::programs::Role;
+use crate::seconds::Seconds;
 
 /// A run to be: who takes part, over what network, and what goes wrong.
 #[derive(Clone, Debug, PartialEq)]
@@ -340,13 +341,4 @@ impl fmt::Display for Cast {
 impl Cast {
     /// A history that no run outgrows while somebody is away.
     pub const ROOMY: usize = 1024;
-}
-
-/// A time as a person reads it.
-pub(crate) struct Seconds(pub(crate) Duration);
-
-impl fmt::Display for Seconds {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} s", (self.0.as_secs_f64() * 1e3).round() / 1e3)
-    }
 }

@@ -35,9 +35,9 @@ fn flies(data: &Path, world: &str, points: &[[f64; 3]]) {
     let file = folder.path().join("mission.plan");
     std::fs::write(&file, plan(points)).unwrap();
     let mut flight = flight("open", 1);
-    flight.world.vehicles = Some(4);
-    flight.world.world_file = Some(data.join("gazebo").join(world));
-    flight.world.missions = vec![file];
+    flight.world.overrides.vehicles = Some(4);
+    flight.world.overrides.world = Some(data.join("gazebo").join(world));
+    flight.world.overrides.missions = vec![file];
     let summary = fly(flight);
     assert_eq!(summary.reason, None, "{world}");
     assert!(

@@ -30,7 +30,7 @@ fn eight_swap_places_across_a_circle() {
 #[test]
 fn sixteen_swap_places_across_a_circle() {
     let mut flight = flight("antipodal", 2);
-    flight.world.vehicles = Some(16);
+    flight.world.overrides.vehicles = Some(16);
     assert_flown(&fly(flight), 1.0);
 }
 

@@ -1,7 +1,7 @@
-//! The swarm as processes over real Zenoh, and what a fault does to it. `skein-sim campaign processes` runs these at more
+//! The swarm as processes over real Zenoh, and what a fault does to it. `skein-lab campaign processes` runs these at more
 //! moments, and all the others.
 
-use skein_sim::campaign::processes::{Fault, run};
+use skein_lab::campaign::processes::trial::{Fault, run};
 use skein_sim::cli::Network;
 
 /// Each test has network ports of its own.

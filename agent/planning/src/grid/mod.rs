@@ -7,7 +7,6 @@ mod bricks;
 mod detours;
 mod lattice;
 mod moves;
-pub mod movingai;
 mod occupancy;
 
 pub use lattice::{Grid, Lattice, ReversibleLattice, StepCosts};

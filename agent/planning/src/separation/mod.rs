@@ -1,12 +1,10 @@
 //! Keeping the distance: a repulsion that resolves encounters, and a filter that makes them safe.
 
 mod filter;
-mod grid;
 mod halfspace;
 mod neighbour;
 mod repulsion;
 
 pub use filter::{Cause, FilterConfig, Filtered, Motion, Outcome, distance_kept_m, filter};
-pub use grid::Grid;
 pub use neighbour::Neighbour;
 pub use repulsion::{RepulsionConfig, repulsion};

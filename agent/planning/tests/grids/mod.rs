@@ -1,7 +1,6 @@
 //! Searches of grids: optimal against a search without any cleverness, within their bounds, and as published.
 
 mod dstar_lite;
-mod published;
 mod reference;
 mod search;
 mod zhang;

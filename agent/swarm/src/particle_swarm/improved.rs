@@ -8,7 +8,6 @@ use super::modes::Modes;
 use super::swarm::unit;
 use super::{Flock, Motion, Mover, SearchSpace};
 
-/// How the improved swarm moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImprovedConfig {
     /// `wmin`: the inertia while particles move far.
@@ -23,7 +22,7 @@ pub struct ImprovedConfig {
     pub lambda2: f64,
     /// `k`: generations over which it is seen how far they move.
     pub generations: usize,
-    /// How far an escape shifts what attracts, as a share of the box's width.
+    /// Shift by an escape of what attracts, as a share of the box's width.
     pub kick: f64,
     /// Most that a particle moves at once, as a share of the box's width.
     pub max_step: f64,
@@ -96,7 +95,7 @@ impl Improved {
         self.inertia
     }
 
-    /// Whether the swarm is judged stuck, and escapes.
+    /// The swarm is judged stuck, and escapes.
     #[must_use]
     pub fn is_stuck(&self) -> bool {
         self.is_stuck

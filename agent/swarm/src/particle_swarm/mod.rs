@@ -5,7 +5,7 @@
 //! number of them, and go on where they stopped. The same seed and the same objective give the same result, bit for bit.
 //!
 //! ```
-//! use skein_swarm::particle_swarm::{Objective, SearchSpace, Standard, Swarm};
+//! use skein_swarm::particle_swarm::{Improved, ImprovedConfig, Objective, SearchSpace, Swarm};
 //!
 //! struct Sphere(SearchSpace);
 //! impl Objective for Sphere {
@@ -14,30 +14,27 @@
 //! }
 //!
 //! let mut sphere = Sphere(SearchSpace::new(vec![-10.0; 4], vec![10.0; 4])?);
-//! let mut swarm = Swarm::new(&sphere.0, Standard::default(), 30, 7);
+//! let motion = Improved::new(&sphere.0, ImprovedConfig::default());
+//! let mut swarm = Swarm::new(&sphere.0, motion, 30, 7);
 //! swarm.run(&mut sphere, 1500);
 //! assert!(swarm.best().cost < 5.0);
 //! # Ok::<(), skein_swarm::particle_swarm::SearchSpaceError>(())
 //! ```
 
-mod constriction;
 mod improved;
 mod modes;
 mod space;
-mod standard;
 mod swarm;
 mod tabu;
 
-pub use self::constriction::Constriction;
 pub use self::improved::{Improved, ImprovedConfig};
 pub use self::space::{SearchSpace, SearchSpaceError};
-pub use self::standard::Standard;
 pub use self::swarm::{Best, Flock, Motion, Mover, Swarm};
 pub use self::tabu::{TabuConfig, TabuSwarm};
 
-/// What is to be minimised.
+/// A function to be minimised.
 pub trait Objective {
-    /// Where it is defined.
+    /// Its domain.
     fn space(&self) -> &SearchSpace;
 
     /// Its value at a position in the space, one number for each dimension; if that is not below `limit`, any number that is

@@ -16,12 +16,7 @@ pub enum SearchSpaceError {
     #[error(
         "{lower} lower bounds and {upper} upper bounds, expected as many of one as of the other, and at least one"
     )]
-    Lengths {
-        /// How many lower bounds there are.
-        lower: usize,
-        /// How many upper bounds there are.
-        upper: usize,
-    },
+    Lengths { lower: usize, upper: usize },
     /// A dimension has no width.
     #[error("dimension {dimension} runs from {lower} to {upper}, expected finite bounds in rising order")]
     Bounds {
@@ -35,19 +30,13 @@ pub enum SearchSpaceError {
     /// The dimensions cannot be cut into chains of this length.
     #[error("{dimensions} dimensions cannot be cut into chains of {chain}; give a length that divides them")]
     Chain {
-        /// How many dimensions there are.
         dimensions: usize,
         /// The length asked for.
         chain: usize,
     },
     /// The centre is not a position in the space.
     #[error("a centre of {numbers} numbers, expected {dimensions}: one for each dimension")]
-    Centre {
-        /// How many dimensions there are.
-        dimensions: usize,
-        /// How many numbers the centre has.
-        numbers: usize,
-    },
+    Centre { dimensions: usize, numbers: usize },
 }
 
 impl SearchSpace {
@@ -94,13 +83,12 @@ impl SearchSpace {
         Ok(SearchSpace { centre, ..self })
     }
 
-    /// How many dimensions there are.
     #[must_use]
     pub fn dimensions(&self) -> usize {
         self.lower.len()
     }
 
-    /// How many successive dimensions belong together; 1 unless said.
+    /// Successive dimensions that belong together; 1 unless said.
     #[must_use]
     pub fn chain(&self) -> usize {
         self.chain

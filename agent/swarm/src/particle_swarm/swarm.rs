@@ -5,7 +5,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::{Objective, SearchSpace};
 
-/// How the particles of an algorithm move.
+/// The motion of an algorithm's particles.
 pub trait Motion {
     /// Told of before every generation but the first, which only looks at where the particles begin.
     fn begin_generation(&mut self, _: &Flock) {}
@@ -17,7 +17,7 @@ pub trait Motion {
     fn max_step(&self) -> f64;
 }
 
-/// Where the particles are, and what they remember. Particle after particle, a position is `dimensions` numbers.
+/// The particles' positions and memories. Particle after particle, a position is `dimensions` numbers.
 #[derive(Clone, Debug)]
 pub struct Flock {
     space: SearchSpace,
@@ -31,7 +31,6 @@ pub struct Flock {
 /// The best position found so far.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Best {
-    /// Where it is.
     pub position: Vec<f64>,
     /// The objective there; infinite before the first evaluation.
     pub cost: f64,
@@ -39,7 +38,6 @@ pub struct Best {
 
 /// A particle about to move.
 pub struct Mover<'a> {
-    /// Where it is.
     pub position: &'a [f64],
     /// Its velocity so far, to be replaced by the next one.
     pub velocity: &'a mut [f64],
@@ -200,19 +198,18 @@ impl<M: Motion> Swarm<M> {
         &self.best
     }
 
-    /// How its particles move.
     #[must_use]
     pub fn motion(&self) -> &M {
         &self.motion
     }
 
-    /// How many particles there are.
+    /// Number of particles.
     #[must_use]
     pub fn size(&self) -> usize {
         self.flock.best_costs.len()
     }
 
-    /// How many evaluations have been spent.
+    /// Evaluations spent so far.
     #[must_use]
     pub fn evaluations(&self) -> usize {
         self.evaluations

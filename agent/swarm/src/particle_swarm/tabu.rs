@@ -9,10 +9,9 @@ use super::modes::Modes;
 use super::swarm::unit;
 use super::{Best, Improved, ImprovedConfig, Objective, SearchSpace, Swarm};
 
-/// How swarm and tabu search take turns.
+/// The turns of swarm and tabu search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TabuConfig {
-    /// How the swarm moves.
     pub swarm: ImprovedConfig,
     /// Generations of the swarm between two turns of the tabu search.
     pub generations: usize,
@@ -20,7 +19,7 @@ pub struct TabuConfig {
     pub moves: usize,
     /// Candidate solutions looked at for each move.
     pub candidates: usize,
-    /// How many moves are remembered as tabu.
+    /// Moves that are remembered as tabu.
     pub tenure: usize,
     /// A swarm whose best has gained less than this share since it was last looked at sticks: it is the search's turn.
     pub least_gain: f64,
@@ -42,7 +41,7 @@ impl Default for TabuConfig {
     }
 }
 
-/// What a move changes, and which way: the mode of a chain, rising or falling.
+/// The change of a move: the mode of a chain, rising or falling.
 type Feature = (usize, bool);
 
 /// The improved swarm, and a tabu search (Glover 1989) that sets out, turn by turn, from the best it has found.
@@ -168,7 +167,7 @@ impl TabuSwarm {
         self.swarm.best()
     }
 
-    /// How many evaluations have been spent.
+    /// Evaluations spent so far.
     #[must_use]
     pub fn evaluations(&self) -> usize {
         self.swarm.evaluations() + self.spent

@@ -4,14 +4,14 @@ use nalgebra::Vector3;
 
 use skein_planning::airspace::Airspace;
 
-/// How vehicles fly their routes so that they arrive together.
+/// The pace of vehicles that arrive together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arrival {
-    /// When the last one arrives, seconds after all set out.
+    /// Arrival of the last one, seconds after all set out.
     pub time_s: f64,
-    /// How much slower than at cruise each flies its route: 1 is cruise, 2 half as fast.
+    /// Factor by which each is slower than at cruise: 1 is cruise, 2 half as fast.
     pub slowed: Vec<f64>,
-    /// How long before the last one the first one arrives, seconds.
+    /// Time from the first arrival to the last, seconds.
     pub spread_s: f64,
 }
 

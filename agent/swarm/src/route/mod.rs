@@ -19,16 +19,16 @@
 //! # Ok::<(), skein_swarm::route::RouteError>(())
 //! ```
 
-mod any_angle;
 mod arrival;
 mod cost;
 mod planner;
 mod problem;
 mod traffic;
+mod weights;
 
-pub use self::any_angle::{AnyAngleConfig, any_angle};
 pub use self::arrival::{Arrival, arrival_slots, arrive_together};
-pub use self::cost::{Assessment, RouteCost};
+pub use self::cost::Assessment;
 pub use self::planner::{Effort, Plan, Planner, plan_in_turn};
 pub use self::problem::{RouteError, RouteProblem};
 pub use self::traffic::{PARTS, Traffic};
+pub use self::weights::RouteCost;

@@ -1,27 +1,27 @@
-//! Who plans a route, and how.
+//! The planners of routes.
 
 use nalgebra::Vector3;
 
-use super::{Assessment, RouteCost, RouteError, RouteProblem, Traffic};
-use crate::particle_swarm::{
-    Best, Constriction, Improved, ImprovedConfig, Motion, Objective, Standard, Swarm, TabuConfig, TabuSwarm,
-};
 use skein_planning::airspace::Airspace;
 
-/// The algorithms of P3, and those they are compared with. All begin with the same particles, if the seed is the same.
+use super::cost::Assessment;
+use super::problem::{RouteError, RouteProblem};
+use super::traffic::Traffic;
+use super::weights::RouteCost;
+use crate::particle_swarm::{
+    Best, Improved, ImprovedConfig, Motion, Objective, Swarm, TabuConfig, TabuSwarm,
+};
+
+/// The algorithms of P3. Both begin with the same particles, if the seed is the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Planner {
     /// The improved particle swarm: on a vehicle.
     Onboard,
     /// The same with tabu search: on the ground.
     Ground,
-    /// The standard particle swarm.
-    Standard,
-    /// The particle swarm with constriction.
-    Constriction,
 }
 
-/// How much is spent on a plan: `particles * generations` evaluations.
+/// The effort for a plan: `particles * generations` evaluations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Effort {
     /// `Ns`.
@@ -42,7 +42,6 @@ impl Default for Effort {
 pub struct Plan {
     /// Start, waypoints, goal (ENU, metres).
     pub route: Vec<Vector3<f64>>,
-    /// What it costs.
     pub assessment: Assessment,
     /// The least cost found until the end of each generation, metres.
     pub convergence_m: Vec<f64>,
@@ -65,16 +64,6 @@ impl Planner {
                     swarm.best().clone()
                 })
             }
-            Planner::Standard => Plan::by_swarm(
-                problem,
-                Swarm::new(space, Standard::default(), effort.particles, seed),
-                effort,
-            ),
-            Planner::Constriction => Plan::by_swarm(
-                problem,
-                Swarm::new(space, Constriction::default(), effort.particles, seed),
-                effort,
-            ),
         }
     }
 }

@@ -2,7 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::{Assessment, RouteCost, Traffic};
+use super::cost::Assessment;
+use super::traffic::Traffic;
+use super::weights::RouteCost;
 use crate::particle_swarm::{Objective, SearchSpace, SearchSpaceError};
 use skein_planning::airspace::Airspace;
 
@@ -28,7 +30,7 @@ pub enum RouteError {
     Outside {
         /// "start" or "goal".
         which: &'static str,
-        /// Where it is (ENU, metres).
+        /// ENU, metres.
         point: Vector3<f64>,
     },
     /// The airspace or the number of waypoints gives no box to search.
@@ -91,7 +93,7 @@ impl<'a> RouteProblem<'a> {
         (self.route[0], self.route[self.space.chain() + 1])
     }
 
-    /// What a route of any number of points (ENU, metres) costs, part by part.
+    /// The cost of a route of any number of points (ENU, metres), part by part.
     #[must_use]
     pub fn judge(&self, route: &[Vector3<f64>]) -> Assessment {
         self.cost.assess(route, self.airspace, self.traffic)

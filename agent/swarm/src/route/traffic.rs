@@ -1,8 +1,8 @@
-//! Where other vehicles are while one flies its route.
+//! The other vehicles while one flies its route.
 
 use nalgebra::Vector3;
 
-use super::RouteCost;
+use super::weights::RouteCost;
 
 /// Parts into which flights are cut to compare vehicles at equal times.
 pub const PARTS: usize = 32;
@@ -10,7 +10,7 @@ pub const PARTS: usize = 32;
 /// Parts of a flight that are looked at together: where these are far from one another, their parts are.
 const STRETCH: usize = 8;
 
-/// Where a vehicle is at the `PARTS + 1` cuts of its flight.
+/// The places of a vehicle at the `PARTS + 1` cuts of its flight.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Track {
     cuts: [Vector3<f64>; PARTS + 1],
@@ -74,7 +74,7 @@ impl Traffic {
 }
 
 impl Track {
-    /// Where one who flies along a route is at equal times; always at its start if that takes no time.
+    /// The places along a route at equal times; always its start if that takes no time.
     pub(super) fn along(route: &[Vector3<f64>], cost: &RouteCost) -> Track {
         let time_s: f64 = route.windows(2).map(|leg| cost.leg_s(&(leg[1] - leg[0]))).sum();
         let step_s = time_s / PARTS as f64;
@@ -111,7 +111,7 @@ impl Extent {
     }
 }
 
-/// Whether a segment is beyond `reach_m` from the origin along an axis.
+/// A segment is beyond `reach_m` from the origin along an axis.
 fn is_beyond(from: &Vector3<f64>, to: &Vector3<f64>, reach_m: f64) -> bool {
     (0..3).any(|axis| from[axis].min(to[axis]) > reach_m || from[axis].max(to[axis]) < -reach_m)
 }

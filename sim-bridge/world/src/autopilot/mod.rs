@@ -12,21 +12,24 @@ mod mixer;
 mod modes;
 mod parameters;
 mod position_control;
+mod situation;
 
 use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_mav::{Battery, Datum, Endpoint, EndpointConfig, ParameterTable, Request, VehicleState};
 
-use crate::sensors::{MotorCommands, SensorReadings};
+use crate::quadrotor::MotorCommands;
+use crate::sensors::SensorReadings;
 use crate::vehicle::VehicleModel;
 use attitude_control::AttitudeControl;
 use estimator::Estimator;
 use mixer::Mixer;
-use modes::{Drive, Modes, Situation, Sticks};
+use modes::{Drive, Modes, Sticks};
 use parameters::Settings;
 pub use parameters::default_parameters;
 use position_control::PositionControl;
+use situation::Situation;
 
 /// Share of full thrust of rotors that idle on the ground.
 const IDLE_SHARE: f64 = 0.05;

@@ -1,0 +1,153 @@
+//! Missions into a scenario: who flies what, from where, and where each lands.
+
+use nalgebra::Vector3;
+use skein_world::{Scene, VehicleModel};
+
+use super::Scenario;
+use super::error::ScenarioError;
+use super::layout::SPACING_M;
+use super::placement::{REACH_M, clear_place, is_clear, way_is_clear};
+use crate::mission::{Ends, Mission};
+
+/// Clearance of the straight line from a mission's own start or goal to the place a vehicle gets instead, in metres.
+const DETOUR_CLEARANCE_M: f64 = 1.0;
+
+/// Gives each vehicle its mission; a single one is flown by all in trail.
+///
+/// In trail the vehicles stand 3 m behind one another before take-off, against the first leg's direction, and land 3 m
+/// behind one another along the last leg, the first farthest. Places that are too near an obstacle, the bounds or
+/// another vehicle's are moved to the nearest that are not, unless the mission is [`exact`](Mission::exact), and noted.
+/// Bounds that nobody stated grow to hold the missions.
+///
+/// # Errors
+/// [`ScenarioError::MissionCount`] for several missions but fewer than vehicles; [`ScenarioError::NoRoom`].
+pub fn apply_missions(scenario: &mut Scenario, missions: Vec<Mission>) -> Result<(), ScenarioError> {
+    let vehicles = scenario.vehicles.len();
+    let trail = missions.len() == 1;
+    if !trail && missions.len() < vehicles {
+        return Err(ScenarioError::MissionCount { missions: missions.len(), vehicles });
+    }
+    let assigned: Vec<&Mission> = missions.iter().cycle().take(vehicles).collect();
+    tune(scenario, &assigned);
+    for (rank, (vehicle, mission)) in scenario.vehicles.iter_mut().zip(&assigned).enumerate() {
+        let behind = if trail { rank as f64 * SPACING_M } else { 0.0 };
+        let route: Vec<_> = mission.waypoints.iter().map(|w| w.position).collect();
+        vehicle.start = mission.home - first_leg(mission) * behind;
+        vehicle.waypoints = route;
+        if let Some(model) = &mission.model {
+            vehicle.model = VehicleModel::built_in(model)?;
+        }
+        if mission.ends == Ends::Land
+            && let Some(goal) = vehicle.waypoints.last_mut()
+        {
+            *goal -= last_leg(mission) * behind;
+        }
+    }
+    scenario.include_routes();
+    place_starts(scenario, &assigned)?;
+    place_goals(scenario, &assigned)?;
+    for vehicle in &mut scenario.vehicles {
+        let ahead = vehicle.waypoints.first().map_or(Vector3::x(), |first| first - vehicle.start);
+        vehicle.yaw = ahead.y.atan2(ahead.x);
+    }
+    Ok(())
+}
+
+/// Take-off height and cruise speed: the lowest and slowest that any mission asks for.
+fn tune(scenario: &mut Scenario, missions: &[&Mission]) {
+    let lowest = missions.iter().filter_map(|m| m.takeoff_height_m).min_by(f64::total_cmp);
+    scenario.takeoff_height_m = lowest.unwrap_or(scenario.takeoff_height_m);
+    let speeds = || missions.iter().flat_map(|m| &m.waypoints).filter_map(|w| w.speed_m_s);
+    if let Some(slowest) = speeds().min_by(f64::total_cmp) {
+        let ceiling = scenario.cruise_speed_m_s;
+        if speeds().any(|speed| speed != slowest) || slowest > ceiling {
+            let flown = slowest.min(ceiling);
+            scenario.notes.push(format!("missions: one cruise speed is flown throughout, {flown} m/s"));
+        }
+        scenario.cruise_speed_m_s = slowest.min(ceiling);
+    }
+    let holds: f64 = missions.iter().flat_map(|m| &m.waypoints).map(|w| w.hold_s).sum();
+    if holds > 0.0 {
+        scenario.notes.push("missions: waypoints are passed without the stops they ask for".to_owned());
+    }
+}
+
+fn place_starts(scenario: &mut Scenario, missions: &[&Mission]) -> Result<(), ScenarioError> {
+    let height = scenario.takeoff_height_m;
+    let mut taken = Vec::new();
+    for (i, mission) in missions.iter().enumerate() {
+        let Some(wanted) = scenario.vehicles.get(i).map(|v| v.start) else { continue };
+        let anchor = Vector3::new(mission.home.x, mission.home.y, height);
+        let place = if mission.exact {
+            wanted
+        } else {
+            find(&scenario.scene, &wanted, &anchor, height, &taken)
+                .ok_or_else(|| no_room(i, "start", wanted))?
+        };
+        scenario.move_start(i, place);
+        taken.push(place);
+    }
+    Ok(())
+}
+
+fn place_goals(scenario: &mut Scenario, missions: &[&Mission]) -> Result<(), ScenarioError> {
+    let mut taken = Vec::new();
+    for (i, mission) in missions.iter().enumerate() {
+        let Some(vehicle) = scenario.vehicles.get_mut(i) else { continue };
+        if mission.ends == Ends::Return {
+            let height = vehicle.waypoints.last().map_or(scenario.takeoff_height_m, |last| last.z);
+            vehicle.waypoints.push(Vector3::new(vehicle.start.x, vehicle.start.y, height));
+            continue;
+        }
+        let wanted = vehicle.goal();
+        let anchor = mission.waypoints.last().map_or(wanted, |last| last.position);
+        let place = if mission.exact {
+            wanted
+        } else {
+            find(&scenario.scene, &wanted, &anchor, wanted.z, &taken)
+                .ok_or_else(|| no_room(i, "goal", wanted))?
+        };
+        scenario.move_goal(i, place);
+        taken.push(place);
+    }
+    Ok(())
+}
+
+/// A clear place near `wanted` from which `anchor` is in plain sight; near `anchor` where there is none.
+fn find(
+    scene: &Scene,
+    wanted: &Vector3<f64>,
+    anchor: &Vector3<f64>,
+    height_m: f64,
+    taken: &[Vector3<f64>],
+) -> Option<Vector3<f64>> {
+    let in_sight = |place: &Vector3<f64>| {
+        let above = Vector3::new(place.x, place.y, height_m);
+        way_is_clear(scene, &above, anchor, DETOUR_CLEARANCE_M)
+    };
+    let clear = |place: &Vector3<f64>| is_clear(scene, place, height_m);
+    clear_place(wanted, taken, |p| clear(p) && in_sight(p)).or_else(|| clear_place(wanted, taken, clear))
+}
+
+fn no_room(index: usize, what: &'static str, near: Vector3<f64>) -> ScenarioError {
+    ScenarioError::NoRoom { vehicle: index + 1, what, near, reach_m: REACH_M }
+}
+
+/// Direction over ground from home to the first waypoint away from it; east where there is none.
+fn first_leg(mission: &Mission) -> Vector3<f64> {
+    let places = mission.waypoints.iter().map(|w| w.position);
+    places.map(|place| level(place - mission.home)).find(|d| *d != Vector3::zeros()).unwrap_or(Vector3::x())
+}
+
+/// Direction over ground in which the goal is reached; that of the first leg where there is no other.
+fn last_leg(mission: &Mission) -> Vector3<f64> {
+    let goal = mission.waypoints.last().map_or(mission.home, |last| last.position);
+    let before = mission.waypoints.iter().rev().skip(1).map(|w| w.position).chain([mission.home]);
+    before.map(|place| level(goal - place)).find(|d| *d != Vector3::zeros()).unwrap_or(Vector3::x())
+}
+
+/// Unit vector over ground; zero for a way of less than a decimetre.
+fn level(way: Vector3<f64>) -> Vector3<f64> {
+    let ground = Vector3::new(way.x, way.y, 0.0);
+    if ground.norm() < 0.1 { Vector3::zeros() } else { ground.normalize() }
+}

@@ -1,0 +1,21 @@
+//! Benchmarks on this computer. No test depends on the figures.
+
+mod bp;
+mod fleet;
+mod hold;
+mod link;
+mod nav;
+pub mod plan;
+
+use crate::task::Entry;
+
+pub const TASKS: &[Entry] = &[
+    Entry::of::<bp::Bp>(),
+    Entry::of::<plan::Plan>(),
+    Entry::of::<nav::Nav>(),
+    Entry::of::<fleet::Sizes>(),
+    Entry::of::<fleet::OneSize>(),
+    Entry::of::<link::Extent>(),
+    Entry::of::<link::peer::Part>(),
+    Entry::of::<hold::Holds>(),
+];

@@ -1,0 +1,13 @@
+//! Campaigns: many runs with faults, each judged by what is promised.
+
+mod network;
+pub mod processes;
+mod separation;
+
+use crate::task::Entry;
+
+pub const TASKS: &[Entry] = &[
+    Entry::of::<network::Network>(),
+    Entry::of::<separation::Separation>(),
+    Entry::of::<processes::Campaign>(),
+];

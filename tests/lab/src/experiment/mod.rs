@@ -1,0 +1,28 @@
+//! The published experiments, run again, each beside what it must reach.
+
+mod ablation;
+mod circle;
+mod dstar_grid;
+mod feasibility;
+mod lsc;
+mod performance;
+mod right_of_way;
+mod sphere;
+pub mod swarm_planning;
+mod vfh;
+
+use crate::reported::Reported;
+use crate::task::Entry;
+
+pub const TASKS: &[Entry] = &[
+    Entry::of::<Reported<feasibility::Feasibility>>(),
+    Entry::of::<Reported<performance::Performance>>(),
+    Entry::of::<Reported<vfh::Vfh>>(),
+    Entry::of::<Reported<circle::Circle>>(),
+    Entry::of::<Reported<ablation::Ablation>>(),
+    Entry::of::<Reported<right_of_way::RightOfWay>>(),
+    Entry::of::<Reported<sphere::Sphere>>(),
+    Entry::of::<Reported<dstar_grid::DstarGrid>>(),
+    Entry::of::<Reported<lsc::Lsc>>(),
+    Entry::of::<Reported<swarm_planning::SwarmPlanning>>(),
+];

@@ -1,0 +1,99 @@
+//! An operator at a ground station's console, as a program: a WebSocket client that orders and sees who has heard.
+
+use std::net::{SocketAddr, TcpStream};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, ensure};
+use serde_json::{Value, json};
+use tungstenite::{Message, WebSocket, stream::MaybeTlsStream};
+
+/// Patience with the console, a swarm, or an answer.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// A connection to a console.
+pub struct Operator {
+    socket: WebSocket<MaybeTlsStream<TcpStream>>,
+}
+
+impl Operator {
+    /// Connects, as soon as the console answers.
+    ///
+    /// # Errors
+    /// It does not answer.
+    pub fn connect(console: SocketAddr) -> anyhow::Result<Self> {
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            match tungstenite::connect(format!("ws://{console}/live")) {
+                Ok((socket, _)) => {
+                    if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
+                        stream.set_nodelay(true)?;
+                    }
+                    return Ok(Self { socket });
+                }
+                Err(error) if Instant::now() > deadline => {
+                    return Err(error).context("the console does not answer");
+                }
+                Err(_) => std::thread::sleep(Duration::from_millis(50)),
+            }
+        }
+    }
+
+    /// Waits until all of so many vehicles have their motors armed.
+    ///
+    /// # Errors
+    /// They have not within two minutes.
+    pub fn await_armed(&mut self, vehicles: usize) -> anyhow::Result<()> {
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            ensure!(
+                Instant::now() < deadline,
+                "the swarm was not in the air within {} s",
+                PATIENCE.as_secs()
+            );
+            let message = self.next()?;
+            let armed =
+                message["vehicles"].as_array().map(|all| all.iter().filter(|v| v["armed"] == true).count());
+            if message["type"] == "fleet" && armed == Some(vehicles) {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Gives an order, to `"all"` or a list of vehicles; returns how long it took until all of them had acknowledged it.
+    ///
+    /// # Errors
+    /// Somebody has not within two minutes, or refuses it.
+    pub fn order(&mut self, what: &str, to: &Value) -> anyhow::Result<Duration> {
+        let began = Instant::now();
+        let order = json!({ "type": "order", "tag": what, "what": what, "to": to });
+        self.socket.send(Message::text(order.to_string()))?;
+        let mut number = None;
+        let mut newest = Value::Null;
+        while began.elapsed() < PATIENCE {
+            let message = self.next()?;
+            match message["type"].as_str() {
+                Some("ordered") => number = Some(message["id"].clone()),
+                Some("orders") => {
+                    newest =
+                        message["orders"].as_array().and_then(|all| all.last()).cloned().unwrap_or_default();
+                }
+                Some("error") => anyhow::bail!("`{what}` is refused: {}", message["message"]),
+                _ => continue,
+            }
+            let answers = newest["answers"].as_object();
+            let all = answers.is_some_and(|all| all.values().all(|answer| answer["state"] == "acknowledged"));
+            if number.as_ref() == Some(&newest["id"]) && all {
+                return Ok(began.elapsed());
+            }
+        }
+        anyhow::bail!("`{what}` was not acknowledged by all: {newest}")
+    }
+
+    fn next(&mut self) -> anyhow::Result<Value> {
+        loop {
+            if let Message::Text(text) = self.socket.read()? {
+                return Ok(serde_json::from_str(&text)?);
+            }
+        }
+    }
+}
