@@ -23,6 +23,12 @@ impl Address {
         (target_system == 0 || target_system == self.system_id)
             && (target_component == 0 || target_component == self.component_id)
     }
+
+    /// Whether a message names a target, and this address is meant.
+    pub(crate) fn is_addressed_by(&self, message: &MavMessage) -> bool {
+        let component = message.target_component_id().unwrap_or(0);
+        message.target_system_id().is_some_and(|system| self.is_target(system, component))
+    }
 }
 
 /// One message, and who sent it.

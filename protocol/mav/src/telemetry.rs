@@ -3,11 +3,14 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use mavlink::dialects::common::MavSeverity;
+use mavlink::dialects::common::{MavLandedState, MavSeverity};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::geodesy::Geodetic;
-use crate::mode::{AutopilotKind, FlightMode};
+use crate::mode::FlightMode;
+
+/// An autopilot whose heartbeat (1 Hz) stays away this long is lost.
+pub const HEARTBEAT_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// A value and when it arrived.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +41,26 @@ pub enum Landed {
     Landing,
 }
 
+const LANDED: [(Landed, MavLandedState); 5] = [
+    (Landed::Unknown, MavLandedState::MAV_LANDED_STATE_UNDEFINED),
+    (Landed::OnGround, MavLandedState::MAV_LANDED_STATE_ON_GROUND),
+    (Landed::TakingOff, MavLandedState::MAV_LANDED_STATE_TAKEOFF),
+    (Landed::InAir, MavLandedState::MAV_LANDED_STATE_IN_AIR),
+    (Landed::Landing, MavLandedState::MAV_LANDED_STATE_LANDING),
+];
+
+impl From<MavLandedState> for Landed {
+    fn from(state: MavLandedState) -> Self {
+        LANDED.into_iter().find(|(_, known)| *known == state).map_or(Self::Unknown, |(own, _)| own)
+    }
+}
+
+impl From<Landed> for MavLandedState {
+    fn from(landed: Landed) -> Self {
+        LANDED.into_iter().find(|(own, _)| *own == landed).map(|(_, known)| known).unwrap_or_default()
+    }
+}
+
 /// State of the battery.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Battery {
@@ -66,33 +89,26 @@ pub enum Severity {
     Debug,
 }
 
+const SEVERITIES: [(Severity, MavSeverity); 8] = [
+    (Severity::Emergency, MavSeverity::MAV_SEVERITY_EMERGENCY),
+    (Severity::Alert, MavSeverity::MAV_SEVERITY_ALERT),
+    (Severity::Critical, MavSeverity::MAV_SEVERITY_CRITICAL),
+    (Severity::Error, MavSeverity::MAV_SEVERITY_ERROR),
+    (Severity::Warning, MavSeverity::MAV_SEVERITY_WARNING),
+    (Severity::Notice, MavSeverity::MAV_SEVERITY_NOTICE),
+    (Severity::Info, MavSeverity::MAV_SEVERITY_INFO),
+    (Severity::Debug, MavSeverity::MAV_SEVERITY_DEBUG),
+];
+
 impl From<MavSeverity> for Severity {
     fn from(severity: MavSeverity) -> Self {
-        match severity {
-            MavSeverity::MAV_SEVERITY_EMERGENCY => Self::Emergency,
-            MavSeverity::MAV_SEVERITY_ALERT => Self::Alert,
-            MavSeverity::MAV_SEVERITY_CRITICAL => Self::Critical,
-            MavSeverity::MAV_SEVERITY_ERROR => Self::Error,
-            MavSeverity::MAV_SEVERITY_WARNING => Self::Warning,
-            MavSeverity::MAV_SEVERITY_NOTICE => Self::Notice,
-            MavSeverity::MAV_SEVERITY_INFO => Self::Info,
-            MavSeverity::MAV_SEVERITY_DEBUG => Self::Debug,
-        }
+        SEVERITIES.into_iter().find(|(_, known)| *known == severity).map_or(Self::Debug, |(own, _)| own)
     }
 }
 
 impl From<Severity> for MavSeverity {
     fn from(severity: Severity) -> Self {
-        match severity {
-            Severity::Emergency => Self::MAV_SEVERITY_EMERGENCY,
-            Severity::Alert => Self::MAV_SEVERITY_ALERT,
-            Severity::Critical => Self::MAV_SEVERITY_CRITICAL,
-            Severity::Error => Self::MAV_SEVERITY_ERROR,
-            Severity::Warning => Self::MAV_SEVERITY_WARNING,
-            Severity::Notice => Self::MAV_SEVERITY_NOTICE,
-            Severity::Info => Self::MAV_SEVERITY_INFO,
-            Severity::Debug => Self::MAV_SEVERITY_DEBUG,
-        }
+        SEVERITIES.into_iter().find(|(own, _)| *own == severity).map(|(_, known)| known).unwrap_or_default()
     }
 }
 
@@ -109,8 +125,6 @@ pub struct Text {
 /// body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Telemetry {
-    /// Make of the autopilot; `None` before its first heartbeat.
-    pub autopilot: Option<AutopilotKind>,
     /// When its last heartbeat came.
     pub last_heartbeat: Option<Duration>,
     /// Whether heartbeats come. False before the first and after a pause of [`crate::HEARTBEAT_TIMEOUT`].
@@ -164,7 +178,6 @@ impl Telemetry {
 impl Default for Telemetry {
     fn default() -> Self {
         Self {
-            autopilot: None,
             last_heartbeat: None,
             connected: false,
             armed: false,

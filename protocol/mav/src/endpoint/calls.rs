@@ -6,11 +6,12 @@ use std::time::Duration;
 use mavlink::dialects::common::{COMMAND_INT_DATA, COMMAND_LONG_DATA, MavCmd, MavFrame};
 use nalgebra::Vector3;
 
-use super::AutopilotCommand;
+use super::request::AutopilotCommand;
 use crate::command::CommandResult;
+use crate::dialects::px4;
 use crate::frame::Address;
 use crate::geodesy::{Datum, Geodetic};
-use crate::mode::{FlightMode, px4};
+use crate::mode::FlightMode;
 
 /// A repetition comes this soon after the original, or it is a new command.
 const REPETITION: Duration = Duration::from_secs(5);

@@ -7,20 +7,17 @@ use mavlink::dialects::common::{
     ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA,
     EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA, GpsFixType,
     HEARTBEAT_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, MISSION_CURRENT_DATA, MavAutopilot,
-    MavBatteryChargeState, MavBatteryFunction, MavBatteryType, MavLandedState, MavModeFlag,
-    MavProtocolCapability, MavState, MavSysStatusSensor, MavType, MissionState, SYS_STATUS_DATA,
-    VFR_HUD_DATA,
+    MavBatteryChargeState, MavBatteryFunction, MavBatteryType, MavModeFlag, MavProtocolCapability, MavState,
+    MavSysStatusSensor, MavType, MissionState, SYS_STATUS_DATA, VFR_HUD_DATA,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::axes;
+use crate::dialects::px4;
 use crate::frame::FrameWriter;
 use crate::geodesy::{Datum, LocalFrame};
 use crate::mode::FlightMode;
 use crate::telemetry::{Battery, Landed};
-
-/// Release of PX4 whose dialect is spoken, as `flight_sw_version` encodes it: 1.13.0, official.
-const DIALECT_VERSION: u32 = 0x010d_00ff;
 
 /// An autopilot's state, as it reports it. Vectors are in the world's ENU frame unless they say body.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,7 +99,7 @@ impl Report<'_> {
             _ => MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED | MavModeFlag::MAV_MODE_FLAG_GUIDED_ENABLED,
         };
         HEARTBEAT_DATA {
-            custom_mode: state.mode.to_px4_custom(),
+            custom_mode: px4::custom_mode(state.mode),
             mavtype: MavType::MAV_TYPE_QUADROTOR,
             autopilot: MavAutopilot::MAV_AUTOPILOT_PX4,
             base_mode,
@@ -150,16 +147,7 @@ impl Report<'_> {
     }
 
     fn extended_state(&self) -> EXTENDED_SYS_STATE_DATA {
-        EXTENDED_SYS_STATE_DATA {
-            landed_state: match self.state.landed {
-                Landed::Unknown => MavLandedState::MAV_LANDED_STATE_UNDEFINED,
-                Landed::OnGround => MavLandedState::MAV_LANDED_STATE_ON_GROUND,
-                Landed::TakingOff => MavLandedState::MAV_LANDED_STATE_TAKEOFF,
-                Landed::InAir => MavLandedState::MAV_LANDED_STATE_IN_AIR,
-                Landed::Landing => MavLandedState::MAV_LANDED_STATE_LANDING,
-            },
-            ..Default::default()
-        }
+        EXTENDED_SYS_STATE_DATA { landed_state: self.state.landed.into(), ..Default::default() }
     }
 
     fn system_status(&self) -> SYS_STATUS_DATA {
@@ -338,7 +326,7 @@ fn version() -> AUTOPILOT_VERSION_DATA {
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2,
-        flight_sw_version: DIALECT_VERSION,
+        flight_sw_version: px4::RELEASE,
         ..Default::default()
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::{Vector2, Vector3};
-use skein_mav::dialect::MavCmd;
+use skein_mav::messages::MavCmd;
 use skein_mav::{Datum, MissionItem};
 
 use super::modes::Situation;

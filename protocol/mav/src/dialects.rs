@@ -1,0 +1,20 @@
+//! The list of dialects, from which an autopilot's heartbeat chooses.
+
+mod ardupilot;
+pub mod px4;
+mod unknown;
+
+use mavlink::dialects::common::HEARTBEAT_DATA;
+
+use crate::dialect::Dialect;
+
+/// All makes of autopilot that can be commanded.
+pub static DIALECTS: [&dyn Dialect; 2] = [&px4::Px4, &ardupilot::ArduPilot];
+
+/// What an autopilot is taken to speak as long as no dialect of [`DIALECTS`] is recognised.
+pub(crate) static UNKNOWN: &dyn Dialect = &unknown::Unknown;
+
+/// The dialect of the autopilot that sent this heartbeat.
+pub(crate) fn of(heartbeat: &HEARTBEAT_DATA) -> &'static dyn Dialect {
+    DIALECTS.into_iter().find(|dialect| dialect.is_spoken_by(heartbeat)).unwrap_or(UNKNOWN)
+}
