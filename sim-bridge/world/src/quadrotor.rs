@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
+use skein_mav::Battery;
 
-use crate::sensors::{Battery, MotorCommands};
 use crate::vehicle::{GRAVITY_M_S2, VehicleModel};
 
 /// The simulation's time step: 250 per second.
@@ -29,7 +29,14 @@ pub struct RigidState {
     pub angular_rate: Vector3<f64>,
 }
 
-/// How a vehicle met the ground.
+/// Thrust demanded of each rotor as a share (0..1) of its full thrust.
+///
+/// Order: front-right, rear-left (counter-clockwise seen from above), front-left, rear-right
+/// (clockwise).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MotorCommands(pub [f64; 4]);
+
+/// The meeting of a vehicle with the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touchdown {
     /// Downward speed just before, m/s.

@@ -1,6 +1,7 @@
 //! What a vehicle's instruments say, with seeded noise.
 
 use nalgebra::Vector3;
+use skein_mav::Battery;
 
 use crate::lidar::{Surroundings, cast_ray};
 use crate::noise::Noise;
@@ -43,22 +44,6 @@ pub struct Gps {
     /// World ENU, m/s.
     pub velocity: Vector3<f64>,
 }
-
-/// State of the energy store.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Battery {
-    /// Energy left, 0..1 of full.
-    pub fraction: f64,
-    /// Voltage, V.
-    pub voltage_v: f64,
-}
-
-/// Thrust demanded of each rotor as a share (0..1) of its full thrust.
-///
-/// Order: front-right, rear-left (counter-clockwise seen from above), front-left, rear-right
-/// (clockwise).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct MotorCommands(pub [f64; 4]);
 
 /// An accelerometer reads no more than 16 g.
 const ACCELEROMETER_LIMIT_M_S2: f64 = 157.0;

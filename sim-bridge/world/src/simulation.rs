@@ -3,13 +3,14 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
+use skein_mav::Battery;
 
 use crate::autopilot::{Autopilot, AutopilotConfig};
 use crate::lidar::{Hull, Lidar, LidarScan, Surroundings};
 use crate::noise::Noise;
-use crate::quadrotor::{Quadrotor, RigidState, STEP};
+use crate::quadrotor::{MotorCommands, Quadrotor, RigidState, STEP};
 use crate::scene::Scene;
-use crate::sensors::{Battery, MotorCommands, SensorReadings, Sensors, is_due};
+use crate::sensors::{SensorReadings, Sensors, is_due};
 use crate::truth::{Player, Referee, Truth};
 use crate::vehicle::VehicleModel;
 use crate::wind::{Wind, WindConfig};

@@ -265,7 +265,7 @@ impl VehicleModel {
     }
 
     /// Where each rotor stands in the body frame (FLU, m), in the order of
-    /// [`MotorCommands`](crate::sensors::MotorCommands).
+    /// [`MotorCommands`](crate::quadrotor::MotorCommands).
     pub fn rotor_positions(&self) -> [Vector3<f64>; 4] {
         let reach = self.arm_m * std::f64::consts::FRAC_1_SQRT_2;
         [

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::sensors::MotorCommands;
+use crate::quadrotor::MotorCommands;
 use crate::vehicle::VehicleModel;
 
 /// Signs with which roll, pitch and yaw torque enter each rotor: front-right, rear-left (counter-clockwise),

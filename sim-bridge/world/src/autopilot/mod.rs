@@ -12,21 +12,24 @@ mod mixer;
 mod modes;
 mod parameters;
 mod position_control;
+mod situation;
 
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_mav::{Battery, Datum, Endpoint, EndpointConfig, ParameterTable, Request, VehicleState};
+use skein_mav::{Datum, Endpoint, EndpointConfig, ParameterTable, Request, VehicleState};
 
-use crate::sensors::{MotorCommands, SensorReadings};
+use crate::quadrotor::MotorCommands;
+use crate::sensors::SensorReadings;
 use crate::vehicle::VehicleModel;
 use attitude_control::AttitudeControl;
 use estimator::Estimator;
 use mixer::Mixer;
-use modes::{Drive, Modes, Situation, Sticks};
+use modes::{Drive, Modes, Sticks};
 use parameters::Settings;
 pub use parameters::default_parameters;
 use position_control::PositionControl;
+use situation::Situation;
 
 /// Share of full thrust of rotors that idle on the ground.
 const IDLE_SHARE: f64 = 0.05;
@@ -215,7 +218,7 @@ impl Autopilot {
             velocity: estimate.velocity,
             attitude: estimate.attitude,
             angular_rate: estimate.angular_rate,
-            battery: Battery { fraction: readings.battery.fraction, voltage_v: readings.battery.voltage_v },
+            battery: readings.battery,
             home: self.modes.home(),
             sensors_ok,
             ready_to_arm,

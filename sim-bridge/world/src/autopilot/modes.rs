@@ -9,29 +9,15 @@ mod tasks;
 use std::time::Duration;
 
 use nalgebra::{Vector2, Vector3};
-use skein_mav::{Datum, FlightMode, Landed, MissionItem, SetPoint, Severity, Stamped};
+use skein_mav::{FlightMode, Landed, SetPoint, Severity, Stamped};
 
-use super::estimator::Estimate;
 use super::mission::MissionFlight;
-use super::parameters::{FailsafeAction, Settings};
+use super::parameters::FailsafeAction;
 use super::position_control::Demand;
-use crate::sensors::SensorReadings;
+use super::situation::Situation;
 
 /// Within this of its height a climb is over, m.
 const HEIGHT_REACHED_M: f64 = 0.25;
-
-/// What decisions are made from.
-pub(super) struct Situation<'a> {
-    pub(super) now: Duration,
-    pub(super) estimate: &'a Estimate,
-    /// Why the estimate cannot be flown by, if so.
-    pub(super) readiness: Result<(), &'static str>,
-    pub(super) readings: &'a SensorReadings,
-    pub(super) settings: &'a Settings,
-    pub(super) datum: &'a Datum,
-    pub(super) mission: &'a [MissionItem],
-    pub(super) home: Vector3<f64>,
-}
 
 /// A pilot's sticks, each -1..1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use skein_mav::Severity;
 
-use super::{Charge, Failsafe, Modes, Situation, Task};
+use super::{Charge, Failsafe, Modes, Task};
 use crate::autopilot::parameters::FailsafeAction;
+use crate::autopilot::situation::Situation;
 
 /// After set-points are lost the vehicle holds this long before it does what is configured.
 const HOLD_BEFORE_ACTION: Duration = Duration::from_secs(1);
