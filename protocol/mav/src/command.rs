@@ -1,4 +1,4 @@
-//! What a companion can tell an autopilot to do, and what it answers.
+//! Commands of a companion to its autopilot, and the answers.
 
 use mavlink::dialects::common::MavResult;
 
@@ -25,7 +25,7 @@ pub enum Command {
     StartMission,
 }
 
-/// What became of a command.
+/// The outcome of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum CommandResult {
     /// It is being done.

@@ -34,7 +34,7 @@ const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
 /// MAVLink's component id for the first companion computer.
 const ONBOARD_COMPUTER: u8 = 191;
 
-/// Who the companion is, and where.
+/// The companion's identity and place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CompanionConfig {
     /// System id of the vehicle, which the companion shares.

@@ -11,7 +11,8 @@ use crate::parameter::{ParameterEncoding, ParameterValue};
 use crate::set_point::SetPoint;
 use crate::telemetry::Telemetry;
 
-/// How a companion speaks to one make of autopilot. A dialect keeps no state: one value serves every link.
+/// The language between a companion and one make of autopilot. It keeps no state: one value serves every
+/// link.
 pub trait Dialect: std::fmt::Debug + Send + Sync {
     /// Name of the make.
     fn name(&self) -> &'static str;
@@ -40,7 +41,7 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
         vec![Command::Arm, Command::Takeoff { height_m }]
     }
 
-    /// How long set-points must arrive before [`Command::Offboard`] is given.
+    /// The time for which set-points must arrive before [`Command::Offboard`] is given.
     fn set_points_before_offboard(&self) -> Duration {
         Duration::from_millis(300)
     }
@@ -54,7 +55,7 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
         kept_yaw: &mut Option<f64>,
     ) -> Option<SetPoint>;
 
-    /// How integers are written into parameter messages.
+    /// The way integers are written into parameter messages.
     fn parameter_encoding(&self) -> ParameterEncoding {
         ParameterEncoding::Bytewise
     }

@@ -11,7 +11,7 @@ use crate::dialect::Dialect;
 /// All makes of autopilot that can be commanded.
 pub static DIALECTS: [&dyn Dialect; 2] = [&px4::Px4, &ardupilot::ArduPilot];
 
-/// What an autopilot is taken to speak as long as no dialect of [`DIALECTS`] is recognised.
+/// The dialect of an autopilot as long as none of [`DIALECTS`] is recognised.
 pub(crate) static UNKNOWN: &dyn Dialect = &unknown::Unknown;
 
 /// The dialect of the autopilot that sent this heartbeat.

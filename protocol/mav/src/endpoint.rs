@@ -41,14 +41,13 @@ use streams::{Rate, Streams};
 /// Unread requests kept; a flood beyond them is dropped, and its commands are not acknowledged.
 const MAX_REQUESTS: usize = 64;
 
-/// Who the autopilot is, and where.
+/// The autopilot's identity and place.
 #[derive(Debug, Clone)]
 pub struct EndpointConfig {
     /// System id of the vehicle; the component is 1, the autopilot.
     pub system_id: u8,
     /// Datum of the world, which is also the origin of the autopilot's local frame.
     pub datum: Datum,
-    /// The autopilot's parameters.
     pub parameters: ParameterTable,
     /// Which mission items it can fly. An upload with another one is refused whole.
     pub accepts_item: fn(&MissionItem) -> bool,
@@ -76,7 +75,7 @@ pub struct Endpoint {
     reported: Option<Reported>,
 }
 
-/// What was last reported of the things whose change is told at once.
+/// The last report of the things whose change is told at once.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Reported {
     mode: FlightMode,

@@ -10,11 +10,7 @@ use crate::telemetry::Text;
 #[derive(Debug, Clone, PartialEq)]
 pub enum MavEvent {
     /// The autopilot answered a command, or it could not be sent.
-    CommandAcked {
-        command: Command,
-        /// Accepted, or why not.
-        result: CommandResult,
-    },
+    CommandAcked { command: Command, result: CommandResult },
     /// The autopilot never answered, for all repetitions. It may have obeyed.
     CommandTimedOut { command: Command },
     /// The flight mode changed, whoever asked for it.

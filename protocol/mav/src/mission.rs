@@ -25,9 +25,9 @@ pub const MAX_ITEMS: u16 = 2000;
 /// One item of a mission, in MAVLink's own terms so that what is read back is exactly what was sent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MissionItem {
-    /// What to do; a waypoint is `MAV_CMD_NAV_WAYPOINT`.
+    /// A waypoint is `MAV_CMD_NAV_WAYPOINT`.
     pub command: MavCmd,
-    /// What `x`, `y`, `z` mean.
+    /// The meaning of `x`, `y`, `z`.
     pub frame: MavFrame,
     /// The command's parameters 1 to 4. For a waypoint: seconds to stay, acceptance radius in metres, pass-by
     /// radius, heading in degrees clockwise from north (NaN: any).
@@ -158,7 +158,7 @@ pub enum MissionError {
     Superseded,
 }
 
-/// What the sending role says next.
+/// A message of the sending role.
 #[derive(Debug, PartialEq)]
 pub(crate) enum SenderMessage {
     Count(u16),
@@ -197,7 +197,7 @@ impl MissionSender {
         Some(SenderMessage::Item(seq, item))
     }
 
-    /// What was said last, to be said again.
+    /// The message sent last.
     pub(crate) fn repeat(&self) -> SenderMessage {
         let item = |seq| self.items.get(usize::from(seq)).map(|item| (seq, *item));
         match self.last_sent.and_then(item) {
@@ -215,7 +215,7 @@ impl MissionSender {
     }
 }
 
-/// What the receiving role says next.
+/// A message of the receiving role.
 #[derive(Debug, PartialEq)]
 pub(crate) enum ReceiverMessage {
     /// `MISSION_REQUEST_LIST`.
@@ -246,7 +246,7 @@ impl ReceiverMessage {
 /// The receiving role of a transfer.
 #[derive(Debug, Clone)]
 pub(crate) struct MissionReceiver {
-    /// How many items there are; `None` until the other end has said so.
+    /// Number of items; `None` until the other end has told it.
     count: Option<u16>,
     items: Vec<MissionItem>,
     patience: Patience,
@@ -291,7 +291,7 @@ impl MissionReceiver {
         self.items
     }
 
-    /// What to ask for now.
+    /// The request for what is missing.
     pub(crate) fn request(&self) -> ReceiverMessage {
         match self.count {
             None => ReceiverMessage::List,

@@ -1,6 +1,6 @@
 //! Flight modes by name. Their numbers are a matter of the [`Dialect`](crate::dialect::Dialect).
 
-/// What the autopilot is doing.
+/// A flight mode, named for what the autopilot does in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FlightMode {
     /// A companion computer's set-points are flown (PX4 OFFBOARD, ArduPilot GUIDED).

@@ -6,7 +6,7 @@ use mavlink::types::CharArray;
 /// Longest parameter name, in bytes.
 pub const MAX_NAME_LEN: usize = 16;
 
-/// How an integer is written into the field, which is a float.
+/// The way of writing an integer into the field, which is a float.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterEncoding {
     /// Its bytes are copied.

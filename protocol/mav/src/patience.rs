@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// How often something is said again.
+/// The rhythm of repetitions.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Retry {
     pub(crate) every: Duration,

@@ -14,7 +14,7 @@ use crate::geodesy::LocalFrame;
 pub enum SetPoint {
     /// Velocity in three axes.
     Velocity {
-        /// Velocity, m/s.
+        /// In m/s.
         velocity: Vector3<f64>,
         /// Heading, rad.
         yaw: Option<f64>,
@@ -31,7 +31,7 @@ pub enum SetPoint {
         yaw: Option<f64>,
     },
     Position {
-        /// Position, m.
+        /// In m.
         position: Vector3<f64>,
         /// Heading, rad.
         yaw: Option<f64>,

@@ -1,4 +1,4 @@
-//! What an autopilot says about its vehicle, in the world's terms.
+//! Telemetry: the state of a vehicle by its autopilot's word, in the world's terms.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -21,13 +21,12 @@ pub struct Stamped<T> {
 }
 
 impl<T> Stamped<T> {
-    /// How old the value is.
     pub fn age(&self, now: Duration) -> Duration {
         now.saturating_sub(self.stamp)
     }
 }
 
-/// Where the autopilot believes the vehicle to be between ground and air.
+/// Ground, air, or between, as the autopilot believes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Landed {
     /// Not said yet.
@@ -70,7 +69,7 @@ pub struct Battery {
     pub voltage_v: f64,
 }
 
-/// How serious a text is, most serious first (RFC 5424).
+/// Severity of a text, most serious first (RFC 5424).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// The system is unusable.
@@ -115,9 +114,7 @@ impl From<Severity> for MavSeverity {
 /// A line the autopilot wrote.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Text {
-    /// How serious it is.
     pub severity: Severity,
-    /// What it says.
     pub text: String,
 }
 
@@ -129,11 +126,9 @@ pub struct Telemetry {
     pub last_heartbeat: Option<Duration>,
     /// Whether heartbeats come. False before the first and after a pause of [`crate::HEARTBEAT_TIMEOUT`].
     pub connected: bool,
-    /// Whether the motors may turn.
+    /// The motors may turn.
     pub armed: bool,
-    /// What the autopilot is doing.
     pub mode: FlightMode,
-    /// Ground or air.
     pub landed: Landed,
     /// Position, m.
     pub position: Option<Stamped<Vector3<f64>>>,
@@ -161,7 +156,6 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// How many texts are kept.
     pub const MAX_TEXTS: usize = 16;
 
     /// Whether position, velocity and attitude are all younger than `limit`.

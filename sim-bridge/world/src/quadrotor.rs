@@ -13,7 +13,7 @@ pub const STEP: Duration = Duration::from_millis(4);
 const DT: f64 = 0.004;
 /// Friction of the legs on the ground.
 const GROUND_FRICTION: f64 = 0.8;
-/// How fast the legs put a tilted vehicle upright, s.
+/// Time in which the legs put a tilted vehicle upright, s.
 const GROUND_LEVELLING_TIME_S: f64 = 0.05;
 
 /// Position and motion of a rigid body.
@@ -127,7 +127,6 @@ impl Quadrotor {
         self.on_ground
     }
 
-    /// Whether the vehicle has crashed.
     pub fn wrecked(&self) -> bool {
         self.wrecked
     }
@@ -220,7 +219,7 @@ impl Quadrotor {
         (!was_on_ground).then_some(touchdown)
     }
 
-    /// What an accelerometer feels of the step, contact forces included.
+    /// Specific force of the step, contact forces included, as an accelerometer feels it.
     fn feel(&self, velocity_before: &Vector3<f64>) -> Vector3<f64> {
         let acceleration = (self.state.velocity - velocity_before) / DT;
         let gravity = Vector3::new(0.0, 0.0, -GRAVITY_M_S2);

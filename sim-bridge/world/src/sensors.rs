@@ -1,4 +1,4 @@
-//! What a vehicle's instruments say, with seeded noise.
+//! A vehicle's instruments, with seeded noise.
 
 use nalgebra::Vector3;
 use skein_mav::Battery;

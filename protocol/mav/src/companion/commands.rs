@@ -9,7 +9,7 @@ use crate::frame::FrameWriter;
 use crate::patience::{Patience, Retry, Turn};
 
 const RETRY: Retry = Retry { every: Duration::from_millis(400), times: 4 };
-/// How long a command "in progress" may take.
+/// A command "in progress" may take this long.
 const PROGRESS: Duration = Duration::from_secs(5);
 
 /// Why a command was sent.

@@ -22,7 +22,7 @@ const POSHOLD: u8 = 16;
 const BRAKE: u8 = 17;
 const SMART_RTL: u8 = 21;
 
-/// How quickly a height error is flown off where planar set-points must become velocities, 1/s.
+/// Gain from height error to climb where planar set-points become velocities, 1/s.
 const PLANAR_CLIMB_GAIN: f64 = 1.0;
 /// Fastest climb or descent then, m/s.
 const PLANAR_MAX_CLIMB_M_S: f64 = 1.5;

@@ -49,7 +49,7 @@ pub(super) const FAILSAFES_IF_PRESENT: [Failsafe; 2] = {
     [timeout.optional(), action.optional()]
 };
 
-/// What a vehicle does when set-points stop.
+/// The reaction of a vehicle to set-points that stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OffboardLoss {
     /// A pilot flies: position control.

@@ -15,8 +15,7 @@ pub(super) struct Missions {
     items: Vec<MissionItem>,
     accepts: fn(&MissionItem) -> bool,
     upload: Option<(Address, MissionReceiver)>,
-    /// Who uploaded the mission last: its acknowledgement may have been lost, and its last item then comes
-    /// again.
+    /// The last station that uploaded a mission. It repeats its last item if the acknowledgement was lost.
     last_uploader: Option<Address>,
 }
 

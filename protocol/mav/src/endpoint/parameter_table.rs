@@ -56,7 +56,7 @@ impl ParameterTable {
         Self { entries }
     }
 
-    /// How many there are.
+    /// Number of parameters.
     pub fn len(&self) -> usize {
         self.entries.len()
     }

@@ -22,11 +22,9 @@ use crate::telemetry::{Battery, Landed};
 /// An autopilot's state, as it reports it. Vectors are in the world's ENU frame unless they say body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VehicleState {
-    /// What it is doing.
     pub mode: FlightMode,
-    /// Whether the motors may turn.
+    /// The motors may turn.
     pub armed: bool,
-    /// Ground or air.
     pub landed: Landed,
     /// Position, m; `None` while it does not know.
     pub position: Option<Vector3<f64>>,

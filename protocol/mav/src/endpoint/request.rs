@@ -28,17 +28,14 @@ pub enum AutopilotCommand {
     /// Change the flight mode.
     SetMode(FlightMode),
     /// Fly to a place and stay there.
-    GoTo {
-        /// Where, m.
-        position: Vector3<f64>,
-    },
+    GoTo { position: Vector3<f64> },
     /// Fly this fast in the modes in which the autopilot chooses the speed itself.
     SetSpeed {
         /// Ground speed, m/s.
         speed_m_s: f64,
     },
     SetHome {
-        /// Where to, m; `None` for here.
+        /// In m; `None` for here.
         position: Option<Vector3<f64>>,
     },
     /// Continue the mission with this item, counted from 0.
@@ -61,16 +58,11 @@ pub enum Request {
     Command {
         /// To answer with.
         ticket: Ticket,
-        /// What is asked.
         command: AutopilotCommand,
         from: Address,
     },
     /// A set-point.
-    SetPoint {
-        set_point: SetPoint,
-        /// Who sends it.
-        from: Address,
-    },
+    SetPoint { set_point: SetPoint, from: Address },
     /// A pilot's sticks, each -1..1.
     Sticks {
         forward: f64,

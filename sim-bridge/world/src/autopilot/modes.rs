@@ -1,5 +1,4 @@
-//! Flight modes: what the vehicle is doing, who may change it, and what it does by itself when something is
-//! lost.
+//! Flight modes: the vehicle's task, the commands that change it, and the failsafes.
 
 mod commands;
 mod failsafes;
@@ -28,7 +27,7 @@ pub(super) struct Sticks {
     pub(super) turn_left: f64,
 }
 
-/// What the vehicle is doing, with all it needs for that.
+/// The vehicle's task, with all that it needs for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Task {
     Hold { position: Vector3<f64> },
@@ -56,7 +55,7 @@ enum Failsafe {
     Acting,
 }
 
-/// How far the battery is down.
+/// Stages of the battery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Charge {
     Good,
@@ -65,7 +64,7 @@ enum Charge {
     Emergency,
 }
 
-/// What the motors are to do.
+/// The motors' task.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Drive {
     Stopped,
@@ -86,7 +85,7 @@ pub(super) struct Modes {
     charge: Charge,
     inside_fence: bool,
     set_point: Option<Stamped<SetPoint>>,
-    /// How long before the newest set-point the one before came.
+    /// Time between the newest set-point and the one before.
     set_point_interval: Option<Duration>,
     sticks: Option<Stamped<Sticks>>,
     ground_distance: Option<Stamped<f64>>,
@@ -166,12 +165,12 @@ impl Modes {
         }
     }
 
-    /// What is to be told to the stations.
+    /// Takes the texts for the stations.
     pub(super) fn take_texts(&mut self) -> Vec<(Severity, String)> {
         std::mem::take(&mut self.texts)
     }
 
-    /// The mission items that have been reached.
+    /// Takes the mission items that have been reached.
     pub(super) fn take_items_reached(&mut self) -> Vec<usize> {
         std::mem::take(&mut self.items_reached)
     }

@@ -1,4 +1,4 @@
-//! What stations may have the vehicle do, and when it is refused.
+//! Commands of stations, and the reasons to refuse them.
 
 use std::time::Duration;
 

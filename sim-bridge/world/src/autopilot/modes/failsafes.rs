@@ -1,4 +1,4 @@
-//! What the vehicle does by itself when set-points, sticks, the fence or the battery are lost.
+//! Failsafes: set-points, sticks or the battery are lost, or the fence is left.
 
 use std::time::Duration;
 
