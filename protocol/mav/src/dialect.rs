@@ -12,7 +12,7 @@ use crate::set_point::SetPoint;
 use crate::telemetry::Telemetry;
 
 /// The language between a companion and one make of autopilot. It keeps no state: one value serves every
-/// link.
+/// link. What a method does unless a dialect says otherwise is right for a make of which nothing is known.
 pub trait Dialect: std::fmt::Debug + Send + Sync {
     /// Name of the make.
     fn name(&self) -> &'static str;
@@ -21,19 +21,28 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
     fn is_spoken_by(&self, heartbeat: &HEARTBEAT_DATA) -> bool;
 
     /// The mode behind the `custom_mode` of a heartbeat.
-    fn mode(&self, custom_mode: u32) -> FlightMode;
+    fn mode(&self, custom_mode: u32) -> FlightMode {
+        FlightMode::Other(custom_mode)
+    }
 
     /// Parameters 2 and 3 of `MAV_CMD_DO_SET_MODE`: main and sub-mode. `None` for a mode that the make does
     /// not have, or that no number leads to.
-    fn mode_numbers(&self, mode: FlightMode) -> Option<(u8, u8)>;
+    fn mode_numbers(&self, _mode: FlightMode) -> Option<(u8, u8)> {
+        None
+    }
 
     /// The command to climb to `height_m` above home, where home is `home_height_m` above the vertical
     /// reference.
     ///
     /// # Errors
     /// The reason why it cannot be sent.
-    fn take_off(&self, height_m: f64, home_height_m: Option<f64>)
-    -> Result<COMMAND_LONG_DATA, CommandResult>;
+    fn take_off(
+        &self,
+        _height_m: f64,
+        _home_height_m: Option<f64>,
+    ) -> Result<COMMAND_LONG_DATA, CommandResult> {
+        Err(CommandResult::NoAutopilot)
+    }
 
     /// The commands that bring a vehicle from the ground to its climb, in order. Each is given once the one
     /// before is acknowledged.
@@ -50,10 +59,12 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
     /// for a make that turns the nose unless told where it belongs. `None` if nothing can be sent.
     fn set_point(
         &self,
-        wish: SetPoint,
-        telemetry: &Telemetry,
-        kept_yaw: &mut Option<f64>,
-    ) -> Option<SetPoint>;
+        _wish: SetPoint,
+        _telemetry: &Telemetry,
+        _kept_yaw: &mut Option<f64>,
+    ) -> Option<SetPoint> {
+        None
+    }
 
     /// The way integers are written into parameter messages.
     fn parameter_encoding(&self) -> ParameterEncoding {

@@ -35,3 +35,9 @@ impl std::fmt::Display for FlightMode {
         })
     }
 }
+
+impl Default for FlightMode {
+    fn default() -> Self {
+        Self::Other(0)
+    }
+}

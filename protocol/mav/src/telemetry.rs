@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use mavlink::dialects::common::{MavLandedState, MavSeverity};
+use mavlink::dialects::common::MavSeverity;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::geodesy::Geodetic;
@@ -38,26 +38,6 @@ pub enum Landed {
     InAir,
     /// Coming down to the ground.
     Landing,
-}
-
-const LANDED: [(Landed, MavLandedState); 5] = [
-    (Landed::Unknown, MavLandedState::MAV_LANDED_STATE_UNDEFINED),
-    (Landed::OnGround, MavLandedState::MAV_LANDED_STATE_ON_GROUND),
-    (Landed::TakingOff, MavLandedState::MAV_LANDED_STATE_TAKEOFF),
-    (Landed::InAir, MavLandedState::MAV_LANDED_STATE_IN_AIR),
-    (Landed::Landing, MavLandedState::MAV_LANDED_STATE_LANDING),
-];
-
-impl From<MavLandedState> for Landed {
-    fn from(state: MavLandedState) -> Self {
-        LANDED.into_iter().find(|(_, known)| *known == state).map_or(Self::Unknown, |(own, _)| own)
-    }
-}
-
-impl From<Landed> for MavLandedState {
-    fn from(landed: Landed) -> Self {
-        LANDED.into_iter().find(|(own, _)| *own == landed).map(|(_, known)| known).unwrap_or_default()
-    }
 }
 
 /// State of the battery.
@@ -120,7 +100,7 @@ pub struct Text {
 
 /// The newest of everything heard from the autopilot. Vectors are in the world's ENU frame unless they say
 /// body.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Telemetry {
     /// When its last heartbeat came.
     pub last_heartbeat: Option<Duration>,
@@ -166,28 +146,5 @@ impl Telemetry {
             self.attitude.map(|attitude| attitude.age(now)),
         ];
         ages.iter().all(|age| age.is_some_and(|age| age < limit))
-    }
-}
-
-impl Default for Telemetry {
-    fn default() -> Self {
-        Self {
-            last_heartbeat: None,
-            connected: false,
-            armed: false,
-            mode: FlightMode::Other(0),
-            landed: Landed::Unknown,
-            position: None,
-            velocity: None,
-            attitude: None,
-            angular_rate: None,
-            battery: None,
-            home: None,
-            home_height_m: None,
-            local_origin: None,
-            sensors_ok: false,
-            ready_to_arm: false,
-            texts: VecDeque::new(),
-        }
     }
 }

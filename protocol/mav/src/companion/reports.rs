@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use mavlink::dialects::common::{
     ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA,
-    LOCAL_POSITION_NED_DATA, MavMessage, MavModeFlag, MavState, MavSysStatusSensor, STATUSTEXT_DATA,
-    SYS_STATUS_DATA,
+    LOCAL_POSITION_NED_DATA, MavLandedState, MavMessage, MavModeFlag, MavState, MavSysStatusSensor,
+    STATUSTEXT_DATA, SYS_STATUS_DATA,
 };
 use nalgebra::{Quaternion, UnitQuaternion};
 
@@ -48,7 +48,15 @@ impl Reports {
                 self.on_origin(Geodetic::from_e7(message.latitude, message.longitude, message.altitude));
             }
             MavMessage::HOME_POSITION(message) => self.on_home(message),
-            MavMessage::EXTENDED_SYS_STATE(message) => telemetry.landed = Landed::from(message.landed_state),
+            MavMessage::EXTENDED_SYS_STATE(message) => {
+                telemetry.landed = match message.landed_state {
+                    MavLandedState::MAV_LANDED_STATE_UNDEFINED => Landed::Unknown,
+                    MavLandedState::MAV_LANDED_STATE_ON_GROUND => Landed::OnGround,
+                    MavLandedState::MAV_LANDED_STATE_IN_AIR => Landed::InAir,
+                    MavLandedState::MAV_LANDED_STATE_TAKEOFF => Landed::TakingOff,
+                    MavLandedState::MAV_LANDED_STATE_LANDING => Landed::Landing,
+                };
+            }
             MavMessage::SYS_STATUS(message) => self.on_system_status(message),
             MavMessage::BATTERY_STATUS(message) => {
                 telemetry.battery =

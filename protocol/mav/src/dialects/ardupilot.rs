@@ -12,15 +12,18 @@ use crate::parameter::ParameterEncoding;
 use crate::set_point::SetPoint;
 use crate::telemetry::Telemetry;
 
-// Modes.
-const AUTO: u8 = 3;
-const GUIDED: u8 = 4;
-const LOITER: u8 = 5;
-const RTL: u8 = 6;
-const LAND: u8 = 9;
-const POSHOLD: u8 = 16;
-const BRAKE: u8 = 17;
-const SMART_RTL: u8 = 21;
+/// The modes that a number leads to. Take-off is a command given in GUIDED, not a mode.
+const MODES: [(FlightMode, u8); 6] = [
+    (FlightMode::Mission, 3),
+    // GUIDED
+    (FlightMode::Offboard, 4),
+    (FlightMode::Return, 6),
+    (FlightMode::Land, 9),
+    // POSHOLD
+    (FlightMode::Manual, 16),
+    // BRAKE. LOITER would read the absent throttle stick as "descend".
+    (FlightMode::Hold, 17),
+];
 
 /// Gain from height error to climb where planar set-points become velocities, 1/s.
 const PLANAR_CLIMB_GAIN: f64 = 1.0;
@@ -41,31 +44,20 @@ impl Dialect for ArduPilot {
     }
 
     fn mode(&self, custom_mode: u32) -> FlightMode {
-        match u8::try_from(custom_mode) {
-            Ok(GUIDED) => FlightMode::Offboard,
-            Ok(BRAKE) => FlightMode::Hold,
-            Ok(LAND) => FlightMode::Land,
-            Ok(RTL | SMART_RTL) => FlightMode::Return,
-            Ok(AUTO) => FlightMode::Mission,
-            // STABILIZE, ACRO, ALT_HOLD, LOITER, DRIFT, SPORT, POSHOLD: all follow the sticks.
-            Ok(0..=2 | LOITER | 11 | 13 | POSHOLD) => FlightMode::Manual,
-            _ => FlightMode::Other(custom_mode),
+        match custom_mode {
+            // STABILIZE, ACRO, ALT_HOLD, LOITER, DRIFT, SPORT: all follow the sticks.
+            0..=2 | 5 | 11 | 13 => FlightMode::Manual,
+            // SMART_RTL
+            21 => FlightMode::Return,
+            _ => MODES
+                .into_iter()
+                .find(|(_, number)| u32::from(*number) == custom_mode)
+                .map_or(FlightMode::Other(custom_mode), |(mode, _)| mode),
         }
     }
 
     fn mode_numbers(&self, mode: FlightMode) -> Option<(u8, u8)> {
-        let number = match mode {
-            FlightMode::Offboard => GUIDED,
-            // LOITER would read the absent throttle stick as "descend".
-            FlightMode::Hold => BRAKE,
-            FlightMode::Land => LAND,
-            FlightMode::Return => RTL,
-            FlightMode::Mission => AUTO,
-            FlightMode::Manual => POSHOLD,
-            // Take-off is a command given in GUIDED, not a mode.
-            FlightMode::Takeoff | FlightMode::Other(_) => return None,
-        };
-        Some((number, 0))
+        MODES.into_iter().find(|(known, _)| *known == mode).map(|(_, number)| (number, 0))
     }
 
     /// The height counts from home. The other parameters stay 0: NaN is not understood.

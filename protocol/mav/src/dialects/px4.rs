@@ -16,17 +16,19 @@ pub const OFFBOARD_LOSS_TIMEOUT: &str = "COM_OF_LOSS_T";
 /// Parameter: what the vehicle then does, by the numbers of [`OffboardLoss`].
 pub const OFFBOARD_LOSS_ACTION: &str = "COM_OBL_RC_ACT";
 
-// Main modes.
+/// Main and sub-mode of each mode.
+const MODES: [(FlightMode, (u8, u8)); 7] = [
+    (FlightMode::Manual, (POSITION_CONTROL, 0)),
+    (FlightMode::Takeoff, (AUTO, 2)),
+    (FlightMode::Hold, (AUTO, 3)),
+    (FlightMode::Mission, (AUTO, 4)),
+    (FlightMode::Return, (AUTO, 5)),
+    (FlightMode::Land, (AUTO, 6)),
+    (FlightMode::Offboard, (OFFBOARD, 0)),
+];
 const POSITION_CONTROL: u8 = 3;
-/// Its sub-modes follow.
 const AUTO: u8 = 4;
 const OFFBOARD: u8 = 6;
-// Sub-modes of AUTO.
-const TAKEOFF: u8 = 2;
-const LOITER: u8 = 3;
-const MISSION: u8 = 4;
-const RETURN: u8 = 5;
-const LAND: u8 = 6;
 
 const FAILSAFES: [Failsafe; 2] = [
     Failsafe {
@@ -49,7 +51,7 @@ pub(super) const FAILSAFES_IF_PRESENT: [Failsafe; 2] = {
     [timeout.optional(), action.optional()]
 };
 
-/// The reaction of a vehicle to set-points that stop.
+/// The reaction of a vehicle to set-points that stop, in the order of the numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OffboardLoss {
     /// A pilot flies: position control.
@@ -68,17 +70,9 @@ pub enum OffboardLoss {
 impl OffboardLoss {
     /// The action with this number of the parameter.
     pub fn from_number(number: f64) -> Option<Self> {
-        const BY_NUMBER: [OffboardLoss; 8] = [
-            OffboardLoss::Position,
-            OffboardLoss::Altitude,
-            OffboardLoss::Manual,
-            OffboardLoss::Return,
-            OffboardLoss::Land,
-            OffboardLoss::Hold,
-            OffboardLoss::Terminate,
-            OffboardLoss::Disarm,
-        ];
-        (number >= 0.0 && number.fract() == 0.0).then(|| BY_NUMBER.get(number as usize).copied()).flatten()
+        use OffboardLoss::{Altitude, Disarm, Hold, Land, Manual, Position, Return, Terminate};
+        let by_number = [Position, Altitude, Manual, Return, Land, Hold, Terminate, Disarm];
+        by_number.into_iter().find(|action| f64::from(*action as u8) == number)
     }
 
     /// Whether a vehicle without a pilot falls.
@@ -105,16 +99,7 @@ impl Dialect for Px4 {
     }
 
     fn mode_numbers(&self, mode: FlightMode) -> Option<(u8, u8)> {
-        Some(match mode {
-            FlightMode::Offboard => (OFFBOARD, 0),
-            FlightMode::Takeoff => (AUTO, TAKEOFF),
-            FlightMode::Hold => (AUTO, LOITER),
-            FlightMode::Land => (AUTO, LAND),
-            FlightMode::Return => (AUTO, RETURN),
-            FlightMode::Mission => (AUTO, MISSION),
-            FlightMode::Manual => (POSITION_CONTROL, 0),
-            FlightMode::Other(_) => return None,
-        })
+        MODES.into_iter().find(|(known, _)| *known == mode).map(|(_, numbers)| numbers)
     }
 
     /// The height is absolute. NaN stands for "here" and "this heading".
@@ -151,17 +136,12 @@ pub(crate) fn mode(custom_mode: u32) -> FlightMode {
 
 /// The mode with this main and sub-mode.
 pub(crate) fn mode_of(main: u8, sub: u8) -> Option<FlightMode> {
-    Some(match (main, sub) {
-        (OFFBOARD, _) => FlightMode::Offboard,
-        (AUTO, TAKEOFF) => FlightMode::Takeoff,
-        (AUTO, LOITER) => FlightMode::Hold,
-        (AUTO, MISSION) => FlightMode::Mission,
-        (AUTO, RETURN) => FlightMode::Return,
-        (AUTO, LAND) => FlightMode::Land,
+    match main {
+        OFFBOARD => Some(FlightMode::Offboard),
         // MANUAL, ALTCTL, POSCTL, ACRO, STABILIZED, RATTITUDE: a pilot's stick modes.
-        (1 | 2 | POSITION_CONTROL | 5 | 7 | 8, _) => FlightMode::Manual,
-        _ => return None,
-    })
+        1 | 2 | POSITION_CONTROL | 5 | 7 | 8 => Some(FlightMode::Manual),
+        _ => MODES.into_iter().find(|(_, numbers)| *numbers == (main, sub)).map(|(mode, _)| mode),
+    }
 }
 
 /// The `custom_mode` of a heartbeat in this mode.

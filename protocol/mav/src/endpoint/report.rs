@@ -7,8 +7,9 @@ use mavlink::dialects::common::{
     ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA,
     EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA, GpsFixType,
     HEARTBEAT_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, MISSION_CURRENT_DATA, MavAutopilot,
-    MavBatteryChargeState, MavBatteryFunction, MavBatteryType, MavModeFlag, MavProtocolCapability, MavState,
-    MavSysStatusSensor, MavType, MissionState, SYS_STATUS_DATA, VFR_HUD_DATA,
+    MavBatteryChargeState, MavBatteryFunction, MavBatteryType, MavLandedState, MavModeFlag,
+    MavProtocolCapability, MavState, MavSysStatusSensor, MavType, MissionState, SYS_STATUS_DATA,
+    VFR_HUD_DATA,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -145,7 +146,16 @@ impl Report<'_> {
     }
 
     fn extended_state(&self) -> EXTENDED_SYS_STATE_DATA {
-        EXTENDED_SYS_STATE_DATA { landed_state: self.state.landed.into(), ..Default::default() }
+        EXTENDED_SYS_STATE_DATA {
+            landed_state: match self.state.landed {
+                Landed::Unknown => MavLandedState::MAV_LANDED_STATE_UNDEFINED,
+                Landed::OnGround => MavLandedState::MAV_LANDED_STATE_ON_GROUND,
+                Landed::TakingOff => MavLandedState::MAV_LANDED_STATE_TAKEOFF,
+                Landed::InAir => MavLandedState::MAV_LANDED_STATE_IN_AIR,
+                Landed::Landing => MavLandedState::MAV_LANDED_STATE_LANDING,
+            },
+            ..Default::default()
+        }
     }
 
     fn system_status(&self) -> SYS_STATUS_DATA {

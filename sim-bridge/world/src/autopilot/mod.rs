@@ -102,7 +102,7 @@ impl Autopilot {
             datum: config.datum,
             settings: Settings::read(&config.parameters),
             estimator: Estimator::new(model),
-            modes: Modes::new(),
+            modes: Modes::default(),
             position_control: PositionControl::new(model, attitude_control.bandwidth()),
             attitude_control,
             mixer: Mixer::new(model),

@@ -39,6 +39,12 @@ enum Task {
     Manual,
 }
 
+impl Default for Task {
+    fn default() -> Self {
+        Self::Hold { position: Vector3::zeros() }
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ReturnLeg {
     Climb { over: Vector2<f64>, z: f64 },
@@ -56,8 +62,9 @@ enum Failsafe {
 }
 
 /// Stages of the battery.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 enum Charge {
+    #[default]
     Good,
     Low,
     Critical,
@@ -75,7 +82,7 @@ pub(super) enum Drive {
 }
 
 /// The state machine.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Modes {
     task: Task,
     armed: bool,
@@ -83,7 +90,7 @@ pub(super) struct Modes {
     home: Option<Vector3<f64>>,
     failsafe: Option<Failsafe>,
     charge: Charge,
-    inside_fence: bool,
+    outside_fence: bool,
     set_point: Option<Stamped<SetPoint>>,
     /// Time between the newest set-point and the one before.
     set_point_interval: Option<Duration>,
@@ -101,28 +108,6 @@ pub(super) struct Modes {
 }
 
 impl Modes {
-    pub(super) fn new() -> Self {
-        Self {
-            task: Task::Hold { position: Vector3::zeros() },
-            armed: false,
-            airborne: false,
-            home: None,
-            failsafe: None,
-            charge: Charge::Good,
-            inside_fence: true,
-            set_point: None,
-            set_point_interval: None,
-            sticks: None,
-            ground_distance: None,
-            contact_since: None,
-            standing: None,
-            speed: None,
-            mission_item: 0,
-            texts: Vec::new(),
-            items_reached: Vec::new(),
-        }
-    }
-
     pub(super) fn mode(&self) -> FlightMode {
         match self.task {
             Task::Hold { .. } => FlightMode::Hold,

@@ -88,7 +88,7 @@ impl Modes {
             self.standing = None;
             self.failsafe = None;
             // Whatever was under way must not begin anew by itself at the next arming.
-            self.task = Task::Hold { position: Vector3::zeros() };
+            self.task = Task::default();
             self.tell(Severity::Info, text);
         }
     }
