@@ -354,8 +354,7 @@ impl AgentCore {
     fn follow_autopilot(&mut self, now: Duration) {
         self.failsafes.ask(&mut self.companion);
         while let Some(event) = self.companion.poll_event() {
-            let autopilot = self.companion.telemetry().autopilot;
-            self.failsafes.hear(&event, autopilot);
+            self.failsafes.hear(&event, self.companion.dialect());
             if let Some(event) = self.flight.hear(now, &event, &mut self.companion) {
                 self.report(now, event);
             }

@@ -10,8 +10,6 @@ use skein_wire::vocabulary::{
 
 use crate::me::Me;
 
-/// Set-points must reach the autopilot for this long before it may be asked for offboard mode.
-const SET_POINTS_BEFORE_OFFBOARD: Duration = Duration::from_millis(300);
 /// The command to land is repeated this often while the autopilot does something else.
 const REPEAT_LAND: Duration = Duration::from_secs(2);
 /// A vehicle that is to land goes to a better place for it for so long at most.
@@ -116,7 +114,7 @@ impl Flight {
             (Some(TAKEOFF), FlightPhase::Grounded) => {
                 self.phase = FlightPhase::Arming;
                 self.left_ground = false;
-                companion.command(now, Command::Arm);
+                self.launch(now, None, companion);
             }
             // Where, is seen before the tick is over: see `touch_down`.
             (Some(LAND), FlightPhase::Flying) => {
@@ -128,6 +126,21 @@ impl Flight {
             (Some(HOLD), FlightPhase::Adopted) => companion.command(now, Command::Hold),
             (Some(HAND_BACK), FlightPhase::Taken) => self.engage(now),
             _ => {}
+        }
+    }
+
+    /// Gives the command that follows `done` on the way from the ground to the climb, in the order of the autopilot.
+    fn launch(&mut self, now: Duration, done: Option<Command>, companion: &mut Companion) {
+        let commands = companion.dialect().launch(self.takeoff_height_m);
+        let next = match done {
+            None => commands.first(),
+            Some(done) => commands.iter().skip_while(|command| **command != done).nth(1),
+        };
+        if let Some(next) = next {
+            if matches!(next, Command::Takeoff { .. }) {
+                self.phase = FlightPhase::Climbing;
+            }
+            companion.command(now, *next);
         }
     }
 
@@ -169,14 +182,12 @@ impl Flight {
     /// Hears what the autopilot reports; returns what the b-threads should hear of it.
     pub fn hear(&mut self, now: Duration, event: &MavEvent, companion: &mut Companion) -> Option<Event> {
         match event {
-            MavEvent::CommandAcked { command: Command::Arm, result: CommandResult::Accepted } => {
+            MavEvent::CommandAcked { command, result: CommandResult::Accepted } => {
                 if self.phase == FlightPhase::Arming {
-                    self.phase = FlightPhase::Climbing;
-                    companion.command(now, Command::Takeoff { height_m: self.takeoff_height_m });
+                    self.launch(now, Some(*command), companion);
                 }
                 None
             }
-            MavEvent::CommandAcked { result: CommandResult::Accepted, .. } => None,
             MavEvent::CommandAcked { command, result } => {
                 self.command_failed(now, *command, &result.to_string())
             }
@@ -255,7 +266,9 @@ impl Flight {
             FlightPhase::Climbing if height_m >= self.takeoff_height_m - TAKEOFF_TOLERANCE_M => {
                 self.engage(now)
             }
-            FlightPhase::Engaging { since, asked: false } if now >= since + SET_POINTS_BEFORE_OFFBOARD => {
+            FlightPhase::Engaging { since, asked: false }
+                if now >= since + companion.dialect().set_points_before_offboard() =>
+            {
                 companion.command(now, Command::Offboard);
                 self.phase = FlightPhase::Engaging { since, asked: true };
             }

@@ -5,6 +5,11 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI, TAU};
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
+/// A vector from the single precision of messages.
+pub(crate) fn vector(x: f32, y: f32, z: f32) -> Vector3<f64> {
+    Vector3::new(f64::from(x), f64::from(y), f64::from(z))
+}
+
 /// A world vector, ENU to NED.
 pub fn enu_to_ned(v: &Vector3<f64>) -> Vector3<f64> {
     Vector3::new(v.y, v.x, -v.z)

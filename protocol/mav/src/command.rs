@@ -1,8 +1,6 @@
-//! What a companion can tell an autopilot to do, and what it answers.
+//! Commands of a companion to its autopilot, and the answers.
 
-use mavlink::dialects::common::{COMMAND_LONG_DATA, MavCmd, MavResult};
-
-use crate::mode::{AutopilotKind, FlightMode};
+use mavlink::dialects::common::MavResult;
 
 /// A command to the autopilot.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +25,7 @@ pub enum Command {
     StartMission,
 }
 
-/// What became of a command.
+/// The outcome of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum CommandResult {
     /// It is being done.
@@ -95,65 +93,4 @@ impl CommandResult {
             Self::NotInControl => MavResult::MAV_RESULT_NOT_IN_CONTROL,
         }
     }
-}
-
-impl Command {
-    /// The message that gives this command to an autopilot of this kind. `home_height_m` is the height of
-    /// home above the vertical reference.
-    ///
-    /// # Errors
-    /// The reason why it cannot be sent yet.
-    pub(crate) fn encode(
-        self,
-        kind: AutopilotKind,
-        home_height_m: Option<f64>,
-    ) -> Result<COMMAND_LONG_DATA, CommandResult> {
-        let mode = |mode: FlightMode| set_mode(kind, mode).ok_or(CommandResult::NoAutopilot);
-        match self {
-            Self::Arm => Ok(arm(1.0)),
-            Self::Disarm => Ok(arm(0.0)),
-            Self::Takeoff { height_m } if !height_m.is_finite() => Err(CommandResult::NotFinite),
-            Self::Takeoff { height_m } => match kind {
-                AutopilotKind::Px4 => {
-                    let home = home_height_m.ok_or(CommandResult::NoHome)?;
-                    Ok(take_off(f32::NAN, home + height_m))
-                }
-                AutopilotKind::ArduPilot => Ok(take_off(0.0, height_m)),
-                AutopilotKind::Other => Err(CommandResult::NoAutopilot),
-            },
-            Self::Offboard => mode(FlightMode::Offboard),
-            Self::Land => mode(FlightMode::Land),
-            Self::Return => mode(FlightMode::Return),
-            Self::Hold => mode(FlightMode::Hold),
-            Self::StartMission => mode(FlightMode::Mission),
-        }
-    }
-}
-
-fn arm(param1: f32) -> COMMAND_LONG_DATA {
-    COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, param1, ..Default::default() }
-}
-
-/// `here` is what the autopilot reads as "at this place, with this heading": NaN for PX4, 0 for ArduPilot.
-fn take_off(here: f32, height_m: f64) -> COMMAND_LONG_DATA {
-    COMMAND_LONG_DATA {
-        command: MavCmd::MAV_CMD_NAV_TAKEOFF,
-        param4: here,
-        param5: here,
-        param6: here,
-        param7: height_m as f32,
-        ..Default::default()
-    }
-}
-
-fn set_mode(kind: AutopilotKind, mode: FlightMode) -> Option<COMMAND_LONG_DATA> {
-    let (main, sub) = mode.set_mode_params(kind)?;
-    Some(COMMAND_LONG_DATA {
-        command: MavCmd::MAV_CMD_DO_SET_MODE,
-        // MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-        param1: 1.0,
-        param2: f32::from(main),
-        param3: f32::from(sub),
-        ..Default::default()
-    })
 }

@@ -3,131 +3,54 @@
 mod calls;
 mod missions;
 mod parameter_table;
+mod parameters;
 mod report;
+mod request;
 mod streams;
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use mavlink::MessageData;
 use mavlink::dialects::common::{
     AUTOPILOT_VERSION_DATA, COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA,
-    MANUAL_CONTROL_DATA, MESSAGE_INTERVAL_DATA, MISSION_CURRENT_DATA, MISSION_ITEM_REACHED_DATA, MavCmd,
-    MavMessage, MavModeFlag, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
+    MANUAL_CONTROL_DATA, MESSAGE_INTERVAL_DATA, MISSION_CURRENT_DATA, MISSION_ITEM_REACHED_DATA,
+    MISSION_REQUEST_DATA, MISSION_REQUEST_INT_DATA, MavCmd, MavMessage, MavModeFlag, PARAM_SET_DATA,
     PROTOCOL_VERSION_DATA, SET_MODE_DATA, STATUSTEXT_DATA,
 };
 use mavlink::types::CharArray;
-use mavlink::{Message, MessageData};
 use nalgebra::Vector3;
 
 use crate::command::CommandResult;
+use crate::dialects::px4;
 use crate::frame::{Address, Frame, FrameReader, FrameWriter};
 use crate::geodesy::{Datum, LocalFrame};
 use crate::mission::MissionItem;
-use crate::mode::{AutopilotKind, FlightMode};
-use crate::parameter::{ParameterValue, name_from_wire, wire_name};
+use crate::mode::FlightMode;
 use crate::set_point::SetPoint;
 use crate::telemetry::{Landed, Severity};
 use calls::{Call, Novelty, Remembered};
 use missions::Missions;
 pub use parameter_table::{Parameter, ParameterError, ParameterTable};
+use parameters::Parameters;
 use report::Report;
 pub use report::VehicleState;
+pub use request::{AutopilotCommand, Request, Ticket};
 use streams::{Rate, Streams};
 
-/// How many parameters of a list are sent at each report, so that a list does not crowd out telemetry.
-const LISTED_PER_REPORT: usize = 2;
 /// Unread requests kept; a flood beyond them is dropped, and its commands are not acknowledged.
 const MAX_REQUESTS: usize = 64;
 
-/// Who the autopilot is, and where.
+/// The autopilot's identity and place.
 #[derive(Debug, Clone)]
 pub struct EndpointConfig {
     /// System id of the vehicle; the component is 1, the autopilot.
     pub system_id: u8,
     /// Datum of the world, which is also the origin of the autopilot's local frame.
     pub datum: Datum,
-    /// The autopilot's parameters.
     pub parameters: ParameterTable,
     /// Which mission items it can fly. An upload with another one is refused whole.
     pub accepts_item: fn(&MissionItem) -> bool,
-}
-
-/// A command to the vehicle. Positions and heights are in the world's ENU frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum AutopilotCommand {
-    /// Let the motors turn.
-    Arm {
-        /// Without the checks.
-        force: bool,
-    },
-    /// Stop the motors.
-    Disarm {
-        /// Even in the air.
-        force: bool,
-    },
-    /// Climb straight up.
-    Takeoff {
-        /// World height to climb to, m; `None` for the autopilot's own.
-        z_m: Option<f64>,
-    },
-    /// Change the flight mode.
-    SetMode(FlightMode),
-    /// Fly to a place and stay there.
-    GoTo {
-        /// Where, m.
-        position: Vector3<f64>,
-    },
-    /// Fly this fast in the modes in which the autopilot chooses the speed itself.
-    SetSpeed {
-        /// Ground speed, m/s.
-        speed_m_s: f64,
-    },
-    SetHome {
-        /// Where to, m; `None` for here.
-        position: Option<Vector3<f64>>,
-    },
-    /// Continue the mission with this item, counted from 0.
-    SetMissionItem(u16),
-}
-
-/// The right and duty to answer one command.
-#[derive(Debug, PartialEq)]
-pub struct Ticket {
-    from: Address,
-    command: MavCmd,
-    /// Some messages of old ask for something and expect no acknowledgement.
-    acknowledged: bool,
-}
-
-/// Something a station asks of the autopilot.
-#[derive(Debug, PartialEq)]
-pub enum Request {
-    /// A command, to be answered through [`Endpoint::answer`].
-    Command {
-        /// To answer with.
-        ticket: Ticket,
-        /// What is asked.
-        command: AutopilotCommand,
-        from: Address,
-    },
-    /// A set-point.
-    SetPoint {
-        set_point: SetPoint,
-        /// Who sends it.
-        from: Address,
-    },
-    /// A pilot's sticks, each -1..1.
-    Sticks {
-        forward: f64,
-        left: f64,
-        up: f64,
-        /// Counter-clockwise from above.
-        turn_left: f64,
-    },
-    /// A station set a parameter; the table has its value.
-    ParameterChanged { name: &'static str },
-    /// The mission was replaced or cleared.
-    MissionChanged,
 }
 
 /// The autopilot's end of the link: several stations (a companion, a ground-control program) may talk to it
@@ -137,22 +60,22 @@ pub enum Request {
 /// here; the rest comes out of [`Endpoint::next_request`] as typed wishes.
 #[derive(Debug)]
 pub struct Endpoint {
-    config: EndpointConfig,
+    datum: Datum,
+    /// The autopilot's local frame; its origin is the datum.
     local: LocalFrame,
     reader: FrameReader,
     writer: FrameWriter,
     streams: Streams,
+    parameters: Parameters,
     missions: Missions,
     remembered: Remembered,
     requests: VecDeque<Request>,
-    /// Index of the next parameter of a list under way.
-    listing: Option<usize>,
     /// Messages asked for once, sent with the next report.
     asked_once: Vec<u32>,
     reported: Option<Reported>,
 }
 
-/// What was last reported of the things whose change is told at once.
+/// The last report of the things whose change is told at once.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Reported {
     mode: FlightMode,
@@ -180,17 +103,17 @@ impl Endpoint {
     /// An autopilot's end that has heard nothing yet.
     pub fn new(config: EndpointConfig) -> Self {
         Self {
+            datum: config.datum,
             local: LocalFrame::new(&config.datum, &config.datum.place()),
             reader: FrameReader::default(),
             writer: FrameWriter::new(Address::autopilot(config.system_id)),
             streams: Streams::default(),
+            parameters: Parameters::new(config.parameters),
             missions: Missions::new(config.accepts_item),
             remembered: Remembered::default(),
             requests: VecDeque::new(),
-            listing: None,
             asked_once: Vec::new(),
             reported: None,
-            config,
         }
     }
 
@@ -198,13 +121,7 @@ impl Endpoint {
     pub fn receive(&mut self, now: Duration, bytes: &[u8]) {
         self.reader.push(bytes);
         while let Some(frame) = self.reader.next_frame() {
-            let message = &frame.message;
-            let for_me = message.target_system_id().is_some_and(|system| {
-                let component = message.target_component_id().unwrap_or(0);
-                self.writer.sender().is_target(system, component)
-            });
-            // MANUAL_CONTROL names its target differently.
-            if for_me || matches!(message, MavMessage::MANUAL_CONTROL(_)) {
+            if self.writer.sender().is_addressed_by(&frame.message) {
                 self.handle(now, &frame);
             }
         }
@@ -227,11 +144,11 @@ impl Endpoint {
     pub fn report(&mut self, now: Duration, state: &VehicleState) {
         self.hurry_changes(state);
         self.missions.tick(now, &mut self.writer);
-        self.list_parameters();
+        self.parameters.list(&mut self.writer);
         let report = Report {
             now,
             state,
-            datum: &self.config.datum,
+            datum: &self.datum,
             local: &self.local,
             mission_len: self.missions.items().len(),
         };
@@ -260,7 +177,7 @@ impl Endpoint {
     }
 
     pub fn parameters(&self) -> &ParameterTable {
-        &self.config.parameters
+        &self.parameters.table
     }
 
     pub fn mission(&self) -> &[MissionItem] {
@@ -290,17 +207,15 @@ impl Endpoint {
                 }
             }
             MavMessage::MANUAL_CONTROL(message) => self.on_sticks(message),
-            MavMessage::PARAM_REQUEST_LIST(_) => self.listing = Some(0),
-            MavMessage::PARAM_REQUEST_READ(message) => self.on_parameter_read(message),
+            MavMessage::PARAM_REQUEST_LIST(_) => self.parameters.begin_list(),
+            MavMessage::PARAM_REQUEST_READ(message) => self.parameters.read(message, output),
             MavMessage::PARAM_SET(message) => self.on_parameter_set(message),
             MavMessage::MISSION_REQUEST_LIST(message) => {
                 self.missions.on_list(from, message.mission_type, output);
             }
-            MavMessage::MISSION_REQUEST_INT(message) => {
-                self.missions.on_request(from, message.mission_type, message.seq, output);
-            }
-            MavMessage::MISSION_REQUEST(message) => {
-                self.missions.on_request(from, message.mission_type, message.seq, output);
+            MavMessage::MISSION_REQUEST_INT(MISSION_REQUEST_INT_DATA { mission_type, seq, .. })
+            | MavMessage::MISSION_REQUEST(MISSION_REQUEST_DATA { mission_type, seq, .. }) => {
+                self.missions.on_request(from, *mission_type, *seq, output);
             }
             MavMessage::MISSION_COUNT(message) => {
                 let changed = self.missions.on_count(now, from, message, output);
@@ -354,7 +269,7 @@ impl Endpoint {
         }
         let home_z_m = self.reported.and_then(|reported| reported.home).map_or(0.0, |home| home.z);
         let ticket = Ticket { from: call.from, command: call.command, acknowledged: true };
-        match call.meaning(&self.config.datum, home_z_m) {
+        match call.meaning(&self.datum, home_z_m) {
             Ok(command) => self.push(Request::Command { ticket, command, from: call.from }),
             Err(result) => self.answer(ticket, result),
         }
@@ -418,7 +333,7 @@ impl Endpoint {
 
     fn on_set_mode(&mut self, from: Address, message: &SET_MODE_DATA) {
         let custom = MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED;
-        let mode = FlightMode::from_custom(AutopilotKind::Px4, message.custom_mode);
+        let mode = px4::mode(message.custom_mode);
         if message.base_mode.contains(custom) && !matches!(mode, FlightMode::Other(_)) {
             self.push_unacknowledged(from, AutopilotCommand::SetMode(mode));
         }
@@ -431,67 +346,19 @@ impl Endpoint {
             _ => 0.0,
         };
         let up = if (0..=1000).contains(&message.z) { f64::from(message.z) / 500.0 - 1.0 } else { 0.0 };
-        if message.target == self.config.system_id || message.target == 0 {
-            self.push(Request::Sticks {
-                forward: axis(message.x),
-                left: -axis(message.y),
-                up,
-                turn_left: -axis(message.r),
-            });
-        }
+        self.push(Request::Sticks {
+            forward: axis(message.x),
+            left: -axis(message.y),
+            up,
+            turn_left: -axis(message.r),
+        });
     }
 
-    fn on_parameter_read(&mut self, message: &PARAM_REQUEST_READ_DATA) {
-        let table = &self.config.parameters;
-        let index = match usize::try_from(message.param_index) {
-            Ok(index) => Some(index),
-            Err(_) => table.find(name_from_wire(&message.param_id)).map(|(index, _)| index),
-        };
-        if let Some(index) = index {
-            self.send_parameter(index);
-        }
-    }
-
-    /// Sets a parameter and tells its value, also when it was refused and kept the old one.
     fn on_parameter_set(&mut self, message: &PARAM_SET_DATA) {
-        let name = name_from_wire(&message.param_id);
-        let value = ParameterValue::decode(message.param_value, message.param_type, AutopilotKind::Px4);
-        let outcome = self.config.parameters.set(name, value);
-        if let Some((index, entry)) = self.config.parameters.find(name) {
-            let name = entry.name;
-            self.send_parameter(index);
-            if outcome.is_ok() {
-                self.push(Request::ParameterChanged { name });
-            }
+        match self.parameters.set(message, &mut self.writer) {
+            Ok(name) => self.push(Request::ParameterChanged { name }),
+            Err(error) => self.text(Severity::Warning, &error.to_string()),
         }
-        if let Err(error) = outcome {
-            self.text(Severity::Warning, &error.to_string());
-        }
-    }
-
-    fn send_parameter(&mut self, index: usize) {
-        let table = &self.config.parameters;
-        if let Some(entry) = table.at(index) {
-            let (param_value, param_type) = entry.value.encode(AutopilotKind::Px4);
-            self.writer.write(&PARAM_VALUE_DATA {
-                param_value,
-                param_count: table.len() as u16,
-                param_index: index as u16,
-                param_id: wire_name(entry.name),
-                param_type,
-            });
-        }
-    }
-
-    fn list_parameters(&mut self) {
-        let Some(first) = self.listing else {
-            return;
-        };
-        let end = first + LISTED_PER_REPORT;
-        for index in first..end {
-            self.send_parameter(index);
-        }
-        self.listing = (end < self.config.parameters.len()).then_some(end);
     }
 
     fn hurry_changes(&mut self, state: &VehicleState) {

@@ -3,7 +3,7 @@
 use mavlink::dialects::common::MavMessage;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc, consts};
 
-/// Who speaks: a MAVLink system and one component of it.
+/// A sender or receiver: a MAVLink system and one component of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Address {
     /// System id, 1..=255. Vehicles have one each; ground stations use 255 downwards.
@@ -22,6 +22,12 @@ impl Address {
     pub fn is_target(&self, target_system: u8, target_component: u8) -> bool {
         (target_system == 0 || target_system == self.system_id)
             && (target_component == 0 || target_component == self.component_id)
+    }
+
+    /// Whether a message names a target, and this address is meant.
+    pub(crate) fn is_addressed_by(&self, message: &MavMessage) -> bool {
+        let component = message.target_component_id().unwrap_or(0);
+        message.target_system_id().is_some_and(|system| self.is_target(system, component))
     }
 }
 
@@ -61,7 +67,7 @@ pub struct FrameReader {
     unknown_messages: u64,
 }
 
-/// What the front of the buffer holds.
+/// The front of the buffer.
 enum Candidate {
     /// Not a frame: skip one byte.
     Garbage,
@@ -71,7 +77,7 @@ enum Candidate {
     Intact(Layout),
 }
 
-/// Where things are in an intact frame.
+/// The layout of an intact frame.
 struct Layout {
     version: MavlinkVersion,
     sender: Address,
@@ -197,7 +203,6 @@ impl FrameWriter {
         Self { sender, sequence: 0, buffer: Vec::new() }
     }
 
-    /// Who the frames are from.
     pub fn sender(&self) -> Address {
         self.sender
     }

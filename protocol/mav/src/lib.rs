@@ -1,8 +1,8 @@
 //! MAVLink without I/O: frames, set-points, commands, mission and parameter protocols, at both ends of the
 //! link.
 //!
-//! - [`Companion`] is the end of a vehicle's program. It flies PX4, ArduPilot and Skein's built-in autopilot,
-//!   and learns from the heartbeat which of them it is talking to.
+//! - [`Companion`] is the end of a vehicle's program. It flies PX4, ArduPilot and Skein's built-in autopilot.
+//!   What they do differently is a [`Dialect`], chosen by the heartbeat from the list [`DIALECTS`].
 //! - [`Endpoint`] is the end of an autopilot: what Skein's built-in one is reached through.
 //! - [`FrameReader`] and [`FrameWriter`] are the packets under both.
 //! - [`Datum`] and the [`axes`] are the only place where north-east-down and forward-right-down exist. All
@@ -31,26 +31,33 @@
 pub mod axes;
 mod command;
 mod companion;
+mod dialect;
+mod dialects;
 mod endpoint;
+mod event;
 mod frame;
 mod geodesy;
 mod mission;
 mod mode;
 mod parameter;
+mod patience;
 mod set_point;
 mod telemetry;
 
 pub use command::{Command, CommandResult};
-pub use companion::{Companion, CompanionConfig, HEARTBEAT_TIMEOUT, MavEvent};
+pub use companion::{Companion, CompanionConfig};
+pub use dialect::{Dialect, Failsafe};
+pub use dialects::{DIALECTS, px4};
 pub use endpoint::{
     AutopilotCommand, Endpoint, EndpointConfig, Parameter, ParameterError, ParameterTable, Request, Ticket,
     VehicleState,
 };
+pub use event::MavEvent;
 pub use frame::{Address, Frame, FrameReader, FrameWriter};
 pub use geodesy::{Datum, Geodetic, LocalFrame};
-pub use mavlink::dialects::common as dialect;
+pub use mavlink::dialects::common as messages;
 pub use mission::{MAX_ITEMS, MissionError, MissionItem};
-pub use mode::{AutopilotKind, FlightMode};
-pub use parameter::ParameterValue;
+pub use mode::FlightMode;
+pub use parameter::{ParameterEncoding, ParameterValue};
 pub use set_point::SetPoint;
-pub use telemetry::{Battery, Landed, Severity, Stamped, Telemetry, Text};
+pub use telemetry::{Battery, HEARTBEAT_TIMEOUT, Landed, Severity, Stamped, Telemetry, Text};

@@ -8,25 +8,26 @@
 
 use std::time::Duration;
 
-use mavlink::dialects::common::{MISSION_ITEM_INT_DATA, MavCmd, MavFrame, MavMissionResult, MavMissionType};
+use mavlink::dialects::common::{
+    MISSION_ACK_DATA, MISSION_COUNT_DATA, MISSION_ITEM_INT_DATA, MISSION_REQUEST_INT_DATA,
+    MISSION_REQUEST_LIST_DATA, MavCmd, MavFrame, MavMissionResult, MavMissionType,
+};
 use nalgebra::Vector3;
 
-use crate::frame::Address;
+use crate::frame::{Address, FrameWriter};
 use crate::geodesy::{Datum, Geodetic};
+use crate::patience::{Patience, Retry, Turn};
 
-/// How long a transfer waits before it repeats itself.
-const RETRY: Duration = Duration::from_millis(250);
-/// How often it repeats itself before it gives up.
-const MAX_REPEATS: u32 = 12;
+const RETRY: Retry = Retry { every: Duration::from_millis(250), times: 12 };
 /// Longest mission that is taken in, items. A longer one is refused, so that no peer can fill the memory.
 pub const MAX_ITEMS: u16 = 2000;
 
 /// One item of a mission, in MAVLink's own terms so that what is read back is exactly what was sent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MissionItem {
-    /// What to do; a waypoint is `MAV_CMD_NAV_WAYPOINT`.
+    /// A waypoint is `MAV_CMD_NAV_WAYPOINT`.
     pub command: MavCmd,
-    /// What `x`, `y`, `z` mean.
+    /// The meaning of `x`, `y`, `z`.
     pub frame: MavFrame,
     /// The command's parameters 1 to 4. For a waypoint: seconds to stay, acceptance radius in metres, pass-by
     /// radius, heading in degrees clockwise from north (NaN: any).
@@ -110,6 +111,36 @@ impl MissionItem {
     }
 }
 
+/// Whether a list is one to fly. Fences and rally points come over the same messages.
+pub(crate) fn is_mission(kind: MavMissionType) -> bool {
+    kind == MavMissionType::MAV_MISSION_TYPE_MISSION
+}
+
+pub(crate) fn write_count(to: Address, kind: MavMissionType, count: u16, output: &mut FrameWriter) {
+    output.write(&MISSION_COUNT_DATA {
+        count,
+        target_system: to.system_id,
+        target_component: to.component_id,
+        mission_type: kind,
+        opaque_id: 0,
+    });
+}
+
+pub(crate) fn write_ack(
+    to: Address,
+    kind: MavMissionType,
+    result: MavMissionResult,
+    output: &mut FrameWriter,
+) {
+    output.write(&MISSION_ACK_DATA {
+        target_system: to.system_id,
+        target_component: to.component_id,
+        mavtype: result,
+        mission_type: kind,
+        ..Default::default()
+    });
+}
+
 /// Why a transfer did not end well.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MissionError {
@@ -127,44 +158,20 @@ pub enum MissionError {
     Superseded,
 }
 
-/// A patience: when to repeat, and how often it has been done.
-#[derive(Debug, Clone)]
-struct Patience {
-    repeat_at: Duration,
-    repeats: u32,
-}
-
-/// What to do now.
-#[derive(Debug, PartialEq)]
-enum Turn {
-    Wait,
-    Repeat,
-    GiveUp,
-}
-
-impl Patience {
-    fn new(now: Duration) -> Self {
-        Self { repeat_at: now + RETRY, repeats: 0 }
-    }
-
-    fn turn(&mut self, now: Duration) -> Turn {
-        if now < self.repeat_at {
-            return Turn::Wait;
-        }
-        if self.repeats == MAX_REPEATS {
-            return Turn::GiveUp;
-        }
-        self.repeats += 1;
-        self.repeat_at = now + RETRY;
-        Turn::Repeat
-    }
-}
-
-/// What the sending role says next.
+/// A message of the sending role.
 #[derive(Debug, PartialEq)]
 pub(crate) enum SenderMessage {
     Count(u16),
     Item(u16, MissionItem),
+}
+
+impl SenderMessage {
+    pub(crate) fn write(self, to: Address, output: &mut FrameWriter) {
+        match self {
+            Self::Count(count) => write_count(to, MavMissionType::MAV_MISSION_TYPE_MISSION, count, output),
+            Self::Item(seq, item) => output.write(&item.to_message(seq, to)),
+        }
+    }
 }
 
 /// The sending role of a transfer.
@@ -179,18 +186,18 @@ pub(crate) struct MissionSender {
 impl MissionSender {
     /// Begins: the caller sends the [`SenderMessage::Count`] of [`Self::repeat`].
     pub(crate) fn new(now: Duration, items: Vec<MissionItem>) -> Self {
-        Self { items, last_sent: None, patience: Patience::new(now) }
+        Self { items, last_sent: None, patience: RETRY.from(now) }
     }
 
     /// Answers a request for an item; `None` for one that does not exist.
     pub(crate) fn on_request(&mut self, now: Duration, seq: u16) -> Option<SenderMessage> {
         let item = *self.items.get(usize::from(seq))?;
         self.last_sent = Some(seq);
-        self.patience = Patience::new(now);
+        self.patience = RETRY.from(now);
         Some(SenderMessage::Item(seq, item))
     }
 
-    /// What was said last, to be said again.
+    /// The message sent last.
     pub(crate) fn repeat(&self) -> SenderMessage {
         let item = |seq| self.items.get(usize::from(seq)).map(|item| (seq, *item));
         match self.last_sent.and_then(item) {
@@ -199,17 +206,16 @@ impl MissionSender {
         }
     }
 
-    /// To be called often: what to say again, if anything, or that the other end is gone.
+    /// The message to repeat now, if any.
+    ///
+    /// # Errors
+    /// When the other end is gone.
     pub(crate) fn tick(&mut self, now: Duration) -> Result<Option<SenderMessage>, MissionError> {
-        match self.patience.turn(now) {
-            Turn::Wait => Ok(None),
-            Turn::Repeat => Ok(Some(self.repeat())),
-            Turn::GiveUp => Err(MissionError::TimedOut),
-        }
+        Ok(is_overdue(&mut self.patience, now)?.then(|| self.repeat()))
     }
 }
 
-/// What the receiving role says next.
+/// A message of the receiving role.
 #[derive(Debug, PartialEq)]
 pub(crate) enum ReceiverMessage {
     /// `MISSION_REQUEST_LIST`.
@@ -218,10 +224,29 @@ pub(crate) enum ReceiverMessage {
     Item(u16),
 }
 
+impl ReceiverMessage {
+    pub(crate) fn write(self, to: Address, output: &mut FrameWriter) {
+        let (target_system, target_component) = (to.system_id, to.component_id);
+        match self {
+            Self::List => output.write(&MISSION_REQUEST_LIST_DATA {
+                target_system,
+                target_component,
+                ..Default::default()
+            }),
+            Self::Item(seq) => output.write(&MISSION_REQUEST_INT_DATA {
+                seq,
+                target_system,
+                target_component,
+                ..Default::default()
+            }),
+        }
+    }
+}
+
 /// The receiving role of a transfer.
 #[derive(Debug, Clone)]
 pub(crate) struct MissionReceiver {
-    /// How many items there are; `None` until the other end has said so.
+    /// Number of items; `None` until the other end has told it.
     count: Option<u16>,
     items: Vec<MissionItem>,
     patience: Patience,
@@ -230,7 +255,7 @@ pub(crate) struct MissionReceiver {
 impl MissionReceiver {
     /// Begins by asking for the list.
     pub(crate) fn new(now: Duration) -> Self {
-        Self { count: None, items: Vec::new(), patience: Patience::new(now) }
+        Self { count: None, items: Vec::new(), patience: RETRY.from(now) }
     }
 
     /// The number of items, announced by the sending role.
@@ -242,7 +267,7 @@ impl MissionReceiver {
             self.count = Some(count);
             self.items.clear();
         }
-        self.patience = Patience::new(now);
+        self.patience = RETRY.from(now);
         Ok(())
     }
 
@@ -252,7 +277,7 @@ impl MissionReceiver {
             return false;
         }
         self.items.push(item);
-        self.patience = Patience::new(now);
+        self.patience = RETRY.from(now);
         true
     }
 
@@ -266,7 +291,7 @@ impl MissionReceiver {
         self.items
     }
 
-    /// What to ask for now.
+    /// The request for what is missing.
     pub(crate) fn request(&self) -> ReceiverMessage {
         match self.count {
             None => ReceiverMessage::List,
@@ -274,12 +299,19 @@ impl MissionReceiver {
         }
     }
 
-    /// To be called often: what to ask for again, if anything, or that the other end is gone.
+    /// The message to repeat now, if any.
+    ///
+    /// # Errors
+    /// When the other end is gone.
     pub(crate) fn tick(&mut self, now: Duration) -> Result<Option<ReceiverMessage>, MissionError> {
-        match self.patience.turn(now) {
-            Turn::Wait => Ok(None),
-            Turn::Repeat => Ok(Some(self.request())),
-            Turn::GiveUp => Err(MissionError::TimedOut),
-        }
+        Ok(is_overdue(&mut self.patience, now)?.then(|| self.request()))
+    }
+}
+
+fn is_overdue(patience: &mut Patience, now: Duration) -> Result<bool, MissionError> {
+    match patience.turn(now) {
+        Turn::Wait => Ok(false),
+        Turn::Repeat => Ok(true),
+        Turn::GiveUp => Err(MissionError::TimedOut),
     }
 }

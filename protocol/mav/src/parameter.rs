@@ -1,12 +1,19 @@
-//! Autopilot parameters: values, and the two ways autopilots press them into MAVLink's one `float` field.
+//! Parameter values, and the two ways of writing them into the one field that MAVLink has for them.
 
 use mavlink::dialects::common::MavParamType;
 use mavlink::types::CharArray;
 
-use crate::mode::AutopilotKind;
-
 /// Longest parameter name, in bytes.
 pub const MAX_NAME_LEN: usize = 16;
+
+/// The way of writing an integer into the field, which is a float.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ParameterEncoding {
+    /// Its bytes are copied.
+    Bytewise,
+    /// Its value is cast.
+    Cast,
+}
 
 /// A parameter's value.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,24 +33,26 @@ impl ParameterValue {
         }
     }
 
-    /// The `param_value` and `param_type` of a message. PX4 copies an integer's bytes into the float,
-    /// ArduPilot casts its value.
-    pub(crate) fn encode(self, kind: AutopilotKind) -> (f32, MavParamType) {
+    /// The `param_value` and `param_type` of a message.
+    pub(crate) fn encode(self, encoding: ParameterEncoding) -> (f32, MavParamType) {
         match self {
             Self::Real(value) => (value, MavParamType::MAV_PARAM_TYPE_REAL32),
-            Self::Int(value) if kind == AutopilotKind::ArduPilot => {
-                (value as f32, MavParamType::MAV_PARAM_TYPE_INT32)
+            Self::Int(value) => {
+                let param_value = match encoding {
+                    ParameterEncoding::Bytewise => f32::from_bits(value.cast_unsigned()),
+                    ParameterEncoding::Cast => value as f32,
+                };
+                (param_value, MavParamType::MAV_PARAM_TYPE_INT32)
             }
-            Self::Int(value) => (f32::from_bits(value.cast_unsigned()), MavParamType::MAV_PARAM_TYPE_INT32),
         }
     }
 
     /// The value behind `param_value` and `param_type`.
-    pub(crate) fn decode(value: f32, param_type: MavParamType, kind: AutopilotKind) -> Self {
+    pub(crate) fn decode(value: f32, param_type: MavParamType, encoding: ParameterEncoding) -> Self {
         if matches!(param_type, MavParamType::MAV_PARAM_TYPE_REAL32 | MavParamType::MAV_PARAM_TYPE_REAL64) {
             return Self::Real(value);
         }
-        if kind == AutopilotKind::ArduPilot {
+        if encoding == ParameterEncoding::Cast {
             return Self::Int(value as i32);
         }
         let bits = value.to_bits();

@@ -14,7 +14,7 @@ use crate::geodesy::LocalFrame;
 pub enum SetPoint {
     /// Velocity in three axes.
     Velocity {
-        /// Velocity, m/s.
+        /// In m/s.
         velocity: Vector3<f64>,
         /// Heading, rad.
         yaw: Option<f64>,
@@ -31,7 +31,7 @@ pub enum SetPoint {
         yaw: Option<f64>,
     },
     Position {
-        /// Position, m.
+        /// In m.
         position: Vector3<f64>,
         /// Heading, rad.
         yaw: Option<f64>,
@@ -116,8 +116,8 @@ impl SetPoint {
         let mask = message.type_mask;
         let yaw = (!mask.contains(Mask::POSITION_TARGET_TYPEMASK_YAW_IGNORE))
             .then(|| axes::swap_yaw(f64::from(message.yaw)));
-        let position = local.position_to_world(&vector(message.x, message.y, message.z));
-        let velocity = axes::ned_to_enu(&vector(message.vx, message.vy, message.vz));
+        let position = local.position_to_world(&axes::vector(message.x, message.y, message.z));
+        let velocity = axes::ned_to_enu(&axes::vector(message.vx, message.vy, message.vz));
         let position_mask = mask & ignore_position();
         let velocity_mask = mask & ignore_velocity();
         let planar_position =
@@ -153,8 +153,4 @@ fn ignore_acceleration() -> Mask {
     Mask::POSITION_TARGET_TYPEMASK_AX_IGNORE
         | Mask::POSITION_TARGET_TYPEMASK_AY_IGNORE
         | Mask::POSITION_TARGET_TYPEMASK_AZ_IGNORE
-}
-
-fn vector(x: f32, y: f32, z: f32) -> Vector3<f64> {
-    Vector3::new(f64::from(x), f64::from(y), f64::from(z))
 }

@@ -1,4 +1,4 @@
-//! What an autopilot says about its vehicle, in the world's terms.
+//! Telemetry: the state of a vehicle by its autopilot's word, in the world's terms.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -7,7 +7,10 @@ use mavlink::dialects::common::MavSeverity;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::geodesy::Geodetic;
-use crate::mode::{AutopilotKind, FlightMode};
+use crate::mode::FlightMode;
+
+/// An autopilot whose heartbeat (1 Hz) stays away this long is lost.
+pub const HEARTBEAT_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// A value and when it arrived.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,13 +21,12 @@ pub struct Stamped<T> {
 }
 
 impl<T> Stamped<T> {
-    /// How old the value is.
     pub fn age(&self, now: Duration) -> Duration {
         now.saturating_sub(self.stamp)
     }
 }
 
-/// Where the autopilot believes the vehicle to be between ground and air.
+/// Ground, air, or between, as the autopilot believes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Landed {
     /// Not said yet.
@@ -47,7 +49,7 @@ pub struct Battery {
     pub voltage_v: f64,
 }
 
-/// How serious a text is, most serious first (RFC 5424).
+/// Severity of a text, most serious first (RFC 5424).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// The system is unusable.
@@ -66,60 +68,47 @@ pub enum Severity {
     Debug,
 }
 
+const SEVERITIES: [(Severity, MavSeverity); 8] = [
+    (Severity::Emergency, MavSeverity::MAV_SEVERITY_EMERGENCY),
+    (Severity::Alert, MavSeverity::MAV_SEVERITY_ALERT),
+    (Severity::Critical, MavSeverity::MAV_SEVERITY_CRITICAL),
+    (Severity::Error, MavSeverity::MAV_SEVERITY_ERROR),
+    (Severity::Warning, MavSeverity::MAV_SEVERITY_WARNING),
+    (Severity::Notice, MavSeverity::MAV_SEVERITY_NOTICE),
+    (Severity::Info, MavSeverity::MAV_SEVERITY_INFO),
+    (Severity::Debug, MavSeverity::MAV_SEVERITY_DEBUG),
+];
+
 impl From<MavSeverity> for Severity {
     fn from(severity: MavSeverity) -> Self {
-        match severity {
-            MavSeverity::MAV_SEVERITY_EMERGENCY => Self::Emergency,
-            MavSeverity::MAV_SEVERITY_ALERT => Self::Alert,
-            MavSeverity::MAV_SEVERITY_CRITICAL => Self::Critical,
-            MavSeverity::MAV_SEVERITY_ERROR => Self::Error,
-            MavSeverity::MAV_SEVERITY_WARNING => Self::Warning,
-            MavSeverity::MAV_SEVERITY_NOTICE => Self::Notice,
-            MavSeverity::MAV_SEVERITY_INFO => Self::Info,
-            MavSeverity::MAV_SEVERITY_DEBUG => Self::Debug,
-        }
+        SEVERITIES.into_iter().find(|(_, known)| *known == severity).map_or(Self::Debug, |(own, _)| own)
     }
 }
 
 impl From<Severity> for MavSeverity {
     fn from(severity: Severity) -> Self {
-        match severity {
-            Severity::Emergency => Self::MAV_SEVERITY_EMERGENCY,
-            Severity::Alert => Self::MAV_SEVERITY_ALERT,
-            Severity::Critical => Self::MAV_SEVERITY_CRITICAL,
-            Severity::Error => Self::MAV_SEVERITY_ERROR,
-            Severity::Warning => Self::MAV_SEVERITY_WARNING,
-            Severity::Notice => Self::MAV_SEVERITY_NOTICE,
-            Severity::Info => Self::MAV_SEVERITY_INFO,
-            Severity::Debug => Self::MAV_SEVERITY_DEBUG,
-        }
+        SEVERITIES.into_iter().find(|(own, _)| *own == severity).map(|(_, known)| known).unwrap_or_default()
     }
 }
 
 /// A line the autopilot wrote.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Text {
-    /// How serious it is.
     pub severity: Severity,
-    /// What it says.
     pub text: String,
 }
 
 /// The newest of everything heard from the autopilot. Vectors are in the world's ENU frame unless they say
 /// body.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Telemetry {
-    /// Make of the autopilot; `None` before its first heartbeat.
-    pub autopilot: Option<AutopilotKind>,
     /// When its last heartbeat came.
     pub last_heartbeat: Option<Duration>,
     /// Whether heartbeats come. False before the first and after a pause of [`crate::HEARTBEAT_TIMEOUT`].
     pub connected: bool,
-    /// Whether the motors may turn.
+    /// The motors may turn.
     pub armed: bool,
-    /// What the autopilot is doing.
     pub mode: FlightMode,
-    /// Ground or air.
     pub landed: Landed,
     /// Position, m.
     pub position: Option<Stamped<Vector3<f64>>>,
@@ -147,7 +136,6 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// How many texts are kept.
     pub const MAX_TEXTS: usize = 16;
 
     /// Whether position, velocity and attitude are all younger than `limit`.
@@ -158,29 +146,5 @@ impl Telemetry {
             self.attitude.map(|attitude| attitude.age(now)),
         ];
         ages.iter().all(|age| age.is_some_and(|age| age < limit))
-    }
-}
-
-impl Default for Telemetry {
-    fn default() -> Self {
-        Self {
-            autopilot: None,
-            last_heartbeat: None,
-            connected: false,
-            armed: false,
-            mode: FlightMode::Other(0),
-            landed: Landed::Unknown,
-            position: None,
-            velocity: None,
-            attitude: None,
-            angular_rate: None,
-            battery: None,
-            home: None,
-            home_height_m: None,
-            local_origin: None,
-            sensors_ok: false,
-            ready_to_arm: false,
-            texts: VecDeque::new(),
-        }
     }
 }

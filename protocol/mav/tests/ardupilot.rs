@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_mav::dialect::{
+use skein_mav::messages::{
     ATTITUDE_QUATERNION_DATA, COMMAND_LONG_DATA, GPS_GLOBAL_ORIGIN_DATA, HEARTBEAT_DATA,
     LOCAL_POSITION_NED_DATA, MavAutopilot, MavCmd, MavFrame, MavMessage, MavParamType, PARAM_VALUE_DATA,
     SET_POSITION_TARGET_LOCAL_NED_DATA,

@@ -1,7 +1,7 @@
 //! Frames survive the wire, and nothing on the wire survives as a frame that is not one.
 
 use proptest::prelude::*;
-use skein_mav::dialect::{HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavMessage};
+use skein_mav::messages::{HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavMessage};
 use skein_mav::{Address, FrameReader, FrameWriter};
 
 const SENDER: Address = Address { system_id: 7, component_id: 191 };

@@ -3,6 +3,7 @@
 #![allow(clippy::panic, clippy::unwrap_used)] // A test fails by panicking.
 
 mod ardupilot;
+mod dialects;
 mod frames;
 mod geodesy;
 mod lossy_link;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use crate::lossy_link::{Pair, datum};
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use skein_mav::dialect::{COMMAND_LONG_DATA, MavCmd, MavFrame, SET_POSITION_TARGET_LOCAL_NED_DATA};
+use skein_mav::messages::{COMMAND_LONG_DATA, MavCmd, MavFrame, SET_POSITION_TARGET_LOCAL_NED_DATA};
 use skein_mav::{
     Address, AutopilotCommand, Command, CommandResult, FlightMode, FrameWriter, Landed, MavEvent,
     MissionError, MissionItem, ParameterValue, Request, SetPoint,

@@ -21,7 +21,6 @@ pub struct CsvError {
     pub line: usize,
     /// Column from 1, in characters.
     pub column: usize,
-    /// What is wrong there.
     pub message: String,
 }
 

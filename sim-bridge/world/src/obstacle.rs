@@ -148,7 +148,7 @@ impl Interval {
 /// A solid body at a fixed place in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
-    /// What the world file calls it; for messages, not unique.
+    /// Its name in the world file; for messages, not unique.
     pub name: String,
     /// Its form in its own frame.
     pub shape: Shape,

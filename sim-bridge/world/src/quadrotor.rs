@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
+use skein_mav::Battery;
 
 use crate::vehicle::{GRAVITY_M_S2, VehicleModel};
 
@@ -12,7 +13,7 @@ pub const STEP: Duration = Duration::from_millis(4);
 const DT: f64 = 0.004;
 /// Friction of the legs on the ground.
 const GROUND_FRICTION: f64 = 0.8;
-/// How fast the legs put a tilted vehicle upright, s.
+/// Time in which the legs put a tilted vehicle upright, s.
 const GROUND_LEVELLING_TIME_S: f64 = 0.05;
 
 /// Position and motion of a rigid body.
@@ -28,7 +29,14 @@ pub struct RigidState {
     pub angular_rate: Vector3<f64>,
 }
 
-/// How a vehicle met the ground.
+/// Thrust demanded of each rotor as a share (0..1) of its full thrust.
+///
+/// Order: front-right, rear-left (counter-clockwise seen from above), front-left, rear-right
+/// (clockwise).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MotorCommands(pub [f64; 4]);
+
+/// The meeting of a vehicle with the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touchdown {
     /// Downward speed just before, m/s.
@@ -43,22 +51,6 @@ impl Touchdown {
         self.descent_m_s > 3.0 || self.tilt_rad > std::f64::consts::FRAC_PI_3
     }
 }
-
-/// State of the energy store.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Battery {
-    /// Energy left, 0..1 of full.
-    pub fraction: f64,
-    /// Voltage, V.
-    pub voltage_v: f64,
-}
-
-/// Thrust demanded of each rotor as a share (0..1) of its full thrust.
-///
-/// Order: front-right, rear-left (counter-clockwise seen from above), front-left, rear-right
-/// (clockwise).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct MotorCommands(pub [f64; 4]);
 
 /// A quadrotor as physics sees it: six degrees of freedom, rotors that lag, drag against the air,
 /// a battery that empties, and the ground (z = 0) to stand on.
@@ -135,7 +127,6 @@ impl Quadrotor {
         self.on_ground
     }
 
-    /// Whether the vehicle has crashed.
     pub fn wrecked(&self) -> bool {
         self.wrecked
     }
@@ -228,7 +219,7 @@ impl Quadrotor {
         (!was_on_ground).then_some(touchdown)
     }
 
-    /// What an accelerometer feels of the step, contact forces included.
+    /// Specific force of the step, contact forces included, as an accelerometer feels it.
     fn feel(&self, velocity_before: &Vector3<f64>) -> Vector3<f64> {
         let acceleration = (self.state.velocity - velocity_before) / DT;
         let gravity = Vector3::new(0.0, 0.0, -GRAVITY_M_S2);

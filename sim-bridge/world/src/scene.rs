@@ -6,7 +6,7 @@ use skein_mav::Datum;
 use crate::aabb::Aabb;
 use crate::obstacle::Obstacle;
 
-/// How far the derived bounds reach beyond the outermost obstacle, m.
+/// Distance of the derived bounds from the outermost obstacle, m.
 const MARGIN_M: f64 = 20.0;
 /// The derived bounds hold at least this much in every horizontal direction of the origin, m.
 const LEAST_REACH_M: f64 = 50.0;
@@ -70,12 +70,12 @@ impl Scene {
         &self.obstacles
     }
 
-    /// Where vehicles may fly; leaving it counts as a collision.
+    /// The space for flights; leaving it counts as a collision.
     pub fn bounds(&self) -> &Aabb {
         &self.bounds
     }
 
-    /// Where on Earth the world's origin lies.
+    /// The world's origin on Earth.
     pub fn datum(&self) -> &Datum {
         &self.datum
     }

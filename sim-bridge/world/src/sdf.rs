@@ -56,9 +56,9 @@ impl fmt::Display for Place {
 /// Something in a world file that was understood only in part.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
-    /// Where, the first time.
+    /// Place of its first occurrence.
     pub place: Place,
-    /// What, and what was done about it.
+    /// The oddity, and what was done about it.
     pub message: String,
     pub count: usize,
 }
@@ -78,38 +78,30 @@ impl fmt::Display for Warning {
 pub enum SdfError {
     /// Not well-formed XML.
     #[error("{place}: {message}; {advice}")]
-    Malformed {
-        place: Place,
-        /// What is wrong.
-        message: String,
-        /// What to do.
-        advice: &'static str,
-    },
+    Malformed { place: Place, message: String, advice: &'static str },
     /// Text that is not what the element must hold.
     #[error("{place}: <{element}> holds `{found}`; expected {expected}")]
     Value {
-        /// Where the element begins.
+        /// Start of the element.
         place: Place,
         /// Name of the element.
         element: String,
         found: String,
-        /// What it must be.
         expected: &'static str,
     },
     /// An element without a child that it needs.
     #[error("{place}: <{element}> needs {expected} inside; add it")]
     Missing {
-        /// Where the element begins.
+        /// Start of the element.
         place: Place,
         /// Name of the element.
         element: String,
-        /// What is missing.
         expected: &'static str,
     },
     /// Models inside of models beyond the limit.
     #[error("{place}: models nest deeper than {DEPTH_LIMIT} levels; flatten the file")]
     TooDeep {
-        /// Where the model begins that is one too many.
+        /// Start of the model that is one too many.
         place: Place,
     },
 }
@@ -135,7 +127,7 @@ impl Scene {
     }
 }
 
-/// Where XML stops being XML. An unclosed comment swallows the rest of the file, so the parser
+/// The place where XML stops being XML. An unclosed comment swallows the rest of the file, so the parser
 /// complains about the end; the place to mend is where the comment opens.
 fn malformed(text: &str, source_name: &str, error: &roxmltree::Error) -> SdfError {
     let (offset, message, advice) = if let Some(offset) = unclosed_comment(text) {
@@ -192,7 +184,7 @@ struct Reader<'a> {
     warnings: BTreeMap<String, (usize, usize)>,
 }
 
-/// Where a reader is in the tree of models.
+/// A reader's place in the tree of models.
 struct Parent {
     name: String,
     pose: Isometry3<f64>,

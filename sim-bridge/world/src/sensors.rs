@@ -1,10 +1,11 @@
-//! What a vehicle's instruments say, with seeded noise.
+//! A vehicle's instruments, with seeded noise.
 
 use nalgebra::Vector3;
+use skein_mav::Battery;
 
 use crate::lidar::{Surroundings, cast_ray};
 use crate::noise::Noise;
-use crate::quadrotor::{Battery, Quadrotor, STEP};
+use crate::quadrotor::{Quadrotor, STEP};
 use crate::vehicle::VehicleModel;
 
 /// One step's readings, the autopilot's whole view of the world.

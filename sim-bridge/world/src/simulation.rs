@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
+use skein_mav::Battery;
 
 use crate::autopilot::{Autopilot, AutopilotConfig};
 use crate::lidar::{Hull, Lidar, LidarScan, Surroundings};
 use crate::noise::Noise;
-use crate::quadrotor::{Battery, MotorCommands, Quadrotor, RigidState, STEP};
+use crate::quadrotor::{MotorCommands, Quadrotor, RigidState, STEP};
 use crate::scene::Scene;
 use crate::sensors::{SensorReadings, Sensors, is_due};
 use crate::truth::{Player, Referee, Truth};
@@ -18,11 +19,10 @@ use crate::wind::{Wind, WindConfig};
 #[derive(Debug, Clone)]
 pub struct SimulationConfig {
     pub scene: Scene,
-    /// Who; a vehicle's place in this list is its index everywhere else.
+    /// A vehicle's place in this list is its index everywhere else.
     pub vehicles: Vec<VehicleSetup>,
     /// From which all noise is drawn: equal configurations give equal runs, bit for bit.
     pub seed: u64,
-    /// In which air.
     pub wind: WindConfig,
 }
 
@@ -30,23 +30,21 @@ pub struct SimulationConfig {
 #[derive(Debug, Clone)]
 pub struct VehicleSetup {
     pub model: VehicleModel,
-    /// Where it stands, world ENU, m; below standing height means on the ground.
+    /// World ENU, m; below standing height means on the ground.
     pub position: Vector3<f64>,
-    /// Where it faces, counter-clockwise from east, rad.
+    /// Heading, counter-clockwise from east, rad.
     pub yaw: f64,
-    /// Its MAVLink system id.
+    /// MAVLink system id.
     pub system_id: u8,
 }
 
-/// What is true of a vehicle, for referees, recorders and pictures; its agent must not see it.
+/// The true state of a vehicle, for referees, recorders and pictures; its agent must not see it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VehicleState {
     /// Position, velocity, attitude and angular rate.
     pub motion: RigidState,
     pub battery: Battery,
-    /// Whether it is off the ground.
     pub airborne: bool,
-    /// Whether it has crashed.
     pub crashed: bool,
     /// Way flown, m.
     pub path_length_m: f64,
@@ -82,7 +80,7 @@ struct Vehicle {
     last_airborne: Duration,
 }
 
-/// Who turns readings into motor commands.
+/// The source of motor commands.
 enum Pilot {
     BuiltIn(Box<Autopilot>),
     External(MotorCommands),
@@ -148,17 +146,16 @@ impl Simulation {
         &self.scene
     }
 
-    /// How many vehicles there are.
     pub fn vehicle_count(&self) -> usize {
         self.vehicles.len()
     }
 
-    /// What is true of vehicle `index`; `None` if there is no such vehicle.
+    /// The true state of vehicle `index`; `None` if there is no such vehicle.
     pub fn vehicle(&self, index: usize) -> Option<VehicleState> {
         self.vehicles.get(index).map(Vehicle::state)
     }
 
-    /// What the instruments of vehicle `index` say now.
+    /// The newest readings of vehicle `index`.
     pub fn readings(&self, index: usize) -> Option<&SensorReadings> {
         self.vehicles.get(index).map(|vehicle| &vehicle.readings)
     }

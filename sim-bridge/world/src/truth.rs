@@ -1,4 +1,4 @@
-//! What really happened: collisions, separation, clearance.
+//! The truth about a run: collisions, separation, clearance.
 //!
 //! The referee measures with parry, not with the formulas behind the lidar, so that a mistake in
 //! those cannot hide a collision.
@@ -46,7 +46,7 @@ pub(crate) struct Referee {
     touching: Vec<bool>,
 }
 
-/// What the referee remembers of one vehicle.
+/// The referee's memory of one vehicle.
 #[derive(Debug, Clone, Copy)]
 struct Watch {
     centre: Vector3<f64>,

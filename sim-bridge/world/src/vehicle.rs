@@ -1,4 +1,4 @@
-//! What a kind of multirotor is made of, read from TOML.
+//! Kinds of multirotor, read from TOML.
 //!
 //! The built-in kinds are the files of `vehicles/`; a scenario may bring its own.
 
@@ -54,7 +54,6 @@ pub struct VehicleModel {
     pub max_climb_m_s: f64,
     /// Largest rate of descent the autopilot demands, m/s, positive.
     pub max_descent_m_s: f64,
-    /// How the built-in autopilot flies it.
     #[serde(default)]
     pub control: ControlModel,
     pub battery: BatteryModel,
@@ -82,7 +81,7 @@ pub struct ControlModel {
     pub position_integral: PositionIntegral,
 }
 
-/// What the position loop learns from an error that lasts.
+/// The share of a lasting error that the position loop learns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PositionIntegral {
@@ -203,7 +202,6 @@ pub enum VehicleError {
         line: usize,
         /// Column from 1.
         column: usize,
-        /// What the parser expected.
         message: String,
     },
     /// A number outside of its range.
@@ -213,7 +211,6 @@ pub enum VehicleError {
         /// Dotted name of the field.
         field: &'static str,
         found: f64,
-        /// What is allowed.
         expected: &'static str,
     },
     /// No built-in vehicle has this name.
@@ -264,8 +261,8 @@ impl VehicleModel {
         BUILT_IN.iter().map(|(name, _)| *name)
     }
 
-    /// Where each rotor stands in the body frame (FLU, m), in the order of
-    /// [`MotorCommands`](crate::sensors::MotorCommands).
+    /// Positions of the rotors in the body frame (FLU, m), in the order of
+    /// [`MotorCommands`](crate::quadrotor::MotorCommands).
     pub fn rotor_positions(&self) -> [Vector3<f64>; 4] {
         let reach = self.arm_m * std::f64::consts::FRAC_1_SQRT_2;
         [

@@ -6,14 +6,14 @@ use nalgebra::Vector3;
 
 use crate::noise::Noise;
 
-/// How the wind blows, the same everywhere in the world. The default is still air.
+/// The wind, the same everywhere in the world. The default is still air.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WindConfig {
     /// Mean velocity of the air, ENU, m/s.
     pub mean: Vector3<f64>,
     /// Standard deviation of each axis of the gusts, m/s.
     pub gust_sigma_m_s: f64,
-    /// How long a gust lasts, s: the correlation time.
+    /// Correlation time of the gusts, s.
     pub gust_time_s: f64,
 }
 

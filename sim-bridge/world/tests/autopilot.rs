@@ -2,7 +2,7 @@
 
 use crate::flight::{Flight, at, velocity, x500};
 use nalgebra::Vector3;
-use skein_mav::dialect::{COMMAND_LONG_DATA, MANUAL_CONTROL_DATA, MavCmd, MavFrame};
+use skein_mav::messages::{COMMAND_LONG_DATA, MANUAL_CONTROL_DATA, MavCmd, MavFrame};
 use skein_mav::{
     Address, Command, CommandResult, FlightMode, FrameWriter, Landed, MavEvent, MissionItem, ParameterValue,
     SetPoint,

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_ground::{Destination, Order, Who};
-use skein_mav::dialect::{COMMAND_LONG_DATA, MavCmd};
+use skein_mav::messages::{COMMAND_LONG_DATA, MavCmd};
 use skein_mav::{Address, FrameWriter};
 use skein_tests::Lockstep;
 

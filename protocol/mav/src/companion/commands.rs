@@ -6,12 +6,10 @@ use mavlink::dialects::common::{COMMAND_LONG_DATA, MavCmd, MavResult};
 
 use crate::command::{Command, CommandResult};
 use crate::frame::FrameWriter;
+use crate::patience::{Patience, Retry, Turn};
 
-/// How long an acknowledgement is waited for before the command is repeated.
-const RETRY: Duration = Duration::from_millis(400);
-/// How often a command is sent in all.
-pub(super) const MAX_SENDS: u8 = 5;
-/// How long a command "in progress" may take.
+const RETRY: Retry = Retry { every: Duration::from_millis(400), times: 4 };
+/// A command "in progress" may take this long.
 const PROGRESS: Duration = Duration::from_secs(5);
 
 /// Why a command was sent.
@@ -34,8 +32,7 @@ pub(super) struct Commands {
 struct Pending {
     purpose: Purpose,
     message: COMMAND_LONG_DATA,
-    repeat_at: Duration,
-    sends: u8,
+    patience: Patience,
     /// Acknowledgements still to come for a command of the same number that this one replaced. They say
     /// nothing about this one. If one of them is lost, a repetition asks again.
     stale_acks: u8,
@@ -56,9 +53,8 @@ impl Commands {
         self.pending.push(Pending {
             purpose,
             message,
-            repeat_at: now + RETRY,
-            sends: 1,
-            stale_acks: replaced.as_ref().map_or(0, |old| old.stale_acks.saturating_add(old.sends)),
+            patience: RETRY.from(now),
+            stale_acks: replaced.as_ref().map_or(0, Pending::acks_to_come),
         });
         replaced.map(|old| old.purpose)
     }
@@ -81,7 +77,7 @@ impl Commands {
             return None;
         }
         let Some(result) = CommandResult::from_ack(result) else {
-            pending.repeat_at = now + PROGRESS;
+            pending.patience.put_off(now + PROGRESS);
             return None;
         };
         self.take(command).map(|settled| (settled.purpose, result))
@@ -89,20 +85,28 @@ impl Commands {
 
     /// Repeats what is overdue; returns the purposes of the commands given up.
     pub(super) fn tick(&mut self, now: Duration, output: &mut FrameWriter) -> Vec<Purpose> {
-        for pending in &mut self.pending {
-            if now >= pending.repeat_at && pending.sends < MAX_SENDS {
-                pending.message.confirmation = pending.sends;
-                pending.sends += 1;
+        let given_up = |pending: &mut Pending| match pending.patience.turn(now) {
+            Turn::Wait => false,
+            Turn::Repeat => {
+                pending.message.confirmation += 1;
                 pending.stale_acks = 0;
-                pending.repeat_at = now + RETRY;
                 output.write(&pending.message);
+                false
             }
-        }
-        self.pending.extract_if(.., |pending| now >= pending.repeat_at).map(|lost| lost.purpose).collect()
+            Turn::GiveUp => true,
+        };
+        self.pending.extract_if(.., given_up).map(|lost| lost.purpose).collect()
     }
 
     fn take(&mut self, command: MavCmd) -> Option<Pending> {
         let index = self.pending.iter().position(|pending| pending.message.command == command)?;
         Some(self.pending.remove(index))
+    }
+}
+
+impl Pending {
+    /// Acknowledgements that may come for this command and for those it replaced.
+    fn acks_to_come(&self) -> u8 {
+        self.stale_acks.saturating_add(self.message.confirmation + 1)
     }
 }

@@ -3,14 +3,13 @@
 use std::time::Duration;
 
 use mavlink::dialects::common::{
-    MISSION_ACK_DATA, MISSION_COUNT_DATA, MISSION_REQUEST_INT_DATA, MISSION_REQUEST_LIST_DATA, MavMessage,
-    MavMissionResult, MavMissionType,
+    MISSION_REQUEST_DATA, MISSION_REQUEST_INT_DATA, MavMessage, MavMissionResult, MavMissionType,
 };
 
-use super::MavEvent;
+use crate::event::MavEvent;
 use crate::frame::{Address, FrameWriter};
 use crate::mission::{
-    MAX_ITEMS, MissionError, MissionItem, MissionReceiver, MissionSender, ReceiverMessage, SenderMessage,
+    MAX_ITEMS, MissionError, MissionItem, MissionReceiver, MissionSender, is_mission, write_ack,
 };
 
 /// The transfer under way, if any.
@@ -51,54 +50,35 @@ impl Missions {
         autopilot: Address,
         output: &mut FrameWriter,
     ) -> Option<MavEvent> {
-        match (&mut *self, message) {
-            (Self::Downloading(receiver), MavMessage::MISSION_COUNT(count))
-                if is_mission(count.mission_type) =>
-            {
+        match (&mut *self, about_mission(message)?) {
+            (Self::Downloading(receiver), MavMessage::MISSION_COUNT(count)) => {
                 if let Err(error) = receiver.on_count(now, count.count) {
                     *self = Self::Idle;
                     return Some(failed(error));
                 }
                 self.ask_or_finish(autopilot, output)
             }
-            (Self::Downloading(receiver), MavMessage::MISSION_ITEM_INT(item))
-                if is_mission(item.mission_type) =>
-            {
-                if receiver.on_item(now, item.seq, MissionItem::from_message(item)) {
-                    return self.ask_or_finish(autopilot, output);
-                }
+            (Self::Downloading(receiver), MavMessage::MISSION_ITEM_INT(item)) => {
+                let expected = receiver.on_item(now, item.seq, MissionItem::from_message(item));
+                expected.then(|| self.ask_or_finish(autopilot, output)).flatten()
+            }
+            (
+                Self::Uploading(sender),
+                MavMessage::MISSION_REQUEST_INT(MISSION_REQUEST_INT_DATA { seq, .. })
+                | MavMessage::MISSION_REQUEST(MISSION_REQUEST_DATA { seq, .. }),
+            ) => {
+                sender.on_request(now, *seq)?.write(autopilot, output);
                 None
             }
-            (Self::Uploading(sender), MavMessage::MISSION_REQUEST_INT(request))
-                if is_mission(request.mission_type) =>
-            {
-                let answer = sender.on_request(now, request.seq)?;
-                say(answer, autopilot, output);
-                None
-            }
-            (Self::Uploading(sender), MavMessage::MISSION_REQUEST(request))
-                if is_mission(request.mission_type) =>
-            {
-                let answer = sender.on_request(now, request.seq)?;
-                say(answer, autopilot, output);
-                None
-            }
-            (Self::Uploading(_) | Self::Downloading(_), MavMessage::MISSION_ACK(ack))
-                if is_mission(ack.mission_type) =>
-            {
-                let uploading = matches!(self, Self::Uploading(_));
-                match ack.mavtype {
-                    MavMissionResult::MAV_MISSION_ACCEPTED if uploading => {
-                        *self = Self::Idle;
-                        Some(MavEvent::MissionUploaded)
-                    }
+            (Self::Uploading(_) | Self::Downloading(_), MavMessage::MISSION_ACK(ack)) => {
+                let event = match (ack.mavtype, &*self) {
+                    (MavMissionResult::MAV_MISSION_ACCEPTED, Self::Uploading(_)) => MavEvent::MissionUploaded,
                     // The end of an earlier upload, heard again.
-                    MavMissionResult::MAV_MISSION_ACCEPTED => None,
-                    refusal => {
-                        *self = Self::Idle;
-                        Some(failed(MissionError::Refused(refusal)))
-                    }
-                }
+                    (MavMissionResult::MAV_MISSION_ACCEPTED, _) => return None,
+                    (refusal, _) => failed(MissionError::Refused(refusal)),
+                };
+                *self = Self::Idle;
+                Some(event)
             }
             _ => None,
         }
@@ -115,21 +95,21 @@ impl Missions {
             Self::Idle => Ok(()),
             Self::Wanted(Wanted::Download) => {
                 let receiver = MissionReceiver::new(now);
-                ask(receiver.request(), autopilot, output);
+                receiver.request().write(autopilot, output);
                 *self = Self::Downloading(receiver);
                 Ok(())
             }
             Self::Wanted(Wanted::Upload(items)) => {
                 let sender = MissionSender::new(now, std::mem::take(items));
-                say(sender.repeat(), autopilot, output);
+                sender.repeat().write(autopilot, output);
                 *self = Self::Uploading(sender);
                 Ok(())
             }
             Self::Downloading(receiver) => {
-                receiver.tick(now).map(|again| again.into_iter().for_each(|it| ask(it, autopilot, output)))
+                receiver.tick(now).map(|again| again.into_iter().for_each(|it| it.write(autopilot, output)))
             }
             Self::Uploading(sender) => {
-                sender.tick(now).map(|again| again.into_iter().for_each(|it| say(it, autopilot, output)))
+                sender.tick(now).map(|again| again.into_iter().for_each(|it| it.write(autopilot, output)))
             }
         };
         outcome.err().map(|error| {
@@ -140,58 +120,33 @@ impl Missions {
 
     /// Asks for the next item, or thanks for the last.
     fn ask_or_finish(&mut self, autopilot: Address, output: &mut FrameWriter) -> Option<MavEvent> {
-        let Self::Downloading(receiver) = self else {
+        let Self::Downloading(receiver) = std::mem::take(self) else {
             return None;
         };
         if !receiver.is_complete() {
-            ask(receiver.request(), autopilot, output);
+            receiver.request().write(autopilot, output);
+            *self = Self::Downloading(receiver);
             return None;
         }
-        output.write(&MISSION_ACK_DATA {
-            target_system: autopilot.system_id,
-            target_component: autopilot.component_id,
-            mavtype: MavMissionResult::MAV_MISSION_ACCEPTED,
-            ..Default::default()
-        });
-        match std::mem::take(self) {
-            Self::Downloading(receiver) => Some(MavEvent::MissionReceived { items: receiver.into_items() }),
-            _ => None,
-        }
+        let kind = MavMissionType::MAV_MISSION_TYPE_MISSION;
+        write_ack(autopilot, kind, MavMissionResult::MAV_MISSION_ACCEPTED, output);
+        Some(MavEvent::MissionReceived { items: receiver.into_items() })
     }
 }
 
-fn is_mission(mission_type: MavMissionType) -> bool {
-    mission_type == MavMissionType::MAV_MISSION_TYPE_MISSION
+/// The message, if it belongs to the transfer of a mission.
+fn about_mission(message: &MavMessage) -> Option<&MavMessage> {
+    let kind = match message {
+        MavMessage::MISSION_COUNT(message) => message.mission_type,
+        MavMessage::MISSION_ITEM_INT(message) => message.mission_type,
+        MavMessage::MISSION_REQUEST_INT(message) => message.mission_type,
+        MavMessage::MISSION_REQUEST(message) => message.mission_type,
+        MavMessage::MISSION_ACK(message) => message.mission_type,
+        _ => return None,
+    };
+    is_mission(kind).then_some(message)
 }
 
 fn failed(error: MissionError) -> MavEvent {
     MavEvent::MissionFailed { error }
-}
-
-fn say(message: SenderMessage, autopilot: Address, output: &mut FrameWriter) {
-    match message {
-        SenderMessage::Count(count) => output.write(&MISSION_COUNT_DATA {
-            count,
-            target_system: autopilot.system_id,
-            target_component: autopilot.component_id,
-            ..Default::default()
-        }),
-        SenderMessage::Item(seq, item) => output.write(&item.to_message(seq, autopilot)),
-    }
-}
-
-fn ask(message: ReceiverMessage, autopilot: Address, output: &mut FrameWriter) {
-    match message {
-        ReceiverMessage::List => output.write(&MISSION_REQUEST_LIST_DATA {
-            target_system: autopilot.system_id,
-            target_component: autopilot.component_id,
-            ..Default::default()
-        }),
-        ReceiverMessage::Item(seq) => output.write(&MISSION_REQUEST_INT_DATA {
-            seq,
-            target_system: autopilot.system_id,
-            target_component: autopilot.component_id,
-            ..Default::default()
-        }),
-    }
 }

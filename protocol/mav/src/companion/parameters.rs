@@ -1,19 +1,17 @@
-//! The parameter protocol at the companion's end: read or write by name, repeated until the value comes back.
+//! The parameter protocol at the companion's end: a read or write by name is repeated until
+//! the value comes back.
 
 use std::time::Duration;
 
 use mavlink::dialects::common::{PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA};
 
 use crate::frame::{Address, FrameWriter};
-use crate::mode::AutopilotKind;
-use crate::parameter::{ParameterValue, name_from_wire, wire_name};
+use crate::parameter::{ParameterEncoding, ParameterValue, name_from_wire, wire_name};
+use crate::patience::{Patience, Retry, Turn};
 
-/// How long a value is waited for before it is asked for again.
-const RETRY: Duration = Duration::from_millis(400);
-/// How often it is asked for in all.
-const MAX_SENDS: u8 = 5;
+const RETRY: Retry = Retry { every: Duration::from_millis(400), times: 4 };
 
-/// The parameters asked for and not heard of yet.
+/// The parameters that have been asked for and have not come.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Parameters {
     pending: Vec<Pending>,
@@ -24,26 +22,27 @@ struct Pending {
     name: String,
     /// The value to write; `None` to read.
     write: Option<ParameterValue>,
-    repeat_at: Duration,
-    sends: u8,
+    /// `None` before it is sent.
+    patience: Option<Patience>,
 }
 
 impl Parameters {
-    /// Asks for a parameter, or writes it, at the next tick.
+    /// Reads a parameter, or writes it, at the next tick.
     pub(super) fn request(&mut self, name: &str, write: Option<ParameterValue>) {
         self.pending.retain(|pending| pending.name != name);
-        self.pending.push(Pending { name: name.to_owned(), write, repeat_at: Duration::ZERO, sends: 0 });
+        self.pending.push(Pending { name: name.to_owned(), write, patience: None });
     }
 
     /// A value arrived. Returns it if it was asked for.
     pub(super) fn on_value(
         &mut self,
         message: &PARAM_VALUE_DATA,
-        kind: AutopilotKind,
+        encoding: ParameterEncoding,
     ) -> Option<(String, ParameterValue)> {
         let name = name_from_wire(&message.param_id);
-        let index = self.pending.iter().position(|pending| pending.sends > 0 && pending.name == name)?;
-        let value = ParameterValue::decode(message.param_value, message.param_type, kind);
+        let asked = |pending: &Pending| pending.patience.is_some() && pending.name == name;
+        let index = self.pending.iter().position(asked)?;
+        let value = ParameterValue::decode(message.param_value, message.param_type, encoding);
         Some((self.pending.remove(index).name, value))
     }
 
@@ -51,23 +50,29 @@ impl Parameters {
     pub(super) fn tick(
         &mut self,
         now: Duration,
-        kind: AutopilotKind,
+        encoding: ParameterEncoding,
         autopilot: Address,
         output: &mut FrameWriter,
     ) -> Vec<String> {
-        for pending in &mut self.pending {
-            if now >= pending.repeat_at && pending.sends < MAX_SENDS {
-                pending.sends += 1;
-                pending.repeat_at = now + RETRY;
-                pending.send(kind, autopilot, output);
+        let given_up = |pending: &mut Pending| {
+            let turn = match &mut pending.patience {
+                Some(patience) => patience.turn(now),
+                None => {
+                    pending.patience = Some(RETRY.from(now));
+                    Turn::Repeat
+                }
+            };
+            if turn == Turn::Repeat {
+                pending.send(encoding, autopilot, output);
             }
-        }
-        self.pending.extract_if(.., |pending| now >= pending.repeat_at).map(|lost| lost.name).collect()
+            turn == Turn::GiveUp
+        };
+        self.pending.extract_if(.., given_up).map(|lost| lost.name).collect()
     }
 }
 
 impl Pending {
-    fn send(&self, kind: AutopilotKind, autopilot: Address, output: &mut FrameWriter) {
+    fn send(&self, encoding: ParameterEncoding, autopilot: Address, output: &mut FrameWriter) {
         let param_id = wire_name(&self.name);
         match self.write {
             None => output.write(&PARAM_REQUEST_READ_DATA {
@@ -78,7 +83,7 @@ impl Pending {
                 param_id,
             }),
             Some(value) => {
-                let (param_value, param_type) = value.encode(kind);
+                let (param_value, param_type) = value.encode(encoding);
                 output.write(&PARAM_SET_DATA {
                     param_value,
                     target_system: autopilot.system_id,

@@ -13,7 +13,7 @@ use mavlink::dialects::common::{
 /// A message that is missing is asked for this often at most.
 const ASK_AGAIN: Duration = Duration::from_secs(1);
 
-/// How a message is wanted.
+/// Rate at which a message is wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Wish {
     /// As a stream with this interval.

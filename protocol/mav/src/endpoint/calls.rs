@@ -6,15 +6,16 @@ use std::time::Duration;
 use mavlink::dialects::common::{COMMAND_INT_DATA, COMMAND_LONG_DATA, MavCmd, MavFrame};
 use nalgebra::Vector3;
 
-use super::AutopilotCommand;
+use super::request::AutopilotCommand;
 use crate::command::CommandResult;
+use crate::dialects::px4;
 use crate::frame::Address;
 use crate::geodesy::{Datum, Geodetic};
-use crate::mode::{FlightMode, px4};
+use crate::mode::FlightMode;
 
 /// A repetition comes this soon after the original, or it is a new command.
 const REPETITION: Duration = Duration::from_secs(5);
-/// How many answered commands are remembered.
+/// Number of commands remembered.
 const MAX_REMEMBERED: usize = 16;
 /// Parameter 2 of an arm or disarm command that overrides the checks.
 const FORCE: f64 = 21196.0;
@@ -70,7 +71,7 @@ impl Call {
         }
     }
 
-    /// What the vehicle is asked to do.
+    /// The wish of the station.
     ///
     /// # Errors
     /// The result to answer with when that is nothing it can do.
@@ -148,7 +149,7 @@ pub(super) struct Remembered {
     calls: VecDeque<(Duration, Call, Option<CommandResult>)>,
 }
 
-/// What a call is.
+/// A new call, or one heard before.
 pub(super) enum Novelty {
     /// To be obeyed.
     New,

@@ -3,12 +3,11 @@
 use std::time::Duration;
 
 use mavlink::dialects::common::{
-    MISSION_ACK_DATA, MISSION_COUNT_DATA, MISSION_ITEM_INT_DATA, MISSION_REQUEST_INT_DATA, MavMissionResult,
-    MavMissionType,
+    MISSION_COUNT_DATA, MISSION_ITEM_INT_DATA, MavMissionResult, MavMissionType,
 };
 
 use crate::frame::{Address, FrameWriter};
-use crate::mission::{MissionItem, MissionReceiver, ReceiverMessage};
+use crate::mission::{MissionItem, MissionReceiver, is_mission, write_ack, write_count};
 
 /// The mission and the transfer under way, if any.
 #[derive(Debug, Clone)]
@@ -16,8 +15,7 @@ pub(super) struct Missions {
     items: Vec<MissionItem>,
     accepts: fn(&MissionItem) -> bool,
     upload: Option<(Address, MissionReceiver)>,
-    /// Who uploaded the mission last: its acknowledgement may have been lost, and its last item then comes
-    /// again.
+    /// The last station that uploaded a mission. It repeats its last item if the acknowledgement was lost.
     last_uploader: Option<Address>,
 }
 
@@ -33,20 +31,14 @@ impl Missions {
     /// `MISSION_REQUEST_LIST`. Fences and rally points are empty lists here.
     pub(super) fn on_list(&self, from: Address, kind: MavMissionType, output: &mut FrameWriter) {
         let count = if is_mission(kind) { self.items.len() } else { 0 };
-        output.write(&MISSION_COUNT_DATA {
-            count: count as u16,
-            target_system: from.system_id,
-            target_component: from.component_id,
-            mission_type: kind,
-            opaque_id: 0,
-        });
+        write_count(from, kind, count as u16, output);
     }
 
     /// `MISSION_REQUEST_INT` or the older `MISSION_REQUEST`, answered alike.
     pub(super) fn on_request(&self, from: Address, kind: MavMissionType, seq: u16, output: &mut FrameWriter) {
         match self.items.get(usize::from(seq)) {
             Some(item) if is_mission(kind) => output.write(&item.to_message(seq, from)),
-            _ => acknowledge(from, kind, MavMissionResult::MAV_MISSION_INVALID_SEQUENCE, output),
+            _ => write_ack(from, kind, MavMissionResult::MAV_MISSION_INVALID_SEQUENCE, output),
         }
     }
 
@@ -65,13 +57,13 @@ impl Missions {
             } else {
                 MavMissionResult::MAV_MISSION_UNSUPPORTED
             };
-            acknowledge(from, message.mission_type, result, output);
+            write_ack(from, message.mission_type, result, output);
             return false;
         }
         let receiver = match self.upload.take() {
             Some((uploader, receiver)) if uploader != from => {
                 self.upload = Some((uploader, receiver));
-                acknowledge(from, message.mission_type, MavMissionResult::MAV_MISSION_DENIED, output);
+                write_ack(from, message.mission_type, MavMissionResult::MAV_MISSION_DENIED, output);
                 return false;
             }
             Some((_, receiver)) => receiver,
@@ -118,7 +110,7 @@ impl Missions {
 
     /// `MISSION_CLEAR_ALL`. Returns whether the mission changed.
     pub(super) fn on_clear(&mut self, from: Address, kind: MavMissionType, output: &mut FrameWriter) -> bool {
-        acknowledge(from, kind, MavMissionResult::MAV_MISSION_ACCEPTED, output);
+        write_ack(from, kind, MavMissionResult::MAV_MISSION_ACCEPTED, output);
         let clears = is_mission(kind) || kind == MavMissionType::MAV_MISSION_TYPE_ALL;
         clears && !std::mem::take(&mut self.items).is_empty()
     }
@@ -130,7 +122,7 @@ impl Missions {
         };
         match receiver.tick(now) {
             Ok(None) => {}
-            Ok(Some(request)) => ask(*from, request, output),
+            Ok(Some(request)) => request.write(*from, output),
             Err(_) => {
                 let from = *from;
                 self.abandon(from, MavMissionResult::MAV_MISSION_OPERATION_CANCELLED, output);
@@ -140,7 +132,7 @@ impl Missions {
 
     fn abandon(&mut self, from: Address, result: MavMissionResult, output: &mut FrameWriter) {
         self.upload = None;
-        acknowledge(from, MavMissionType::MAV_MISSION_TYPE_MISSION, result, output);
+        write_ack(from, MavMissionType::MAV_MISSION_TYPE_MISSION, result, output);
     }
 
     /// Asks for the next item, or takes the whole mission over: until then the old one stays in force.
@@ -149,7 +141,7 @@ impl Missions {
             return false;
         };
         if !receiver.is_complete() {
-            ask(from, receiver.request(), output);
+            receiver.request().write(from, output);
             self.upload = Some((from, receiver));
             return false;
         }
@@ -160,32 +152,7 @@ impl Missions {
     }
 }
 
-fn is_mission(kind: MavMissionType) -> bool {
-    kind == MavMissionType::MAV_MISSION_TYPE_MISSION
-}
-
-fn ask(target: Address, request: ReceiverMessage, output: &mut FrameWriter) {
-    if let ReceiverMessage::Item(seq) = request {
-        output.write(&MISSION_REQUEST_INT_DATA {
-            seq,
-            target_system: target.system_id,
-            target_component: target.component_id,
-            ..Default::default()
-        });
-    }
-}
-
 fn accept(target: Address, output: &mut FrameWriter) {
     let kind = MavMissionType::MAV_MISSION_TYPE_MISSION;
-    acknowledge(target, kind, MavMissionResult::MAV_MISSION_ACCEPTED, output);
-}
-
-fn acknowledge(target: Address, kind: MavMissionType, result: MavMissionResult, output: &mut FrameWriter) {
-    output.write(&MISSION_ACK_DATA {
-        target_system: target.system_id,
-        target_component: target.component_id,
-        mavtype: result,
-        mission_type: kind,
-        ..Default::default()
-    });
+    write_ack(target, kind, MavMissionResult::MAV_MISSION_ACCEPTED, output);
 }

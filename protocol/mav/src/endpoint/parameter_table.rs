@@ -56,7 +56,7 @@ impl ParameterTable {
         Self { entries }
     }
 
-    /// How many there are.
+    /// Number of parameters.
     pub fn len(&self) -> usize {
         self.entries.len()
     }
@@ -81,11 +81,12 @@ impl ParameterTable {
         self.find(name).map(|(_, entry)| entry.value.as_f64())
     }
 
-    /// Sets a parameter. A real value for a whole-number parameter is taken if it is whole.
+    /// Sets a parameter and returns its name. A real value for a whole-number parameter is taken if it is
+    /// whole.
     ///
     /// # Errors
     /// When there is no such parameter, or the value is not one it takes; it then keeps its value.
-    pub fn set(&mut self, name: &str, value: ParameterValue) -> Result<(), ParameterError> {
+    pub fn set(&mut self, name: &str, value: ParameterValue) -> Result<&'static str, ParameterError> {
         let found = self.entries.binary_search_by_key(&name, |entry| entry.name);
         let Some(entry) = found.ok().and_then(|index| self.entries.get_mut(index)) else {
             return Err(ParameterError::Unknown { name: name.to_owned() });
@@ -100,6 +101,6 @@ impl ParameterTable {
             ParameterValue::Int(_) if number.fract() == 0.0 => ParameterValue::Int(number as i32),
             ParameterValue::Int(_) => return Err(ParameterError::NotWhole { name, value: number }),
         };
-        Ok(())
+        Ok(name)
     }
 }

@@ -14,22 +14,18 @@ use mavlink::dialects::common::{
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::axes;
+use crate::dialects::px4;
 use crate::frame::FrameWriter;
 use crate::geodesy::{Datum, LocalFrame};
 use crate::mode::FlightMode;
 use crate::telemetry::{Battery, Landed};
 
-/// Release of PX4 whose dialect is spoken, as `flight_sw_version` encodes it: 1.13.0, official.
-const DIALECT_VERSION: u32 = 0x010d_00ff;
-
 /// An autopilot's state, as it reports it. Vectors are in the world's ENU frame unless they say body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VehicleState {
-    /// What it is doing.
     pub mode: FlightMode,
-    /// Whether the motors may turn.
+    /// The motors may turn.
     pub armed: bool,
-    /// Ground or air.
     pub landed: Landed,
     /// Position, m; `None` while it does not know.
     pub position: Option<Vector3<f64>>,
@@ -102,7 +98,7 @@ impl Report<'_> {
             _ => MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED | MavModeFlag::MAV_MODE_FLAG_GUIDED_ENABLED,
         };
         HEARTBEAT_DATA {
-            custom_mode: state.mode.to_px4_custom(),
+            custom_mode: px4::custom_mode(state.mode),
             mavtype: MavType::MAV_TYPE_QUADROTOR,
             autopilot: MavAutopilot::MAV_AUTOPILOT_PX4,
             base_mode,
@@ -338,7 +334,7 @@ fn version() -> AUTOPILOT_VERSION_DATA {
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2,
-        flight_sw_version: DIALECT_VERSION,
+        flight_sw_version: px4::RELEASE,
         ..Default::default()
     }
 }

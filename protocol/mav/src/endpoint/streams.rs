@@ -16,10 +16,10 @@ use crate::frame::Address;
 const MIN_INTERVAL: Duration = Duration::from_millis(4);
 /// Interval of a stream that is off.
 const OFF: Duration = Duration::MAX;
-/// How many stations may have wishes about one stream; the wish of a further one replaces the slowest.
+/// Stations that may have wishes about one stream; the wish of a further one replaces the slowest.
 const MAX_WISHES: usize = 8;
 
-/// What a station may ask of a stream.
+/// The rate that a station asks of a stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Rate {
     /// As the autopilot likes.

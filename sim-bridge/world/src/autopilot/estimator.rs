@@ -1,4 +1,4 @@
-//! Where the vehicle is, how it moves and how it is turned, from its instruments.
+//! Estimates position, motion and attitude from the instruments.
 //!
 //! Attitude is a complementary filter: the gyroscope is integrated, the compass corrects the heading, and the
 //! tilt is corrected by the velocity fixes. A wrong tilt turns gravity into a false acceleration, so that the
@@ -36,7 +36,7 @@ const READY_SIGMA_M: f64 = 0.5;
 /// Nor after this long without a fix.
 const FIX_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// What the autopilot believes of the vehicle's motion.
+/// The vehicle's motion as the autopilot believes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Estimate {
     /// World ENU, m.

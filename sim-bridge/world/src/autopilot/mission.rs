@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::{Vector2, Vector3};
-use skein_mav::dialect::MavCmd;
+use skein_mav::messages::MavCmd;
 use skein_mav::{Datum, MissionItem};
 
 use super::position_control::{Demand, Horizontal, Vertical};
@@ -33,7 +33,7 @@ fn wished_speed(item: &MissionItem) -> Option<f64> {
     (speed.is_finite() && speed > 0.0).then(|| f64::from(speed))
 }
 
-/// What a mission asks for now.
+/// A mission's demand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum MissionStep {
     Fly(Demand),
@@ -53,11 +53,12 @@ pub(super) enum MissionStep {
 pub(super) struct MissionFlight {
     /// The item under way, counted from 0.
     pub(super) item: usize,
-    /// Where to climb to first: a mission begun on the ground.
+    /// The first climb of a mission that begins on the ground.
     lift_off: Option<Vector3<f64>>,
     /// When the place of the item was reached.
     arrived: Option<Duration>,
-    /// Where the item was begun: a take-off climbs straight up from there, a landing comes at that height.
+    /// The vehicle's place when the item began: a take-off climbs straight up from there, a landing comes at
+    /// that height.
     begun_at: Vector3<f64>,
 }
 
@@ -67,8 +68,7 @@ impl MissionFlight {
         Self { item, lift_off, arrived: None, begun_at: *position }
     }
 
-    /// What to do now. After [`MissionStep::Reached`] and [`MissionStep::ChangeSpeed`] it is to be asked
-    /// again.
+    /// The demand now. After [`MissionStep::Reached`] and [`MissionStep::ChangeSpeed`] ask again.
     pub(super) fn step(&mut self, items: &[MissionItem], situation: &Situation<'_>) -> MissionStep {
         let position = &situation.estimate.position;
         if let Some(target) = self.lift_off {
@@ -119,8 +119,7 @@ impl MissionFlight {
         }
     }
 
-    /// Whether a place has been reached and stayed at for that long (`None`: for ever); then the next item is
-    /// begun.
+    /// Begins the next item once the place has been reached and held for so long (`None`: for ever).
     fn reach(
         &mut self,
         place: &Vector3<f64>,

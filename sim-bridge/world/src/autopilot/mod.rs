@@ -17,7 +17,7 @@ mod situation;
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_mav::{Battery, Datum, Endpoint, EndpointConfig, ParameterTable, Request, VehicleState};
+use skein_mav::{Datum, Endpoint, EndpointConfig, ParameterTable, Request, VehicleState};
 
 use crate::quadrotor::MotorCommands;
 use crate::sensors::SensorReadings;
@@ -102,7 +102,7 @@ impl Autopilot {
             datum: config.datum,
             settings: Settings::read(&config.parameters),
             estimator: Estimator::new(model),
-            modes: Modes::new(),
+            modes: Modes::default(),
             position_control: PositionControl::new(model, attitude_control.bandwidth()),
             attitude_control,
             mixer: Mixer::new(model),
@@ -218,7 +218,7 @@ impl Autopilot {
             velocity: estimate.velocity,
             attitude: estimate.attitude,
             angular_rate: estimate.angular_rate,
-            battery: Battery { fraction: readings.battery.fraction, voltage_v: readings.battery.voltage_v },
+            battery: readings.battery,
             home: self.modes.home(),
             sensors_ok,
             ready_to_arm,

@@ -1,5 +1,4 @@
-//! Flight modes: what the vehicle is doing, who may change it, and what it does by itself when something is
-//! lost.
+//! Flight modes: the vehicle's task, the commands that change it, and the failsafes.
 
 mod commands;
 mod failsafes;
@@ -28,7 +27,7 @@ pub(super) struct Sticks {
     pub(super) turn_left: f64,
 }
 
-/// What the vehicle is doing, with all it needs for that.
+/// The vehicle's task, with all that it needs for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Task {
     Hold { position: Vector3<f64> },
@@ -38,6 +37,12 @@ enum Task {
     Return(ReturnLeg),
     Mission(MissionFlight),
     Manual,
+}
+
+impl Default for Task {
+    fn default() -> Self {
+        Self::Hold { position: Vector3::zeros() }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,16 +61,17 @@ enum Failsafe {
     Acting,
 }
 
-/// How far the battery is down.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+/// Stages of the battery.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 enum Charge {
+    #[default]
     Good,
     Low,
     Critical,
     Emergency,
 }
 
-/// What the motors are to do.
+/// The motors' task.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Drive {
     Stopped,
@@ -76,7 +82,7 @@ pub(super) enum Drive {
 }
 
 /// The state machine.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Modes {
     task: Task,
     armed: bool,
@@ -84,9 +90,9 @@ pub(super) struct Modes {
     home: Option<Vector3<f64>>,
     failsafe: Option<Failsafe>,
     charge: Charge,
-    inside_fence: bool,
+    outside_fence: bool,
     set_point: Option<Stamped<SetPoint>>,
-    /// How long before the newest set-point the one before came.
+    /// Time between the newest set-point and the one before.
     set_point_interval: Option<Duration>,
     sticks: Option<Stamped<Sticks>>,
     ground_distance: Option<Stamped<f64>>,
@@ -102,28 +108,6 @@ pub(super) struct Modes {
 }
 
 impl Modes {
-    pub(super) fn new() -> Self {
-        Self {
-            task: Task::Hold { position: Vector3::zeros() },
-            armed: false,
-            airborne: false,
-            home: None,
-            failsafe: None,
-            charge: Charge::Good,
-            inside_fence: true,
-            set_point: None,
-            set_point_interval: None,
-            sticks: None,
-            ground_distance: None,
-            contact_since: None,
-            standing: None,
-            speed: None,
-            mission_item: 0,
-            texts: Vec::new(),
-            items_reached: Vec::new(),
-        }
-    }
-
     pub(super) fn mode(&self) -> FlightMode {
         match self.task {
             Task::Hold { .. } => FlightMode::Hold,
@@ -166,12 +150,12 @@ impl Modes {
         }
     }
 
-    /// What is to be told to the stations.
+    /// Takes the texts for the stations.
     pub(super) fn take_texts(&mut self) -> Vec<(Severity, String)> {
         std::mem::take(&mut self.texts)
     }
 
-    /// The mission items that have been reached.
+    /// Takes the mission items that have been reached.
     pub(super) fn take_items_reached(&mut self) -> Vec<usize> {
         std::mem::take(&mut self.items_reached)
     }

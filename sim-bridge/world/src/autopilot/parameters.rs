@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use skein_mav::px4::{OFFBOARD_LOSS_ACTION, OFFBOARD_LOSS_TIMEOUT, OffboardLoss};
 use skein_mav::{Parameter, ParameterTable, ParameterValue};
 
 use crate::vehicle::VehicleModel;
@@ -12,10 +13,9 @@ pub fn default_parameters(model: &VehicleModel) -> ParameterTable {
         |name, value: f64, min, max| Parameter { name, value: ParameterValue::Real(value as f32), min, max };
     let whole = |name, value, min, max| Parameter { name, value: ParameterValue::Int(value), min, max };
     ParameterTable::new(vec![
-        // Set-points lost: after how many seconds, and then what (0, 1, 2 a pilot's modes, which hold here; 3
-        // return, 4 land, 5 hold, 6 terminate, 7 disarm).
-        real("COM_OF_LOSS_T", 0.5, 0.1, 60.0),
-        whole("COM_OBL_RC_ACT", 4, 0.0, 7.0),
+        // Set-points lost: after how many seconds, and then what.
+        real(OFFBOARD_LOSS_TIMEOUT, 0.5, 0.1, 60.0),
+        whole(OFFBOARD_LOSS_ACTION, 4, 0.0, 7.0),
         // Sticks lost: after how many seconds, and then what (1 hold, 2 return, 3 land).
         real("COM_RC_LOSS_T", 0.5, 0.1, 35.0),
         whole("NAV_RCL_ACT", 2, 1.0, 3.0),
@@ -50,7 +50,7 @@ pub fn default_parameters(model: &VehicleModel) -> ParameterTable {
     ])
 }
 
-/// What follows when set-points, sticks or the fence are lost, or the battery runs low.
+/// The reaction to lost set-points or sticks, a fence that was left, or a low battery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum FailsafeAction {
     Warn,
@@ -103,13 +103,10 @@ impl Settings {
         let time = |name| Duration::from_secs_f64(real(name).clamp(0.0, 1e6));
         let some_time = |name| Some(time(name)).filter(|time| !time.is_zero());
         Self {
-            set_point_timeout: time("COM_OF_LOSS_T"),
-            set_point_loss_action: match whole("COM_OBL_RC_ACT") {
-                0..=2 | 5 => FailsafeAction::Hold,
-                3 => FailsafeAction::Return,
-                6 | 7 => FailsafeAction::Disarm,
-                _ => FailsafeAction::Land,
-            },
+            set_point_timeout: time(OFFBOARD_LOSS_TIMEOUT),
+            set_point_loss_action: set_point_loss_action(OffboardLoss::from_number(real(
+                OFFBOARD_LOSS_ACTION,
+            ))),
             stick_timeout: time("COM_RC_LOSS_T"),
             stick_loss_action: match whole("NAV_RCL_ACT") {
                 1 => FailsafeAction::Hold,
@@ -148,5 +145,16 @@ impl Settings {
             max_tilt_rad: real("MPC_TILTMAX_AIR").to_radians(),
             waypoint_radius_m: real("NAV_ACC_RAD"),
         }
+    }
+}
+
+/// In a pilot's mode the vehicle holds until sticks come.
+fn set_point_loss_action(configured: Option<OffboardLoss>) -> FailsafeAction {
+    use OffboardLoss::{Altitude, Disarm, Hold, Land, Manual, Position, Return, Terminate};
+    match configured {
+        Some(Position | Altitude | Manual | Hold) => FailsafeAction::Hold,
+        Some(Return) => FailsafeAction::Return,
+        Some(Terminate | Disarm) => FailsafeAction::Disarm,
+        Some(Land) | None => FailsafeAction::Land,
     }
 }

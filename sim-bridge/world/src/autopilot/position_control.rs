@@ -12,7 +12,7 @@ use super::parameters::Settings;
 use crate::quadrotor::STEP;
 use crate::vehicle::{GRAVITY_M_S2, PositionIntegral, VehicleModel};
 
-/// How quickly the velocity reference follows the wish, 1/s.
+/// Rate at which the velocity reference follows the wish, 1/s.
 const REFERENCE_RATE: f64 = 5.0;
 /// Integral of the velocity error, relative to its proportional gain, 1/s.
 const INTEGRAL_RATE: f64 = 0.6;
@@ -32,9 +32,9 @@ const MAX_VERTICAL_ACCEL_M_S2: f64 = 4.0;
 const MIN_LIFT_SHARE: f64 = 0.3;
 /// Share of the acceleration limit planned for braking; the rest corrects.
 const BRAKING_SHARE: f64 = 0.6;
-/// How fast the nose turns, rad/s.
+/// Fastest turn of the nose, rad/s.
 const MAX_YAW_RATE: f64 = 1.2;
-/// How quickly the heading reference follows the wish, 1/s.
+/// Rate at which the heading reference follows the wish, 1/s.
 const YAW_REFERENCE_RATE: f64 = 3.0;
 
 /// A wish for east and north.
@@ -42,7 +42,7 @@ const YAW_REFERENCE_RATE: f64 = 3.0;
 pub(super) enum Horizontal {
     /// m/s.
     Velocity(Vector2<f64>),
-    /// Where to, m, and how fast at most, m/s.
+    /// A place, m, and the highest speed, m/s.
     Position(Vector2<f64>, f64),
 }
 
@@ -55,7 +55,7 @@ pub(super) enum Vertical {
     Height(f64, f64),
 }
 
-/// What the flight mode wants of the controllers.
+/// The flight mode's demand on the controllers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Demand {
     pub(super) horizontal: Horizontal,
@@ -82,7 +82,7 @@ impl Demand {
     }
 }
 
-/// What the outer loops want of the inner ones.
+/// The outer loops' demand on the inner ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct AttitudeTarget {
     /// Body FLU to world ENU.
@@ -263,7 +263,7 @@ fn approach_speed(distance: f64, gain: f64, braking: f64) -> f64 {
     }
 }
 
-/// Where a vehicle with this velocity comes to rest when it brakes at once, relative to where it is.
+/// The way that a vehicle with this velocity still flies when it brakes at once.
 pub(super) fn stopping_way(velocity: &Vector3<f64>, settings: &Settings) -> Vector3<f64> {
     let horizontal = velocity.xy();
     let braking = BRAKING_SHARE * settings.max_accel_m_s2;

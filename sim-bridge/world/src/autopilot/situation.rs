@@ -1,4 +1,4 @@
-//! What decisions are made from.
+//! The situation of the vehicle, from which modes and missions decide.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ use crate::sensors::SensorReadings;
 pub(super) struct Situation<'a> {
     pub(super) now: Duration,
     pub(super) estimate: &'a Estimate,
-    /// Why the estimate cannot be flown by, if so.
+    /// The error is the reason why the estimate cannot be flown by.
     pub(super) readiness: Result<(), &'static str>,
     pub(super) readings: &'a SensorReadings,
     pub(super) settings: &'a Settings,

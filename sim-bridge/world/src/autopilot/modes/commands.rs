@@ -1,4 +1,4 @@
-//! What stations may have the vehicle do, and when it is refused.
+//! Commands of stations, and the reasons to refuse them.
 
 use std::time::Duration;
 
@@ -88,7 +88,7 @@ impl Modes {
             self.standing = None;
             self.failsafe = None;
             // Whatever was under way must not begin anew by itself at the next arming.
-            self.task = Task::Hold { position: Vector3::zeros() };
+            self.task = Task::default();
             self.tell(Severity::Info, text);
         }
     }

@@ -1,4 +1,4 @@
-//! What the vehicle does by itself when set-points, sticks, the fence or the battery are lost.
+//! Failsafes: set-points, sticks or the battery are lost, or the fence is left.
 
 use std::time::Duration;
 
@@ -67,9 +67,9 @@ impl Modes {
         let settings = situation.settings;
         let away = situation.estimate.position - situation.home;
         let beyond = |distance: f64, limit: f64| limit > 0.0 && distance > limit;
-        let inside =
-            !beyond(away.xy().norm(), settings.fence_radius_m) && !beyond(away.z, settings.fence_height_m);
-        let left = std::mem::replace(&mut self.inside_fence, inside) && !inside;
+        let outside =
+            beyond(away.xy().norm(), settings.fence_radius_m) || beyond(away.z, settings.fence_height_m);
+        let left = !std::mem::replace(&mut self.outside_fence, outside) && outside;
         if let Some(action) = settings.fence_action.filter(|_| left && self.airborne) {
             self.act(situation, action, "Geofence left");
         }

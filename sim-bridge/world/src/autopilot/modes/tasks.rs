@@ -1,4 +1,4 @@
-//! What each flight mode flies.
+//! The flight modes' demands.
 
 use std::time::Duration;
 

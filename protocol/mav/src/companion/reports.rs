@@ -1,0 +1,173 @@
+//! Telemetry from the messages that an autopilot sends to everyone.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use mavlink::dialects::common::{
+    ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA,
+    LOCAL_POSITION_NED_DATA, MavLandedState, MavMessage, MavModeFlag, MavState, MavSysStatusSensor,
+    STATUSTEXT_DATA, SYS_STATUS_DATA,
+};
+use nalgebra::{Quaternion, UnitQuaternion};
+
+use crate::axes;
+use crate::dialect::Dialect;
+use crate::dialects;
+use crate::event::MavEvent;
+use crate::geodesy::{Datum, Geodetic, LocalFrame};
+use crate::telemetry::{Battery, HEARTBEAT_TIMEOUT, Landed, Severity, Stamped, Telemetry, Text};
+
+/// The telemetry, and what is needed to read the next message.
+#[derive(Debug, Clone)]
+pub(super) struct Reports {
+    pub(super) telemetry: Telemetry,
+    pub(super) dialect: &'static dyn Dialect,
+    datum: Datum,
+    /// Follows from `telemetry.local_origin`.
+    local: Option<LocalFrame>,
+}
+
+impl Reports {
+    pub(super) fn new(datum: Datum) -> Self {
+        Self { telemetry: Telemetry::default(), dialect: dialects::UNKNOWN, datum, local: None }
+    }
+
+    /// The autopilot's local frame, once it has told its origin.
+    pub(super) fn local_frame(&self) -> Option<&LocalFrame> {
+        self.local.as_ref()
+    }
+
+    /// Takes in a message; what it changes at once is added to the events.
+    pub(super) fn hear(&mut self, now: Duration, message: &MavMessage, events: &mut VecDeque<MavEvent>) {
+        let telemetry = &mut self.telemetry;
+        match message {
+            MavMessage::HEARTBEAT(message) => self.on_heartbeat(now, message, events),
+            MavMessage::LOCAL_POSITION_NED(message) => self.on_local_position(now, message),
+            MavMessage::ATTITUDE_QUATERNION(message) => self.on_attitude(now, message),
+            MavMessage::GPS_GLOBAL_ORIGIN(message) => {
+                self.on_origin(Geodetic::from_e7(message.latitude, message.longitude, message.altitude));
+            }
+            MavMessage::HOME_POSITION(message) => self.on_home(message),
+            MavMessage::EXTENDED_SYS_STATE(message) => {
+                telemetry.landed = match message.landed_state {
+                    MavLandedState::MAV_LANDED_STATE_UNDEFINED => Landed::Unknown,
+                    MavLandedState::MAV_LANDED_STATE_ON_GROUND => Landed::OnGround,
+                    MavLandedState::MAV_LANDED_STATE_IN_AIR => Landed::InAir,
+                    MavLandedState::MAV_LANDED_STATE_TAKEOFF => Landed::TakingOff,
+                    MavLandedState::MAV_LANDED_STATE_LANDING => Landed::Landing,
+                };
+            }
+            MavMessage::SYS_STATUS(message) => self.on_system_status(message),
+            MavMessage::BATTERY_STATUS(message) => {
+                telemetry.battery =
+                    battery(message).map(|value| Stamped { stamp: now, value }).or(telemetry.battery);
+            }
+            MavMessage::STATUSTEXT(message) => self.on_text(now, message, events),
+            _ => {}
+        }
+    }
+
+    /// Counts the autopilot as lost if its heartbeats have just stayed away for too long.
+    pub(super) fn end_without_heartbeat(&mut self, now: Duration) -> bool {
+        let telemetry = &mut self.telemetry;
+        let silent =
+            telemetry.last_heartbeat.is_some_and(|last| now.saturating_sub(last) > HEARTBEAT_TIMEOUT);
+        silent && std::mem::take(&mut telemetry.connected)
+    }
+
+    fn on_heartbeat(&mut self, now: Duration, message: &HEARTBEAT_DATA, events: &mut VecDeque<MavEvent>) {
+        let telemetry = &mut self.telemetry;
+        self.dialect = dialects::of(message);
+        let first = telemetry.last_heartbeat.replace(now).is_none();
+        if !std::mem::replace(&mut telemetry.connected, true) {
+            events.push_back(MavEvent::HeartbeatRegained);
+        }
+        let mode = self.dialect.mode(message.custom_mode);
+        let from = std::mem::replace(&mut telemetry.mode, mode);
+        if from != mode && !first {
+            events.push_back(MavEvent::ModeChanged { from, to: mode });
+        }
+        let armed = message.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED);
+        if std::mem::replace(&mut telemetry.armed, armed) != armed {
+            events.push_back(MavEvent::ArmedChanged { armed });
+        }
+        if message.system_status == MavState::MAV_STATE_BOOT {
+            telemetry.ready_to_arm = false;
+        }
+    }
+
+    fn on_local_position(&mut self, now: Duration, message: &LOCAL_POSITION_NED_DATA) {
+        let position = axes::vector(message.x, message.y, message.z);
+        let velocity = axes::vector(message.vx, message.vy, message.vz);
+        if !position.iter().chain(velocity.iter()).all(|number| number.is_finite()) {
+            return;
+        }
+        let stamped = |value| Stamped { stamp: now, value };
+        self.telemetry.velocity = Some(stamped(axes::ned_to_enu(&velocity)));
+        if let Some(local) = &self.local {
+            self.telemetry.position = Some(stamped(local.position_to_world(&position)));
+        }
+    }
+
+    fn on_attitude(&mut self, now: Duration, message: &ATTITUDE_QUATERNION_DATA) {
+        let [w, x, y, z] = [message.q1, message.q2, message.q3, message.q4].map(f64::from);
+        let rate = axes::vector(message.rollspeed, message.pitchspeed, message.yawspeed);
+        // Half a unit away from one is no rotation any more, but a broken sender.
+        let Some(attitude) = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 0.5) else {
+            return;
+        };
+        if !attitude.coords.iter().chain(rate.iter()).all(|number| number.is_finite()) {
+            return;
+        }
+        self.telemetry.attitude = Some(Stamped { stamp: now, value: axes::attitude_from_ned(&attitude) });
+        self.telemetry.angular_rate = Some(Stamped { stamp: now, value: axes::frd_to_flu(&rate) });
+    }
+
+    fn on_origin(&mut self, origin: Geodetic) {
+        if self.telemetry.local_origin != Some(origin) {
+            self.telemetry.local_origin = Some(origin);
+            self.local = Some(LocalFrame::new(&self.datum, &origin));
+        }
+    }
+
+    fn on_home(&mut self, message: &HOME_POSITION_DATA) {
+        let home = Geodetic::from_e7(message.latitude, message.longitude, message.altitude);
+        self.telemetry.home = Some(self.datum.to_enu(&home));
+        self.telemetry.home_height_m = Some(home.height_m);
+    }
+
+    /// The pre-arm bit tells whether the vehicle is ready to arm. PX4 has it from 1.13; an older one is ready
+    /// when its sensors are healthy.
+    fn on_system_status(&mut self, message: &SYS_STATUS_DATA) {
+        let pre_arm = MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK;
+        let used = message.onboard_control_sensors_present & message.onboard_control_sensors_enabled;
+        let healthy = message.onboard_control_sensors_health;
+        self.telemetry.sensors_ok = healthy.contains(used - pre_arm);
+        self.telemetry.ready_to_arm =
+            if used.contains(pre_arm) { healthy.contains(pre_arm) } else { self.telemetry.sensors_ok };
+    }
+
+    fn on_text(&mut self, now: Duration, message: &STATUSTEXT_DATA, events: &mut VecDeque<MavEvent>) {
+        let text = Text {
+            severity: Severity::from(message.severity),
+            text: message.text.to_str().unwrap_or_default().to_owned(),
+        };
+        let texts = &mut self.telemetry.texts;
+        if texts.len() == Telemetry::MAX_TEXTS {
+            texts.pop_front();
+        }
+        texts.push_back(Stamped { stamp: now, value: text.clone() });
+        events.push_back(MavEvent::Text(text));
+    }
+}
+
+/// The first battery, if its charge is known.
+fn battery(message: &BATTERY_STATUS_DATA) -> Option<Battery> {
+    // u16::MAX marks a cell that is not there, -1 an unknown charge.
+    let cells = message.voltages.iter().filter(|cell| **cell != u16::MAX);
+    let millivolts: u32 = cells.map(|cell| u32::from(*cell)).sum();
+    (message.id == 0 && (0..=100).contains(&message.battery_remaining)).then(|| Battery {
+        fraction: f64::from(message.battery_remaining) / 100.0,
+        voltage_v: f64::from(millivolts) / 1000.0,
+    })
+}

@@ -1,0 +1,102 @@
+//! ArduPilot's copters.
+
+use mavlink::dialects::common::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd};
+use nalgebra::Vector3;
+
+use super::px4;
+use crate::axes;
+use crate::command::CommandResult;
+use crate::dialect::{Dialect, Failsafe};
+use crate::mode::FlightMode;
+use crate::parameter::ParameterEncoding;
+use crate::set_point::SetPoint;
+use crate::telemetry::Telemetry;
+
+/// The modes that a number leads to. Take-off is a command given in GUIDED, not a mode.
+const MODES: [(FlightMode, u8); 6] = [
+    (FlightMode::Mission, 3),
+    // GUIDED
+    (FlightMode::Offboard, 4),
+    (FlightMode::Return, 6),
+    (FlightMode::Land, 9),
+    // POSHOLD
+    (FlightMode::Manual, 16),
+    // BRAKE. LOITER would read the absent throttle stick as "descend".
+    (FlightMode::Hold, 17),
+];
+
+/// Gain from height error to climb where planar set-points become velocities, 1/s.
+const PLANAR_CLIMB_GAIN: f64 = 1.0;
+/// Fastest climb or descent then, m/s.
+const PLANAR_MAX_CLIMB_M_S: f64 = 1.5;
+
+/// ArduPilot's dialect. It cuts a mode's number to 8 bits: PX4's offboard would be STABILIZE to it.
+#[derive(Debug)]
+pub(super) struct ArduPilot;
+
+impl Dialect for ArduPilot {
+    fn name(&self) -> &'static str {
+        "ArduPilot"
+    }
+
+    fn is_spoken_by(&self, heartbeat: &HEARTBEAT_DATA) -> bool {
+        heartbeat.autopilot == MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA
+    }
+
+    fn mode(&self, custom_mode: u32) -> FlightMode {
+        match custom_mode {
+            // STABILIZE, ACRO, ALT_HOLD, LOITER, DRIFT, SPORT: all follow the sticks.
+            0..=2 | 5 | 11 | 13 => FlightMode::Manual,
+            // SMART_RTL
+            21 => FlightMode::Return,
+            _ => MODES
+                .into_iter()
+                .find(|(_, number)| u32::from(*number) == custom_mode)
+                .map_or(FlightMode::Other(custom_mode), |(mode, _)| mode),
+        }
+    }
+
+    fn mode_numbers(&self, mode: FlightMode) -> Option<(u8, u8)> {
+        MODES.into_iter().find(|(known, _)| *known == mode).map(|(_, number)| (number, 0))
+    }
+
+    /// The height counts from home. The other parameters stay 0: NaN is not understood.
+    fn take_off(&self, height_m: f64, _: Option<f64>) -> Result<COMMAND_LONG_DATA, CommandResult> {
+        Ok(COMMAND_LONG_DATA {
+            command: MavCmd::MAV_CMD_NAV_TAKEOFF,
+            param7: height_m as f32,
+            ..Default::default()
+        })
+    }
+
+    /// A set-point with partial axes stops the vehicle, and one without heading turns the nose: planar ones
+    /// become full velocities, and an open heading the one the vehicle had.
+    fn set_point(
+        &self,
+        wish: SetPoint,
+        telemetry: &Telemetry,
+        kept_yaw: &mut Option<f64>,
+    ) -> Option<SetPoint> {
+        let nose = || telemetry.attitude.map(|attitude| axes::yaw(&attitude.value));
+        *kept_yaw = wish.yaw().or(*kept_yaw).or_else(nose);
+        let yaw = *kept_yaw;
+        Some(match wish {
+            SetPoint::Planar { vx, vy, z, .. } => {
+                let climb = PLANAR_CLIMB_GAIN * (z - telemetry.position?.value.z);
+                let vz = climb.clamp(-PLANAR_MAX_CLIMB_M_S, PLANAR_MAX_CLIMB_M_S);
+                SetPoint::Velocity { velocity: Vector3::new(vx, vy, vz), yaw }
+            }
+            SetPoint::Velocity { velocity, .. } => SetPoint::Velocity { velocity, yaw },
+            SetPoint::Position { position, .. } => SetPoint::Position { position, yaw },
+        })
+    }
+
+    fn parameter_encoding(&self) -> ParameterEncoding {
+        ParameterEncoding::Cast
+    }
+
+    /// None of its own are read so far.
+    fn failsafes(&self) -> &'static [Failsafe] {
+        &px4::FAILSAFES_IF_PRESENT
+    }
+}
