@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 use foxglove::messages::{FrameTransforms, LaserScan, PoseInFrame, SceneUpdate};
 use nalgebra::{Isometry3, Vector3};
 use prost::Message;
-use skein_ground::recorder::{Level, Recorder, RecorderError, Scan};
+use skein_ground::recorder::{Level, Recorder, RecorderError};
 use skein_wire::proto::TraceEvent;
-use skein_wire::{Form, Solid};
+use skein_wire::{Form, Scan, Solid};
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
@@ -39,7 +39,15 @@ fn record(path: &Path, millis: u64) -> Result<Recorder, RecorderError> {
     recorder.scene(ms(0), &[tree, wall])?;
     recorder.vehicles(ms(0), &VEHICLES.map(|v| (v, 0.25)))?;
     recorder.log(ms(0), Level::Info, "ground/main", "mission starts")?;
-    let ranges: Vec<f32> = (0..720_u16).map(|i| 3.0 + f32::from(i).sin()).collect();
+    let scan = Scan {
+        stamp: ms(0),
+        angle_min: -3.0,
+        angle_step: 0.01,
+        max_range_m: 40.0,
+        ranges_m: (0..720_u16).map(|i| 3.0 + f32::from(i).sin()).collect(),
+        up_m: None,
+        down_m: None,
+    };
     for now in (0..millis).step_by(20) {
         let t = now as f64 / 1000.0;
         let pose = |i: usize| Isometry3::translation(t, i as f64, 3.0);
@@ -47,11 +55,7 @@ fn record(path: &Path, millis: u64) -> Result<Recorder, RecorderError> {
         recorder.poses(ms(now), &poses)?;
         for vehicle in VEHICLES {
             if now % 100 == 0 {
-                recorder.scan(
-                    ms(now),
-                    vehicle,
-                    Scan { ranges_m: &ranges, angle_min: -3.0, angle_step: 0.01 },
-                )?;
+                recorder.scan(ms(now), vehicle, &scan)?;
             }
             if now % 1000 == 0 {
                 recorder.path(ms(now), vehicle, &[Vector3::zeros(), Vector3::x()])?;

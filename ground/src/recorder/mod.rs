@@ -33,7 +33,7 @@ use nalgebra::{Isometry3, Vector3};
 use prost::Message;
 use skein_dbp::{Board, NodeName};
 use skein_wire::proto::{self, TraceEvent};
-use skein_wire::{Solid, State};
+use skein_wire::{Scan, Solid, State};
 use thiserror::Error;
 
 pub use foxglove::messages::log::Level;
@@ -58,17 +58,6 @@ pub enum RecorderError {
     /// The file cannot be continued, for instance because the disk is full.
     #[error("recording to `{}` failed: {source}", path.display())]
     Write { path: PathBuf, source: McapError },
-}
-
-/// A planar laser scan in its vehicle's xy plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scan<'a> {
-    /// Metres, counter-clockwise; infinite or NaN where nothing came back.
-    pub ranges_m: &'a [f32],
-    /// Angle of the first ray from body +x, radians.
-    pub angle_min: f64,
-    /// From one ray to the next, radians.
-    pub angle_step: f64,
 }
 
 /// Writes one mission to a file.
@@ -212,7 +201,7 @@ impl Recorder {
     ///
     /// # Errors
     /// [`RecorderError::Write`].
-    pub fn scan(&mut self, now: Duration, vehicle: &str, scan: Scan<'_>) -> Result<(), RecorderError> {
+    pub fn scan(&mut self, now: Duration, vehicle: &str, scan: &Scan) -> Result<(), RecorderError> {
         if self.scans_due.get(vehicle).is_some_and(|due| now < *due) {
             return Ok(());
         }

@@ -2,7 +2,7 @@
 
 use skein_dbp::NodeNameError;
 
-use crate::payload::{MAX_PAYLOAD, VERSION};
+use crate::proto::{MAX_PAYLOAD, VERSION};
 
 /// Bytes that are not a message.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

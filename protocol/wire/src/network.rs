@@ -8,7 +8,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use skein_dbp::NodeName;
 
-use crate::{Key, Link};
+use crate::key::Key;
+use crate::link::Link;
 
 /// How the network treats messages. Probabilities are from 0 to 1, for each message and receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,11 +59,11 @@ pub struct NetworkStats {
 ///
 /// ```
 /// use std::time::Duration;
-/// use skein_wire::{Fleet, Key, Link, Network, NetworkConfig, NodeName, Topic};
+/// use skein_wire::{Fleet, Key, Link, Network, NetworkConfig, NodeName, State};
 /// let (one, two) = (NodeName::new("uav/1")?, NodeName::new("uav/2")?);
 /// let network = Network::new(NetworkConfig::default(), 7);
 /// let (mut a, mut b) = (network.join(&one), network.join(&two));
-/// let key = Key::new(&Fleet::new("demo")?, Topic::State { node: one });
+/// let key = Key::to_all::<State>(&Fleet::new("demo")?, one);
 /// a.put(&key, vec![1, 2, 3]);
 /// assert_eq!(b.poll(), None);
 /// network.advance(Duration::from_millis(1));

@@ -19,7 +19,7 @@ use skein_world::{Lidar, Scene};
 
 use crate::cli::Controller;
 use crate::cpu_time;
-use crate::fly::{agent_configs, scan_for_agent};
+use crate::fly::agent_configs;
 use crate::scenario::Scenario;
 use crate::summary::PlanTimes;
 
@@ -163,7 +163,7 @@ impl<'a> Flight<'a> {
         let pose =
             Isometry3::from_parts(Translation3::from(self.motion.position), UnitQuaternion::identity());
         let seen = skein_world::Surroundings { scene: self.scene, hulls: &[], own: 0 };
-        let scan = scan_for_agent(&lidar.scan(now, &pose, &seen));
+        let scan = lidar.scan(now, &pose, &seen);
         let others: Vec<_> = neighbours.iter().map(Neighbour::predicted).collect();
 
         let began = cpu_time::this_thread()?;

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use skein_ground::GroundCore;
-use skein_ground::recorder::{Level, Recorder, RecorderError, Scan};
+use skein_ground::recorder::{Level, Recorder, RecorderError};
 use skein_wire::proto::TraceEvent;
 use skein_wire::vocabulary::ADVANCE;
 
@@ -54,8 +54,7 @@ impl Recording {
         let now = swarm.now();
         for (index, scan) in &happenings.scans {
             if let Some(name) = self.names.get(*index) {
-                let (angle_min, angle_step) = (scan.angle_min, scan.angle_step);
-                self.recorder.scan(now, name, Scan { ranges_m: &scan.ranges_m, angle_min, angle_step })?;
+                self.recorder.scan(now, name, scan)?;
             }
         }
         if happenings.ticked {

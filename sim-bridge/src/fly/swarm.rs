@@ -4,11 +4,11 @@
 
 use std::time::{Duration, Instant};
 
-use skein_agent::{AgentConfig, AgentCore, AgentError, Outcome, Scan};
+use skein_agent::{AgentConfig, AgentCore, AgentError, Outcome};
 use skein_dbp::{Happened, NodeName};
 use skein_ground::{GroundConfig, GroundCore, Order, UnknownVehicle};
-use skein_wire::{Link, MemoryStore};
-use skein_world::{LidarScan, Simulation, Truth};
+use skein_wire::{Link, MemoryStore, Scan};
+use skein_world::{Simulation, Truth};
 
 use super::{plan_times::PlanTimes, report::Account, trace_hash::TraceHash};
 use crate::cpu_time;
@@ -41,7 +41,7 @@ pub struct Happenings {
     /// Selections at their homes, by node.
     pub selections: Vec<Happened>,
     /// Lidar scans, by vehicle.
-    pub scans: Vec<(usize, LidarScan)>,
+    pub scans: Vec<(usize, Scan)>,
     /// What each autopilot has said.
     pub mavlink: Vec<Vec<u8>>,
     /// Whether agents and ground ticked.
@@ -92,9 +92,8 @@ impl Swarm {
         }
         for (index, scan) in &happenings.scans {
             if let Some(vehicle) = self.vehicles.get_mut(*index) {
-                let scan = scan_for_agent(scan);
                 let began = cpu_time();
-                vehicle.agent.sense(now, &scan);
+                vehicle.agent.sense(now, scan);
                 self.agents_cpu += cpu_time().saturating_sub(began);
             }
         }
@@ -256,18 +255,4 @@ fn is_requested_from_afar(selection: &Happened) -> bool {
 /// A node hears of all occurrences; each is recorded once, at its home.
 fn keep_own(selections: &mut Vec<Happened>, node: &NodeName) {
     selections.retain(|selection| selection.home == *node);
-}
-
-/// What the agent gets of a scan: all but the true pose, which it never learns.
-/// A scan of the world as a vehicle takes it in.
-pub(crate) fn scan_for_agent(scan: &LidarScan) -> Scan {
-    Scan {
-        stamp: scan.stamp,
-        angle_min: scan.angle_min,
-        angle_step: scan.angle_step,
-        max_range_m: scan.max_range_m,
-        ranges_m: scan.ranges_m.clone(),
-        up_m: scan.up_m,
-        down_m: scan.down_m,
-    }
 }
