@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use serde::Serialize;
+use skein_bp::Value;
 use skein_dbp::{Happened, NodeName, Peer};
-use skein_wire::proto::{TraceEvent, value::Kind};
 use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
 use skein_wire::{Form, MissionState, Scene, State};
 use tokio::sync::{broadcast, watch};
@@ -41,7 +41,7 @@ pub(super) struct Feed {
     orders: watch::Sender<Option<Text>>,
     events: broadcast::Sender<Text>,
     reasons: watch::Sender<Reasons>,
-    history: Arc<Mutex<VecDeque<EventView>>>,
+    history: Arc<Mutex<VecDeque<Happened>>>,
     questions: Questions,
     fleet_due: Duration,
     reasons_due: Duration,
@@ -55,7 +55,7 @@ pub(super) struct Subscription {
     pub(super) orders: watch::Receiver<Option<Text>>,
     pub(super) events: broadcast::Receiver<Text>,
     pub(super) reasons: watch::Receiver<Reasons>,
-    history: Arc<Mutex<VecDeque<EventView>>>,
+    history: Arc<Mutex<VecDeque<Happened>>>,
     questions: Questions,
 }
 
@@ -107,7 +107,7 @@ impl Subscription {
     /// The latest events, as one message.
     pub(super) fn history(&self) -> Text {
         let history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
-        text(&Message::Events { events: history.iter().cloned().collect() })
+        text(&Message::Events { events: history.iter().map(event_view).collect() })
     }
 }
 
@@ -130,7 +130,7 @@ enum Message<'a> {
         orders: Vec<OrderView<'a>>,
     },
     Events {
-        events: Vec<EventView>,
+        events: Vec<EventView<'a>>,
     },
     Why {
         headline: String,
@@ -218,25 +218,15 @@ enum AnswerView<'a> {
     Refused { why: &'a str },
 }
 
-#[derive(Clone, Serialize)]
-struct EventView {
+#[derive(Serialize)]
+struct EventView<'a> {
     time_s: f64,
-    home: String,
+    home: &'a str,
     seq: u64,
-    name: String,
-    data: BTreeMap<String, Datum>,
-    requested_by: Vec<String>,
-    blocked_by: Vec<String>,
-    lease_age_ms: Option<f64>,
-}
-
-#[derive(Clone, Serialize)]
-#[serde(untagged)]
-enum Datum {
-    Flag(bool),
-    Integer(i64),
-    Real(f64),
-    Text(String),
+    name: &'a str,
+    data: BTreeMap<&'a str, &'a Value>,
+    requested_by: &'a [Arc<str>],
+    blocked_by: Vec<&'a str>,
 }
 
 impl Feed {
@@ -328,18 +318,18 @@ impl Feed {
             let repeated = matches!(happened.event.kind(), ADVANCE | HOMEWARD);
             !(repeated || happened.home == *station && is_about_leave(happened))
         };
-        let views: Vec<EventView> =
-            happened.iter().filter(tells).map(|happened| event_view(station, happened)).collect();
-        if views.is_empty() {
+        let told: Vec<&Happened> = happened.iter().filter(tells).collect();
+        if told.is_empty() {
             return;
         }
         let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
-        history.extend(views.iter().cloned());
+        history.extend(told.iter().copied().cloned());
         let excess = history.len().saturating_sub(EVENTS_KEPT);
         history.drain(..excess);
         drop(history);
         // Nobody watches: that is no error.
-        let _ = self.events.send(text(&Message::Events { events: views }));
+        let events = told.into_iter().map(event_view).collect();
+        let _ = self.events.send(text(&Message::Events { events }));
     }
 }
 
@@ -423,23 +413,15 @@ fn order_view(record: &OrderRecord) -> OrderView<'_> {
     }
 }
 
-fn event_view(station: &NodeName, happened: &Happened) -> EventView {
-    let event = TraceEvent::new(station, happened);
-    let datum = |value: skein_wire::proto::Value| match value.kind? {
-        Kind::Flag(flag) => Some(Datum::Flag(flag)),
-        Kind::Integer(integer) => Some(Datum::Integer(integer)),
-        Kind::Real(real) => Some(Datum::Real(real)),
-        Kind::Text(text) => Some(Datum::Text(text)),
-    };
+fn event_view(happened: &Happened) -> EventView<'_> {
     EventView {
         time_s: happened.at.as_secs_f64(),
-        home: event.home,
-        seq: event.seq,
-        name: event.event,
-        data: event.data.into_iter().filter_map(|(key, value)| Some((key, datum(value)?))).collect(),
-        requested_by: event.requested_by,
-        blocked_by: event.blocked_by,
-        lease_age_ms: event.lease_age_ms,
+        home: happened.home.as_str(),
+        seq: happened.seq,
+        name: happened.event.name(),
+        data: happened.event.data().collect(),
+        requested_by: &happened.requested_by,
+        blocked_by: happened.event.text("by").into_iter().collect(),
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::Occurred;
+use skein_dbp::Happened;
 
 /// Who is slower than this does not get anywhere, m/s.
 const SLOW_M_S: f64 = 0.2;
@@ -99,14 +99,14 @@ pub struct Change {
     pub cycle: Vec<String>,
 }
 
-impl From<&Occurred> for EventNote {
-    fn from(occurred: &Occurred) -> Self {
+impl From<&Happened> for EventNote {
+    fn from(happened: &Happened) -> Self {
         Self {
-            time_s: occurred.at.as_secs_f64(),
-            event: occurred.event.to_string(),
-            home: occurred.home.to_string(),
-            requested_by: occurred.requested_by.clone(),
-            choice: occurred.choice.clone(),
+            time_s: happened.at.as_secs_f64(),
+            event: happened.event.to_string(),
+            home: happened.home.to_string(),
+            requested_by: happened.requested_by.iter().map(ToString::to_string).collect(),
+            choice: happened.choice.as_deref().map(Into::into),
         }
     }
 }

@@ -31,7 +31,7 @@ use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 use nalgebra::{Isometry3, Vector3};
 use prost::Message;
-use skein_dbp::{Board, NodeName};
+use skein_dbp::{Board, Happened, NodeName};
 use skein_wire::proto::{self, TraceEvent};
 use skein_wire::{Scan, Solid, State};
 use thiserror::Error;
@@ -240,13 +240,13 @@ impl Recorder {
         self.write("/log", now, &message)
     }
 
-    /// An event that a node selected or heard of, for `/skein/trace`, at the event's own time.
+    /// An event that `node` selected or heard of, for `/skein/trace`, at the event's own time.
     ///
     /// # Errors
     /// [`RecorderError::Write`].
-    pub fn trace(&mut self, event: &TraceEvent) -> Result<(), RecorderError> {
-        let at = Duration::from_nanos(event.time_ns);
-        self.write_own("/skein/trace", "skein.TraceEvent", at, event)
+    pub fn trace(&mut self, node: &NodeName, happened: &Happened) -> Result<(), RecorderError> {
+        let event = TraceEvent::new(node, happened);
+        self.write_own("/skein/trace", "skein.TraceEvent", happened.at, &event)
     }
 
     /// What a vehicle tells of itself, for `/uav/N/state`, unless it has been written already; its path has a topic of its

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use skein_wire::{NodeLink, NodeName};
 
-use crate::ZenohLink;
+use crate::link::ZenohLink;
 
 /// Between two lines.
 const PERIOD: Duration = Duration::from_secs(1);

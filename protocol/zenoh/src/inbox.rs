@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 
 use skein_wire::{Key, MAX_PAYLOAD};
 
-use crate::Bell;
+use crate::bell::Bell;
 
 /// How many bytes may wait at a link, however few messages they are.
 const MOST_BYTES: usize = 64 << 20;

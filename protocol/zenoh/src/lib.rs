@@ -25,6 +25,7 @@ mod config;
 mod error;
 mod inbox;
 mod link;
+mod queue;
 mod runtime;
 mod session;
 
@@ -33,5 +34,6 @@ pub use complaints::Complaints;
 pub use config::{Mode, NetworkSettings, Security, ZenohConfig};
 pub use error::ZenohError;
 pub use link::{ZenohLink, ZenohLinkStats};
+pub use queue::ZenohStats;
 pub use runtime::share_threads;
-pub use session::{ZenohSession, ZenohStats};
+pub use session::ZenohSession;

@@ -5,13 +5,15 @@ use std::sync::atomic::Ordering;
 
 use skein_wire::{Key, Link};
 
+use crate::bell::Bell;
 use crate::inbox::Inbox;
-use crate::{Bell, ZenohSession};
+use crate::queue::Entry;
 
-/// One node's link over a [`ZenohSession`]. It never waits.
+/// One node's link over a [`ZenohSession`](crate::ZenohSession). It never waits.
 #[derive(Debug)]
 pub struct ZenohLink {
-    session: ZenohSession,
+    /// Keeps the session open.
+    session: Arc<Entry>,
     port: u64,
     inbox: Arc<Inbox>,
 }
@@ -30,7 +32,7 @@ pub struct ZenohLinkStats {
 }
 
 impl ZenohLink {
-    pub(crate) fn new(session: ZenohSession, port: u64, inbox: Arc<Inbox>) -> Self {
+    pub(crate) fn new(session: Arc<Entry>, port: u64, inbox: Arc<Inbox>) -> Self {
         Self { session, port, inbox }
     }
 

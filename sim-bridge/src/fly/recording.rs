@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use skein_ground::GroundCore;
 use skein_ground::recorder::{Level, Recorder, RecorderError};
-use skein_wire::proto::TraceEvent;
 use skein_wire::vocabulary::ADVANCE;
 
 use super::{
@@ -85,7 +84,7 @@ impl Recording {
 
     fn events(&mut self, now: Duration, happenings: &Happenings) -> Result<(), RecorderError> {
         for happened in &happenings.selections {
-            self.recorder.trace(&TraceEvent::new(&happened.home, happened))?;
+            self.recorder.trace(&happened.home, happened)?;
             // The trace holds every leave to move; people do not need to read each.
             if happened.event.kind() != ADVANCE {
                 self.recorder.log(now, Level::Info, happened.home.as_str(), &happened.event.to_string())?;

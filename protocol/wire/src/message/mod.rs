@@ -19,7 +19,7 @@ mod state;
 use prost::Message as _;
 use skein_dbp::{BidAck, BidRecord, Board, Message, NodeName, Occurrence, Presence, Repair};
 
-use self::field::Result;
+pub(crate) use self::field::{Result, node, ns};
 pub use self::{
     record::{Addressee, Kind, Record},
     scan::Scan,
