@@ -13,6 +13,7 @@ const SLOW_M_S: f64 = 0.2;
 ///
 /// B-threads of the vehicle are named plainly, those elsewhere as `node#bthread`. Times are the listener's, in seconds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Explanation {
     pub vehicle: String,
     pub time_s: f64,
@@ -30,6 +31,7 @@ pub struct Explanation {
 
 /// Where a vehicle is and what it does.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Situation {
     /// How old this is.
     pub age_s: f64,
@@ -51,6 +53,7 @@ pub struct Situation {
 
 /// An event that has happened.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct EventNote {
     pub time_s: f64,
     /// Its name and data.
@@ -65,6 +68,7 @@ pub struct EventNote {
 
 /// Something that is requested.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Request {
     /// Its name and data.
     pub event: String,
@@ -77,6 +81,7 @@ pub struct Request {
 
 /// Who blocks a request.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Blocker {
     pub node: String,
     pub bthread: String,
@@ -90,6 +95,7 @@ pub struct Blocker {
 
 /// One reason for which a vehicle stands still, and what would end it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Change {
     /// Sentences, from the vehicle to what is behind it all.
     pub because: Vec<String>,

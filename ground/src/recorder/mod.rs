@@ -134,7 +134,7 @@ impl Recorder {
         })
     }
 
-    /// What stands in the world, for `/scene`.
+    /// The obstacles of the world, for `/scene`.
     ///
     /// # Errors
     /// [`RecorderError::Write`], as for all that follow.
@@ -155,7 +155,7 @@ impl Recorder {
         self.write("/scene", now, &SceneUpdate { entities, ..SceneUpdate::default() })
     }
 
-    /// Where the vehicles are (body FLU to world ENU, metres), for `/tf` and `/uav/N/pose`: all in one call.
+    /// The poses of the vehicles (body FLU to world ENU, metres), for `/tf` and `/uav/N/pose`: all in one call.
     ///
     /// # Errors
     /// [`RecorderError::Write`].
@@ -197,7 +197,7 @@ impl Recorder {
         self.write(&format!("/{vehicle}/path"), now, &SceneUpdate { entities, ..SceneUpdate::default() })
     }
 
-    /// What a vehicle's lidar sees, for `/uav/N/scan`.
+    /// One turn of a vehicle's lidar, for `/uav/N/scan`.
     ///
     /// # Errors
     /// [`RecorderError::Write`].
@@ -249,7 +249,7 @@ impl Recorder {
         self.write_own("/skein/trace", "skein.TraceEvent", happened.at, &event)
     }
 
-    /// What a vehicle tells of itself, for `/uav/N/state`, unless it has been written already; its path has a topic of its
+    /// The state of a vehicle, for `/uav/N/state`, unless it has been written already; its path has a topic of its
     /// own.
     ///
     /// # Errors
@@ -264,7 +264,7 @@ impl Recorder {
         self.write_own(&format!("/{}/state", state.node), "skein.State", now, &message)
     }
 
-    /// What a node has on its board, for `/uav/N/board`, unless it has been written already.
+    /// The board of a node, for `/uav/N/board`, unless it has been written already.
     ///
     /// # Errors
     /// [`RecorderError::Write`].

@@ -16,11 +16,7 @@ pub enum IncarnationError {
     File { path: PathBuf, source: io::Error },
     /// The file holds something else.
     #[error("`{}` holds {found:?}: expected a number; put one there that is greater than any this node has had", path.display())]
-    Content {
-        path: PathBuf,
-        /// What stands there.
-        found: String,
-    },
+    Content { path: PathBuf, found: String },
 }
 
 /// The next incarnation of `node`: greater than every one before that had this `folder`, and on disk before it is

@@ -12,7 +12,7 @@ pub fn path_of(folder: &Path, node: &NodeName, what: &str) -> PathBuf {
     folder.join(format!("{}.{what}", node.as_str().replace('/', "-")))
 }
 
-/// What the file holds; none if there is no file.
+/// The content of the file; none if there is no file.
 pub fn read(path: &Path) -> io::Result<Option<Vec<u8>>> {
     match fs::read(path) {
         Ok(text) => Ok(Some(text)),

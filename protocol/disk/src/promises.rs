@@ -1,4 +1,4 @@
-//! What a node has promised to others.
+//! The promises that a node has made to others.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -16,11 +16,7 @@ pub enum PromisesError {
     File { path: PathBuf, source: io::Error },
     /// The file holds something else.
     #[error("`{}`: {source}; it should hold the blocks that this node must keep, as JSON. Remove it only if none of them is to hold any more", path.display())]
-    Content {
-        path: PathBuf,
-        /// What is wrong, with line and column.
-        source: serde_json::Error,
-    },
+    Content { path: PathBuf, source: serde_json::Error },
 }
 
 /// Keeps a node's promises in `<folder>/<node>.kept.json`, written whole each time.

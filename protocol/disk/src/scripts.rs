@@ -20,9 +20,7 @@ pub struct ScriptStore(PathBuf);
 #[error("`{}`: {problem}; the scripts that this vehicle had been sent are kept there, as JSON. {fate}", path.display())]
 pub struct ScriptsLost {
     pub path: PathBuf,
-    /// What is wrong with it.
     pub problem: String,
-    /// Where it is now.
     fate: Fate,
 }
 

@@ -49,7 +49,8 @@ pub enum KeyError {
     },
     /// The key has another form.
     #[error(
-        "`{given}` is not a key: expected `{ROOT}/<fleet>/<what>/<node>`, `<what>` one of {}, and a second node where it is for one",
+        "`{given}` is not a key: expected `{ROOT}/<fleet>/<what>/<node>`, `<what>` one of {}, \
+         and a second node where it is for one",
         words()
     )]
     Form {

@@ -1,4 +1,4 @@
-//! What nodes say to one another: messages, keys, the [`Link`] seam and a [`Network`] in memory.
+//! The messages between nodes: their forms and keys, the [`Link`] seam and a [`Network`] in memory.
 //!
 //! The protocol's records ([`skein_dbp::Message`]) and each vehicle's [`State`] travel as protobuf under keys
 //! `skein/<fleet>/<what>/<node>/...`. A [`NodeLink`] couples a [`skein_dbp::Node`] to any [`Link`]; the

@@ -11,7 +11,7 @@ use skein_dbp::NodeName;
 use crate::key::Key;
 use crate::link::Link;
 
-/// How the network treats messages. Probabilities are from 0 to 1, for each message and receiver.
+/// The faults and delays of a network. Probabilities are from 0 to 1, for each message and receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NetworkConfig {
     /// Least and greatest time that a message takes, drawn evenly.
@@ -36,7 +36,7 @@ impl Default for NetworkConfig {
     }
 }
 
-/// What the network has carried.
+/// Counts of the messages that a network has carried.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NetworkStats {
     /// Messages put by all nodes.
@@ -170,7 +170,6 @@ impl Network {
         self.lock().groups.clear();
     }
 
-    /// What has been carried so far.
     #[must_use]
     pub fn stats(&self) -> NetworkStats {
         self.lock().stats

@@ -11,7 +11,7 @@ use crate::link::Link;
 use crate::message::{Payload, State};
 use crate::store::Store;
 
-/// How many messages one pump takes in, so that a flood cannot keep a node from going on.
+/// One pump takes in so many messages at most, so that a flood cannot keep a node from going on.
 const MOST_PER_PUMP: usize = 4096;
 
 /// Of how many nodes it is remembered that they speak another version.
@@ -35,7 +35,7 @@ pub struct NodeLink {
     node: Node,
     fleet: Fleet,
     store: Option<Box<dyn Store>>,
-    /// What the store has not taken yet.
+    /// Promises that the store has not taken yet.
     unsaved: Option<Kept>,
     states: Vec<State>,
     /// Other nodes' boards, for who reads them.
@@ -46,7 +46,7 @@ pub struct NodeLink {
     skewed: BTreeMap<NodeName, u32>,
 }
 
-/// What has come in that was not understood.
+/// Counts of the messages that have come and gone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NodeLinkStats {
     /// Messages taken in.
@@ -159,7 +159,6 @@ impl NodeLink {
         &self.fleet
     }
 
-    /// What has come and gone.
     #[must_use]
     pub fn stats(&self) -> NodeLinkStats {
         self.stats
@@ -231,7 +230,7 @@ impl NodeLink {
 }
 
 impl NodeLink {
-    /// Whether nothing is left to be kept.
+    /// Saves the promises; returns whether all of them are kept.
     fn keep(&mut self) -> bool {
         self.unsaved = self.node.take_unsaved().or_else(|| self.unsaved.take());
         let (Some(kept), Some(store)) = (&self.unsaved, &mut self.store) else { return true };

@@ -11,7 +11,7 @@ use crate::message::{Result, node, ns};
 use crate::proto::{self, TraceEvent};
 
 impl TraceEvent {
-    /// What `node` saw happen.
+    /// The record of what `node` saw happen.
     #[must_use]
     pub fn new(node: &NodeName, happened: &Happened) -> Self {
         let proto::Event { name, data } = (&happened.event).into();

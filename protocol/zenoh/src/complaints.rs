@@ -1,4 +1,4 @@
-//! What comes in that is of no use, in a line a second at most.
+//! Complaints about useless messages, in a line a second at most.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

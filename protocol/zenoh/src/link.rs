@@ -18,7 +18,7 @@ pub struct ZenohLink {
     inbox: Arc<Inbox>,
 }
 
-/// What has arrived at a link.
+/// Counts of the messages that have arrived at a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ZenohLinkStats {
     /// Messages that arrived.
@@ -42,13 +42,11 @@ impl ZenohLink {
         self.inbox.bell.clone()
     }
 
-    /// Whether no message waits to be taken.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.inbox.is_empty()
     }
 
-    /// What has arrived so far.
     #[must_use]
     pub fn stats(&self) -> ZenohLinkStats {
         ZenohLinkStats {

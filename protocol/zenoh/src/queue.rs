@@ -11,7 +11,7 @@ use tokio::sync::mpsc::{Receiver, Sender, UnboundedReceiver, UnboundedSender, ch
 use crate::error::ZenohError;
 use crate::inbox::Inbox;
 
-/// What has passed through a session.
+/// Counts of the messages that have passed through a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ZenohStats {
     pub messages: u64,
@@ -38,7 +38,7 @@ pub(crate) struct Put {
     pub(crate) payload: Vec<u8>,
 }
 
-/// What else the session is asked to do.
+/// Anything else that the session is asked to do.
 pub(crate) enum Command {
     Join { port: u64, patterns: Vec<String>, inbox: Arc<Inbox>, answer: SyncSender<Result<(), ZenohError>> },
     Leave { port: u64 },
@@ -51,7 +51,7 @@ pub(crate) enum Asked {
     Command(Command),
 }
 
-/// Where messages to put wait, so many at most, and commands, which are few.
+/// The asking end: messages to put are so many at most, commands are few.
 #[derive(Debug)]
 pub(crate) struct Senders {
     puts: Sender<Put>,

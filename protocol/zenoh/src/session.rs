@@ -19,9 +19,9 @@ use crate::inbox::Inbox;
 use crate::link::ZenohLink;
 use crate::queue::{Asked, Command, Entry, Put, Queue, ZenohStats, queue};
 
-/// How often opening is tried when the port that was free has been taken meanwhile.
+/// Opening is tried so often when the port that was free has been taken meanwhile.
 const OPENING_TRIES: usize = 8;
-/// How many keys have a publisher; what is put under others travels all the same.
+/// So many keys have a publisher; messages under others travel all the same.
 const MOST_PUBLISHERS: usize = 1024;
 /// A client looks for its router this often.
 const TRY_AGAIN: Duration = Duration::from_millis(200);
@@ -42,7 +42,7 @@ struct Shared {
     fleet: Fleet,
     locators: Vec<String>,
     incoming_capacity: usize,
-    /// Whether commands are carried out at once.
+    /// Commands are carried out at once.
     waits: bool,
     next_port: AtomicU64,
     entry: Arc<Entry>,
@@ -111,7 +111,7 @@ impl ZenohSession {
         Ok(ZenohLink::new(self.0.entry.clone(), port, inbox))
     }
 
-    /// Where others can connect to this session.
+    /// The endpoints of this session, for others to connect to.
     #[must_use]
     pub fn locators(&self) -> &[String] {
         &self.0.locators
@@ -124,7 +124,6 @@ impl ZenohSession {
         self.0.entry.ask(Command::CountPeers { answer }).ok().and_then(|()| peers.recv().ok()).unwrap_or(0)
     }
 
-    /// What has passed through.
     #[must_use]
     pub fn stats(&self) -> ZenohStats {
         self.0.entry.stats()
@@ -236,7 +235,7 @@ async fn serve(session: zenoh::Session, waited: Vec<Command>, mut queue: Queue) 
 /// A publisher for each key that has been put, so that Zenoh finds out once, and not with each message, who hears it.
 struct Publishers<'a> {
     session: &'a zenoh::Session,
-    /// Whether what is put has listeners in this session too.
+    /// Everybody, if this session has listeners of its own; else only other sessions.
     destination: Locality,
     declared: BTreeMap<String, Publisher<'a>>,
 }

@@ -1,4 +1,4 @@
-//! What all b-threads bid at a node, on `board/<node>`. Only ground stations listen.
+//! A node's board: the bids of all b-threads there, on `board/<node>`. Only ground stations listen.
 
 use std::time::Duration;
 
@@ -33,7 +33,7 @@ impl From<&Board> for proto::Board {
 impl TryFrom<proto::Board> for Board {
     type Error = DecodeError;
 
-    /// What exceeds the quotas is cut here too: a board decides nothing, and part of it is better than none.
+    /// A board that exceeds the quotas is cut here too: a board decides nothing, and part of it is better than none.
     fn try_from(board: proto::Board) -> Result<Self> {
         let rows =
             board.rows.into_iter().take(Self::MAX_ROWS).map(BoardRow::try_from).collect::<Result<_>>()?;

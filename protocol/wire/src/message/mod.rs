@@ -1,6 +1,6 @@
 //! The messages, each in a file of its own: its fields, its keys, who may say it, and its protobuf form.
 //!
-//! Who adds one writes its file, its form in `proto/skein.proto`, and its line in the list below.
+//! To add one, write its file, its form in `proto/skein.proto`, and its line in the list below.
 
 mod ack;
 mod bid;
@@ -36,7 +36,7 @@ macro_rules! messages {
         protocol: $($said:ident($said_type:ident)),+;
         $($(#[$about:meta])* $other:ident($other_type:ident)),+;
     ) => {
-        /// What travels under a key.
+        /// The content of a message.
         ///
         /// ```
         /// use skein_wire::{NodeName, Payload, State};
@@ -88,11 +88,11 @@ messages! {
     protocol: Bid(BidRecord), Ack(BidAck), Occurrence(Occurrence), Repair(Repair), Presence(Presence);
     /// A vehicle's state.
     State(State),
-    /// What a vehicle's lidar sees.
+    /// One turn of a vehicle's lidar.
     Scan(Scan),
-    /// What stands in a world.
+    /// A world, for display.
     Scene(Scene),
-    /// What all b-threads bid at a node.
+    /// The bids of all b-threads at a node.
     Board(Board);
 }
 

@@ -1,4 +1,4 @@
-//! What every message tells of itself: the keys it travels under, and who may say it.
+//! The heading of a message: the keys that it travels under, and who may say it.
 
 use skein_dbp::NodeName;
 
@@ -21,7 +21,7 @@ pub trait Record {
 pub struct Kind {
     pub word: &'static str,
     pub addressee: Addressee,
-    /// Whether every node listens to what is for it or for all; to other kinds only those listen who ask for them.
+    /// Every node listens to those that are for it or for all. If not, only those listen who ask for them.
     pub every_node_listens: bool,
 }
 
@@ -34,13 +34,11 @@ pub enum Addressee {
 }
 
 impl Kind {
-    /// Whether a message of this kind may be for all.
     #[must_use]
     pub const fn may_be_for_all(&self) -> bool {
         !matches!(self.addressee, Addressee::One)
     }
 
-    /// Whether a message of this kind may be for one node.
     #[must_use]
     pub const fn may_be_for_one(&self) -> bool {
         !matches!(self.addressee, Addressee::All)

@@ -1,4 +1,4 @@
-//! What a vehicle's lidar sees, on `scan/<sensor>/<vehicle>`. Only the vehicle's agent listens.
+//! One turn of a vehicle's lidar, on `scan/<sensor>/<vehicle>`. Only the vehicle's agent listens.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ pub struct Scan {
     pub angle_min: f64,
     /// From one ray to the next, radians.
     pub angle_step: f64,
-    /// What the lidar can see, metres.
+    /// The lidar sees so far, metres.
     pub max_range_m: f64,
     /// Metres, at most [`Scan::MAX_RAYS`]; infinite where nothing came back.
     pub ranges_m: Vec<f32>,
@@ -31,7 +31,7 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// How many rays a scan may have.
+    /// A scan has at most so many rays.
     pub const MAX_RAYS: usize = 4096;
 }
 

@@ -1,4 +1,4 @@
-//! What stands in a world, as a recording and the console show it, on `scene/<node>`.
+//! A world, as a recording and the console show it, on `scene/<node>`.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use skein_dbp::NodeName;
@@ -14,7 +14,6 @@ pub struct Scene {
     /// Least corner of the space to fly in, metres ENU.
     pub min: Vector3<f64>,
     pub max: Vector3<f64>,
-    /// What stands there.
     pub solids: Vec<Solid>,
 }
 
@@ -44,7 +43,7 @@ pub enum Form {
 }
 
 impl Scene {
-    /// How many bodies of a scene travel.
+    /// So many bodies of a scene travel.
     pub const MAX_SOLIDS: usize = 4096;
 }
 

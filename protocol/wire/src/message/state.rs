@@ -31,17 +31,15 @@ pub struct State {
     pub radius_m: f64,
     /// The autopilot's mode.
     pub mode: String,
-    /// Whether the motors are armed.
     pub armed: bool,
     /// Share of the battery's energy left, 0 to 1.
     pub battery: f64,
-    /// What the vehicle is about.
+    /// Its task, for people.
     pub task: String,
-    /// What it waits for, empty if for nothing.
+    /// Its reason to wait; empty if it does not.
     pub waiting_for: String,
     /// Points of the planned path, metres, for display; only the first [`State::MAX_PATH`] travel.
     pub path: Vec<Vector3<f64>>,
-    /// How far its mission is.
     pub mission: MissionState,
     /// The names of the scripts that run on it; only the first [`State::MAX_SCRIPTS`] travel.
     pub scripts: Vec<String>,
@@ -60,7 +58,7 @@ pub struct Echo {
     pub held: Duration,
 }
 
-/// How far a vehicle's mission is.
+/// The progress of a vehicle's mission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MissionState {
     #[default]
@@ -72,9 +70,9 @@ pub enum MissionState {
 }
 
 impl State {
-    /// How many points of a path travel.
+    /// So many points of a path travel.
     pub const MAX_PATH: usize = 32;
-    /// How many names of scripts travel.
+    /// So many names of scripts travel.
     pub const MAX_SCRIPTS: usize = 8;
 
     /// A vehicle that stands disarmed at the origin with a full battery: a start to fill in.
