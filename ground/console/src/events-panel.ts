@@ -8,7 +8,7 @@ import { EventHistory, passes, split } from './event-history';
 import { type Identity, identities } from './identity';
 import type { SwarmEvent } from './protocol';
 import type { Selection } from './selection';
-import { clockWords, dataWords, durationWords, spaced } from './words';
+import { clockWords, dataWords, spaced } from './words';
 
 /** This near to the end counts as being at it. */
 const END_PX = 12;
