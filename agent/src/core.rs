@@ -13,7 +13,9 @@ use skein_wire::vocabulary::{
     ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, HOMEWARD, LAND, LANDED, LOAD, ORDER, PLAN, RETURN, SCRIPT,
     UNLOAD,
 };
-use skein_wire::{Fleet, Link, MissionState, NodeLink, State, Store, joint_roster, vocabulary};
+use skein_wire::{
+    Fleet, KeptScript, Link, MissionState, NodeLink, Scan, State, Store, joint_roster, vocabulary,
+};
 
 use crate::{
     bthreads,
@@ -24,14 +26,12 @@ use crate::{
     neighbours::{Neighbour, Neighbours},
     pipeline::{
         guidance::{Guidance, Motion, Report, Surroundings},
-        perception::{Perception, Pose, Scan},
+        perception::{Perception, Pose},
         set_point::{FRESH_FOR, KeepAlive, SILENT_AFTER, keep_alive, oldest_age},
         touchdown::Descent,
     },
     precedence,
-    scripts::{
-        Begins, CONFIGURATION, Circumstances, KeptScript, RunningScript, ScriptFacts, ScriptStore, Scripts,
-    },
+    scripts::{Begins, CONFIGURATION, Circumstances, RunningScript, ScriptFacts, Scripts},
     sequential::Sequential,
     verify::check_script,
     watches::Watches,
@@ -175,7 +175,7 @@ impl AgentCore {
     /// again from its beginning if it passes all checks anew, once the vehicle is ready on the ground or an operator lets it
     /// go on in the air; one that does not is refused, and forgotten.
     #[must_use]
-    pub fn keeping_scripts(mut self, store: Box<dyn ScriptStore>, kept: &[KeptScript]) -> Self {
+    pub fn keeping_scripts(mut self, store: Box<dyn Store<Vec<KeptScript>>>, kept: &[KeptScript]) -> Self {
         for KeptScript { from, assignment } in kept {
             let outcome = self
                 .admit(assignment, from, Begins::WhenReleased)

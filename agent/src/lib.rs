@@ -2,7 +2,7 @@
 //!
 //! [`AgentCore`] does no I/O and reads no clock. A driver feeds it MAVLink bytes and lidar scans, ticks it every 20 ms with a
 //! [`Link`](skein_wire::Link) to the other nodes, and carries its MAVLink bytes to the autopilot. So the same agent flies
-//! on a vehicle, over Zenoh on one host, and in lockstep. Only [`scripts::FileScriptStore`], which is for drivers, touches files.
+//! on a vehicle, over Zenoh on one host, and in lockstep.
 
 mod airspace_table;
 pub mod bthreads;
@@ -27,5 +27,4 @@ pub use self::{
     core::{AgentCore, AgentError, Outcome, SetPointRecord, Status},
     flight::FlightPhase,
     me::Me,
-    pipeline::perception::Scan,
 };

@@ -12,13 +12,13 @@ use serde_json::{Value, json};
 use skein_agent::{
     AgentConfig, AgentCore, Controller, Envelope, Fence, Me, PassageRule, Planners,
     bthreads::{self, LinkLossPolicy},
-    scripts::{Begins, KeptScript, MemoryScriptStore, Runner, ScriptStore, Scripts},
+    scripts::{Begins, Runner, Scripts},
 };
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_bp::{Event, Program, ProgramConfig};
 use skein_mav::Datum;
 use skein_wire::vocabulary::{self, *};
-use skein_wire::{Network, NetworkConfig};
+use skein_wire::{KeptScript, MemoryStore, Network, NetworkConfig, Store};
 
 const ME: &str = "uav/1";
 const ROSTER: [&str; 4] = ["uav/1", "uav/2", "ground/main", "script/operator"];
@@ -303,7 +303,7 @@ fn stay() -> Assignment {
 #[test]
 fn a_script_that_was_sent_is_kept_until_it_is_withdrawn() {
     let mut vehicle = Vehicle::in_the_air();
-    let store = MemoryScriptStore::default();
+    let store = MemoryStore::default();
     vehicle.scripts.keep_in(Box::new(store.clone()));
     vehicle.load(&stay()).unwrap();
     assert_eq!(store.kept(), [KeptScript { from: SENDER.to_owned(), assignment: stay() }]);
@@ -315,8 +315,8 @@ fn a_script_that_was_sent_is_kept_until_it_is_withdrawn() {
 #[derive(Clone, Debug, Default)]
 struct Disk(Arc<AtomicBool>);
 
-impl ScriptStore for Disk {
-    fn save(&mut self, _: &[KeptScript]) -> Result<(), String> {
+impl Store<Vec<KeptScript>> for Disk {
+    fn save(&mut self, _: &Vec<KeptScript>) -> Result<(), String> {
         if self.0.load(Ordering::Relaxed) { Ok(()) } else { Err("no space left".to_owned()) }
     }
 }
@@ -413,7 +413,7 @@ fn the_next_life_runs_what_was_kept_and_forgets_what_passes_no_more() {
             assignment: script(json!([{"sync": {"block": "uav/1/land"}}])),
         },
     ];
-    let store = MemoryScriptStore::default();
+    let store = MemoryStore::default();
     let core = AgentCore::new(config()).unwrap().keeping_scripts(Box::new(store.clone()), &kept);
     assert_eq!(core.scripts().map(|(name, _)| name).collect::<Vec<_>>(), ["good"]);
     assert_eq!(store.kept(), kept[..1]);

@@ -174,7 +174,7 @@ impl GroundCore {
         }
         self.note_boards(link);
         let happened = self.node.node_mut().take_selections();
-        happened.iter().for_each(|happened| self.evidence.note_event(happened.into()));
+        happened.iter().for_each(|happened| self.evidence.note_event(happened.clone()));
         self.order_log.update(now, self.node.node(), &happened);
         self.selections.extend(happened);
         outcome

@@ -4,12 +4,11 @@ use std::path::Path;
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_bp::{Bid, Event, EventSet};
-use skein_dbp::{Board, BoardLease, BoardRow, NodeName};
+use skein_bp::{Bid, Event, EventSet, Origin};
+use skein_dbp::{Board, BoardLease, BoardRow, Happened, NodeName};
 use skein_ground::bthreads::Hold;
-use skein_ground::explain::{Evidence, Explanation, Occurred, Recorded, RecordedError, explain};
+use skein_ground::explain::{Evidence, Explanation, Recorded, RecordedError, explain};
 use skein_ground::recorder::Recorder;
-use skein_wire::proto::TraceEvent;
 use skein_wire::{MissionState, State};
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -19,6 +18,13 @@ const LEASE: BoardLease = BoardLease { age: Duration::from_millis(200), length: 
 
 fn node(name: &str) -> NodeName {
     NodeName::new(name).unwrap()
+}
+
+/// An event of a vehicle that one of its b-threads has requested.
+fn happened(at: Duration, event: Event, requested_by: &str) -> Happened {
+    let origin = Origin::Internal;
+    let requested_by = vec![requested_by.into()];
+    Happened { event, home: node("uav/3"), seq: 1, term: 0, origin, requested_by, choice: None, at }
 }
 
 /// A b-thread's bid, and who blocks whatever it requests.
@@ -183,12 +189,13 @@ fn an_empty_battery_that_keeps_a_vehicle_from_flying_is_told_with_what_it_went_b
     let operator = request("uav/3/return").wait_for("uav/3/order").priority(20);
     let mut evidence =
         hovering(vec![board("uav/3", &[("battery", battery, &[]), ("operator", operator, &["battery"])])]);
-    evidence.note_event(Occurred {
-        at: NOW - Duration::from_secs(3),
-        home: node("uav/3"),
-        event: Event::new("uav/3/land").with("why", "battery nearly empty"),
-        requested_by: vec!["battery".into()],
+    evidence.note_event(Happened {
         choice: Some("priority 50, over uav/3/goto by mission (blocked)".into()),
+        ..happened(
+            NOW - Duration::from_secs(3),
+            Event::new("uav/3/land").with("why", "battery nearly empty"),
+            "battery",
+        )
     });
     let explanation = of(&evidence, "uav/3");
     assert_eq!(
@@ -289,14 +296,8 @@ fn the_most_tangled_boards_are_explained_in_a_few_reasons() {
 fn record(path: &Path) -> Result<Recorder, Box<dyn std::error::Error>> {
     let mut recorder = Recorder::create(path)?;
     for second in 0..=20_u32 {
-        recorder.trace(&TraceEvent {
-            node: "uav/3".into(),
-            home: "uav/3".into(),
-            time_ns: u64::from(second) * 1_000_000_000,
-            event: "uav/3/plan".into(),
-            requested_by: vec!["mission".into()],
-            ..TraceEvent::default()
-        })?;
+        let planned = happened(Duration::from_secs(second.into()), "uav/3/plan".into(), "mission");
+        recorder.trace(&node("uav/3"), &planned)?;
         for tenth in 0..10 {
             let now = Duration::from_millis(u64::from(second) * 1000 + tenth * 100);
             let x = f64::from(second.min(10));

@@ -7,9 +7,12 @@ use std::time::{Duration, Instant};
 use foxglove::messages::{FrameTransforms, LaserScan, PoseInFrame, SceneUpdate};
 use nalgebra::{Isometry3, Vector3};
 use prost::Message;
-use skein_ground::recorder::{Level, Recorder, RecorderError, Scan};
+use skein_bp::{Event, Origin};
+use skein_dbp::Happened;
+use skein_ground::recorder::{Level, Recorder, RecorderError};
+use skein_wire::NodeName;
 use skein_wire::proto::TraceEvent;
-use skein_wire::{Form, Solid};
+use skein_wire::{Form, Scan, Solid};
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
@@ -19,12 +22,20 @@ fn ms(millis: u64) -> Duration {
     Duration::from_millis(millis)
 }
 
-fn event(millis: u64, name: &str) -> TraceEvent {
-    TraceEvent {
-        node: "uav/1".into(),
-        time_ns: millis * 1_000_000,
-        event: name.into(),
-        ..TraceEvent::default()
+fn node() -> NodeName {
+    NodeName::new("uav/1").unwrap()
+}
+
+fn event(millis: u64, name: &str) -> Happened {
+    Happened {
+        event: Event::new(name),
+        home: node(),
+        seq: 3,
+        term: 0,
+        origin: Origin::Internal,
+        requested_by: vec!["navigation".into()],
+        choice: Some("priority 10".into()),
+        at: ms(millis),
     }
 }
 
@@ -39,7 +50,15 @@ fn record(path: &Path, millis: u64) -> Result<Recorder, RecorderError> {
     recorder.scene(ms(0), &[tree, wall])?;
     recorder.vehicles(ms(0), &VEHICLES.map(|v| (v, 0.25)))?;
     recorder.log(ms(0), Level::Info, "ground/main", "mission starts")?;
-    let ranges: Vec<f32> = (0..720_u16).map(|i| 3.0 + f32::from(i).sin()).collect();
+    let scan = Scan {
+        stamp: ms(0),
+        angle_min: -3.0,
+        angle_step: 0.01,
+        max_range_m: 40.0,
+        ranges_m: (0..720_u16).map(|i| 3.0 + f32::from(i).sin()).collect(),
+        up_m: None,
+        down_m: None,
+    };
     for now in (0..millis).step_by(20) {
         let t = now as f64 / 1000.0;
         let pose = |i: usize| Isometry3::translation(t, i as f64, 3.0);
@@ -47,17 +66,13 @@ fn record(path: &Path, millis: u64) -> Result<Recorder, RecorderError> {
         recorder.poses(ms(now), &poses)?;
         for vehicle in VEHICLES {
             if now % 100 == 0 {
-                recorder.scan(
-                    ms(now),
-                    vehicle,
-                    Scan { ranges_m: &ranges, angle_min: -3.0, angle_step: 0.01 },
-                )?;
+                recorder.scan(ms(now), vehicle, &scan)?;
             }
             if now % 1000 == 0 {
                 recorder.path(ms(now), vehicle, &[Vector3::zeros(), Vector3::x()])?;
             }
         }
-        recorder.trace(&event(now, "uav/1/advance"))?;
+        recorder.trace(&node(), &event(now, "uav/1/advance"))?;
     }
     Ok(recorder)
 }
@@ -100,7 +115,9 @@ fn every_topic_is_there_with_its_schema_and_decodes() -> Outcome {
     let scan = LaserScan::decode(&*topics["/uav/3/scan"][0].data)?;
     assert_eq!((scan.ranges.len(), scan.end_angle), (720, -3.0 + 0.01 * 719.0));
     assert!((scan.ranges[10] - f64::from(3.0 + 10_f32.sin())).abs() < 0.001);
-    assert_eq!(TraceEvent::decode(&*topics["/skein/trace"][1].data)?, event(20, "uav/1/advance"));
+    let trace = TraceEvent::decode(&*topics["/skein/trace"][1].data)?;
+    assert_eq!(trace.node, "uav/1");
+    assert_eq!(Happened::try_from(trace)?, event(20, "uav/1/advance"));
     Ok(())
 }
 
@@ -123,7 +140,7 @@ fn log_times_are_simulated_and_never_go_back() -> Outcome {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("mission.mcap");
     let mut recorder = record(&path, 500)?;
-    recorder.trace(&event(40, "late"))?;
+    recorder.trace(&node(), &event(40, "late"))?;
     recorder.finish()?;
     let file = std::fs::read(&path)?;
     let times: Vec<_> =

@@ -7,9 +7,9 @@ use std::time::{Duration, Instant, SystemTime};
 use anyhow::Context as _;
 use serde::Deserialize;
 use skein_agent::Outcome;
-use skein_dbp::{Message, NodeName};
-use skein_wire::{Fleet, Key, Link as _, MissionState, Payload, Scan, State, Topic};
-use skein_world::{LidarScan, STEP, Simulation};
+use skein_dbp::{Message, NodeName, Occurrence};
+use skein_wire::{Fleet, Key, Link as _, MissionState, Payload, Scan, Scene, State};
+use skein_world::{STEP, Simulation};
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
 
 use crate::fly::account::Account;
@@ -93,19 +93,16 @@ impl WorldHost {
         let node = NodeName::new(&config.node)?;
         let ports = MavlinkPorts::open(scenario.vehicles.len(), port_offset)?;
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
-        let occurrences = Key::occurrences(&fleet);
-        let scan_key = |index| {
-            let topic = Topic::Scan { sensor: node.clone(), vehicle: vehicle_name(index) };
-            Key::new(&fleet, topic)
-        };
+        let occurrences = Key::pattern::<Occurrence>(&fleet);
+        let scan_key = |index| Key::to_one::<Scan>(&fleet, node.clone(), vehicle_name(index));
         Ok(Self {
             simulation: Simulation::new(simulation_config(scenario)),
             ports,
-            link: session.listen(vec![Key::states(&fleet), occurrences])?,
+            link: session.listen(vec![Key::pattern::<State>(&fleet), occurrences])?,
             locators: session.locators().to_vec(),
             scan_keys: (0..scenario.vehicles.len()).map(scan_key).collect(),
             scene: Payload::Scene(scene_view::view(&scenario.scene)).encode(),
-            scene_key: Key::new(&fleet, Topic::Scene { node }),
+            scene_key: Key::to_all::<Scene>(&fleet, node),
             scene_due: Duration::ZERO,
             heard: BTreeMap::new(),
             events: EventCounts::default(),
@@ -239,15 +236,7 @@ impl WorldHost {
 }
 
 /// A scan with its time on this computer's clock.
-fn timed(scan: LidarScan, now: Duration) -> Scan {
+fn timed(scan: Scan, now: Duration) -> Scan {
     let unix = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
-    Scan {
-        measured_at_unix: unix.saturating_sub(now.saturating_sub(scan.stamp)),
-        angle_min: scan.angle_min,
-        angle_step: scan.angle_step,
-        max_range_m: scan.max_range_m,
-        ranges_m: scan.ranges_m,
-        up_m: scan.up_m,
-        down_m: scan.down_m,
-    }
+    Scan { stamp: unix.saturating_sub(now.saturating_sub(scan.stamp)), ..scan }
 }

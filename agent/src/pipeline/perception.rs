@@ -5,6 +5,7 @@ use std::time::Duration;
 use nalgebra::{UnitQuaternion, Vector3};
 use skein_planning::airspace::KeepOut;
 use skein_planning::map::{ClearanceMap, MapError, RayEnd, Sectors, VoxelMapConfig};
+use skein_wire::Scan;
 
 use crate::config::Fence;
 
@@ -30,25 +31,6 @@ const NEAR_M: f64 = 6.0;
 const NEIGHBOUR_M: f64 = 0.8;
 /// Returns nearer than this are the vehicle's own frame, m.
 const OWN_FRAME_M: f64 = 0.15;
-
-/// One turn of a lidar that scans the body's x-y plane, with the range finders above and below.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Scan {
-    /// When it was taken.
-    pub stamp: Duration,
-    /// Angle of the first ray from body x, counter-clockwise, rad.
-    pub angle_min: f64,
-    /// Angle between rays, rad.
-    pub angle_step: f64,
-    /// Range beyond which nothing is seen, m.
-    pub max_range_m: f64,
-    /// Ranges, m; not finite where nothing was seen.
-    pub ranges_m: Vec<f32>,
-    /// Distance to what is above, m.
-    pub up_m: Option<f32>,
-    /// Distance to what is below, m.
-    pub down_m: Option<f32>,
-}
 
 /// Where the vehicle was, and how it lay, when a scan was taken. World ENU, body FLU.
 #[derive(Clone, Copy, Debug, PartialEq)]

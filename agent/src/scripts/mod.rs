@@ -2,11 +2,9 @@
 //!
 //! A script runs in the vehicle's program under the name `script/<name>`, so that it is explained like any other b-thread. It
 //! is checked before ([`ScriptRights`]), and can do no harm while it runs ([`Runner`]). What becomes of it is an
-//! event: `uav/3/script{name, state, why}`. Scripts that were sent are kept ([`ScriptStore`]) for the agent's next life.
+//! event: `uav/3/script{name, state, why}`. Scripts that were sent are kept ([`Store`]) for the agent's next life.
 
 mod facts;
-mod file_store;
-mod kept;
 mod rights;
 mod runner;
 
@@ -17,11 +15,10 @@ use skein_bp::{Event, EventSet, Program};
 use skein_wire::vocabulary::{
     ACCEPTED, ADVANCE, AHEAD, AT, BATTERY, ENDED, NEIGHBOUR, REFUSED, SCRIPT, WITHDRAWN,
 };
+use skein_wire::{KeptScript, Store};
 
 pub use self::{
     facts::{Circumstances, ScriptFacts},
-    file_store::{FileScriptStore, ScriptsLost},
-    kept::{KeptScript, MemoryScriptStore, ScriptStore},
     rights::ScriptRights,
     runner::Runner,
 };
@@ -64,7 +61,7 @@ pub struct Scripts {
     me: Me,
     rights: ScriptRights,
     running: BTreeMap<String, RunningScript>,
-    store: Option<Box<dyn ScriptStore>>,
+    store: Option<Box<dyn Store<Vec<KeptScript>>>>,
     /// Why the store does not hold what runs.
     unsaved: Option<String>,
     /// When to try that again.
@@ -93,7 +90,7 @@ impl Scripts {
     }
 
     /// Keeps in `store` from now on which scripts were sent and run.
-    pub fn keep_in(&mut self, store: Box<dyn ScriptStore>) {
+    pub fn keep_in(&mut self, store: Box<dyn Store<Vec<KeptScript>>>) {
         self.store = Some(store);
         self.note_unsaved();
     }
@@ -200,7 +197,7 @@ impl Scripts {
     fn save(&mut self) -> Result<(), String> {
         let Some(store) = &mut self.store else { return Ok(()) };
         let sent = self.running.values().filter(|script| script.from != CONFIGURATION);
-        let kept: Vec<_> = sent
+        let kept = sent
             .map(|script| KeptScript { from: script.from.clone(), assignment: script.assignment.clone() })
             .collect();
         store.save(&kept)?;

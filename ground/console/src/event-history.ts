@@ -37,14 +37,14 @@ export class EventHistory {
 }
 
 function keyOf(event: SwarmEvent): string {
-  return `${event.home} ${event.seq} ${event.time} ${event.name}`;
+  return `${event.home} ${event.seq} ${event.time_s} ${event.name}`;
 }
 
 export function passes(event: SwarmEvent, filter: EventFilter): boolean {
   if (filter.vehicles && ![...filter.vehicles].some((vehicle) => concerns(event, vehicle))) return false;
   const text = filter.text.trim().toLowerCase();
   if (!text) return true;
-  const words = [event.name, event.home, ...event.requestedBy, ...event.blockedBy, JSON.stringify(event.data)];
+  const words = [event.name, event.home, ...event.requested_by, ...event.blocked_by, JSON.stringify(event.data)];
   return words.some((word) => word.toLowerCase().includes(text));
 }
 
@@ -53,7 +53,7 @@ function concerns(event: SwarmEvent, vehicle: string): boolean {
   return (
     event.home === vehicle ||
     event.name.startsWith(`${vehicle}/`) ||
-    [...event.requestedBy, ...event.blockedBy].some((bthread) => bthread.startsWith(`${vehicle}#`))
+    [...event.requested_by, ...event.blocked_by].some((bthread) => bthread.startsWith(`${vehicle}#`))
   );
 }
 

@@ -8,12 +8,10 @@ import { EventHistory, passes, split } from './event-history';
 import { type Identity, identities } from './identity';
 import type { SwarmEvent } from './protocol';
 import type { Selection } from './selection';
-import { clockWords, dataWords, durationWords, spaced } from './words';
+import { clockWords, dataWords, spaced } from './words';
 
 /** This near to the end counts as being at it. */
 const END_PX = 12;
-/** A lease older than this is worth telling: what it stood for may no longer hold. */
-const OLD_LEASE_MS = 500;
 
 export class EventsPanel {
   private readonly history = new EventHistory();
@@ -140,18 +138,15 @@ export class EventsPanel {
     const row = html(
       'li',
       { class: 'event', title: `${event.name}, decided on ${event.home || node}${event.seq > 0 ? `, number ${event.seq}` : ', not shared'}` },
-      html('time', { class: 'event-time' }, clockWords(event.time)),
+      html('time', { class: 'event-time' }, clockWords(event.time_s)),
       who,
       html('span', { class: 'event-verb' }, spaced(verb || event.name)),
       html('span', { class: 'event-data' }, data),
     );
-    const asked = event.requestedBy.map((bthread) => shortName(bthread, node));
+    const asked = event.requested_by.map((bthread) => shortName(bthread, node));
     if (asked.length > 0) row.append(html('span', { class: 'event-by' }, `by ${asked.join(', ')}`));
-    const blocked = event.blockedBy.map((bthread) => shortName(bthread, node));
+    const blocked = event.blocked_by.map((bthread) => shortName(bthread, node));
     if (blocked.length > 0) row.append(html('span', { class: 'event-blocked' }, `blocked by ${blocked.join(', ')}`));
-    if (event.leaseAgeMs !== null && event.leaseAgeMs > OLD_LEASE_MS) {
-      row.append(html('span', { class: 'event-blocked' }, `lease ${durationWords(event.leaseAgeMs)} old`));
-    }
     return row;
   }
 }

@@ -13,7 +13,7 @@ import { listenToKeys } from './keys';
 import { Banner, Notices } from './notices';
 import { OrdersPanel } from './orders-panel';
 import { Placing } from './placing';
-import type { ClientMessage, Command, Fleet, Point, Question, Scene, Script, ServerMessage } from './protocol';
+import type { ClientMessage, Command, Fleet, Point, Question, Scene, Script, ServerMessage, What } from './protocol';
 import { addresseeWords, Selection } from './selection';
 import { Theme } from './theme';
 import { VehiclesPanel } from './vehicles-panel';
@@ -32,7 +32,7 @@ const ANSWER_MS = 3000;
 
 /** An order that the station has not answered yet. */
 interface Sent {
-  what: Command | 'load' | 'unload';
+  what: What;
   timer: number;
   point?: Point;
 }
@@ -62,7 +62,7 @@ const commands = new Commands(part('commands'), {
   everyone: () => selection.set([]),
 });
 
-let fleet: Fleet = { type: 'fleet', time: 0, outcome: null, vehicles: [] };
+let fleet: Fleet = { type: 'fleet', time_s: 0, outcome: null, vehicles: [] };
 /** By tag. */
 const unanswered = new Map<string, Sent>();
 let tags = 0;
@@ -146,7 +146,7 @@ function showStation({ fleet, station, software }: Scene): void {
 
 function showFleet(): void {
   const fleetNames = names();
-  setText(part('clock'), clockWords(fleet.time));
+  setText(part('clock'), clockWords(fleet.time_s));
   events.setFleet(fleetNames);
   orders.setFleet(fleetNames);
   vehicles.show(fleet);

@@ -69,14 +69,14 @@ export class OrdersPanel {
     setText(this.earlierHead, `Earlier (${rest.length})`);
     this.earlierList.replaceChildren(
       ...rest.map((order) =>
-        html('li', { 'data-state': orderState(order) }, html('time', {}, clockWords(order.time)), html('span', {}, orderSummary(order))),
+        html('li', { 'data-state': orderState(order) }, html('time', {}, clockWords(order.time_s)), html('span', {}, orderSummary(order))),
       ),
     );
   }
 }
 
 function answerWords(answer: Answer): string {
-  if (answer.state === 'acknowledged') return answer.afterMs === null ? 'acknowledged' : durationWords(answer.afterMs);
+  if (answer.state === 'acknowledged') return answer.after_ms === null ? 'acknowledged' : durationWords(answer.after_ms);
   if (answer.state === 'refused') return answer.why ? `refused: ${answer.why}` : 'refused';
   return answer.state;
 }

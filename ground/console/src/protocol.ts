@@ -1,170 +1,56 @@
 /**
- * What the ground station and the console say to each other, and how its messages are read.
+ * How the station's messages are read, and the types of what is read.
  *
  * Reading is forgiving: a field that is missing or of the wrong kind becomes `null` or empty, so that one odd vehicle
- * never takes the others off the screen. Only a message that is no JSON object of a known type is refused.
+ * never takes the others off the screen. Only a message that is no JSON object of a known type is refused. The types are
+ * the station's own, from `messages.ts`, but for what may be `null` here.
  */
+
+import type * as station from './messages';
+
+/** The station's message of this type. */
+type Told<Type extends station.ServerMessage['type']> = Extract<station.ServerMessage, { type: Type }>;
+
+/** The console's message of this type. */
+type Asked<Type extends station.ClientMessage['type']> = Extract<station.ClientMessage, { type: Type }>;
+
+/** The same with some fields of another type. */
+type With<T, Fields> = Omit<T, keyof Fields> & Fields;
+
+/** The same with some fields that may be missing. */
+type Doubtful<T, Field extends keyof T> = With<T, { [F in Field]: T[F] | null }>;
+
+type Json = Record<string, unknown>;
+
+/** What has arrived as a `T`: any of its fields, of any kind. */
+type Raw<T> = Json & { readonly [Field in T extends unknown ? keyof T : never]?: unknown };
 
 export type Vec3 = [x: number, y: number, z: number];
 export type Quaternion = [x: number, y: number, z: number, w: number];
 
-export interface Bounds {
-  min: Vec3;
-  max: Vec3;
-}
+export type Bounds = station.Bounds;
+export type Obstacle = station.Obstacle;
+export type Scene = Told<'scene'>;
 
-export type Obstacle = { position: Vec3; orientation: Quaternion } & (
-  | { form: 'box'; size: Vec3 }
-  | { form: 'cylinder'; radius: number; height: number }
-  | { form: 'sphere'; radius: number }
-);
+/** A vehicle; what it says of itself may be missing. */
+export type Vehicle = Omit<station.VehicleView, keyof station.StateView> &
+  Doubtful<station.StateView, 'position' | 'velocity' | 'yaw_rad' | 'battery' | 'mission'>;
+export type Outcome = station.OutcomeView;
+export type Fleet = With<Told<'fleet'>, { vehicles: Vehicle[] }>;
 
-export interface Scene {
-  type: 'scene';
-  fleet: string;
-  station: string;
-  software: string;
-  bounds: Bounds | null;
-  obstacles: Obstacle[];
-}
+export type Answer = Exclude<station.AnswerView, { state: 'acknowledged' }> | { state: 'acknowledged'; after_ms: number | null };
+/** `script` is the one that it is about, or empty. */
+export type Order = With<station.OrderView, { script: string; answers: Record<string, Answer> }>;
 
-export type MissionState = 'under_way' | 'complete' | 'failed';
+export type SwarmEvent = station.EventView;
 
-export interface Vehicle {
-  name: string;
-  heard: boolean;
-  position: Vec3 | null;
-  velocity: Vec3 | null;
-  yaw: number | null;
-  radius: number;
-  mode: string;
-  armed: boolean;
-  /** Energy left, 0 to 1. */
-  battery: number | null;
-  task: string;
-  waitingFor: string;
-  mission: MissionState | null;
-  path: Vec3[];
-  /** The names of the scripts that run on it. */
-  scripts: string[];
-  link: { alive: boolean; ageMs: number | null };
-  notes: string[];
-}
-
-export interface Outcome {
-  succeeded: boolean;
-  /** Why, by vehicle. */
-  failed: Record<string, string>;
-}
-
-export interface Fleet {
-  type: 'fleet';
-  time: number;
-  outcome: Outcome | null;
-  vehicles: Vehicle[];
-}
-
-export type Answer =
-  | { state: 'acknowledged'; afterMs: number | null }
-  | { state: 'pending' }
-  | { state: 'missing' }
-  | { state: 'refused'; why: string };
-
-export interface Order {
-  id: number;
-  what: string;
-  /** The script that it is about. */
-  script: string;
-  time: number;
-  answers: Record<string, Answer>;
-}
-
-export interface Orders {
-  type: 'orders';
-  orders: Order[];
-}
-
-export interface SwarmEvent {
-  time: number;
-  home: string;
-  /** Place in its home's sequence; 0 for an event that stayed local. */
-  seq: number;
-  name: string;
-  data: Record<string, unknown>;
-  requestedBy: string[];
-  blockedBy: string[];
-  leaseAgeMs: number | null;
-}
-
-export interface Events {
-  type: 'events';
-  events: SwarmEvent[];
-}
-
-export interface Blocker {
-  node: string;
-  bthread: string;
-  /** Whether it runs on the vehicle itself. */
-  local: boolean;
-  leaseAge: number | null;
-  lease: number | null;
-}
-
-/** Something that is requested of a vehicle. */
-export interface Requested {
-  event: string;
-  by: string;
-  priority: number | null;
-  blockedBy: Blocker[];
-}
-
-/** A reason for which a vehicle stands still, and what would end it: any of `needed`. */
-export interface Change {
-  because: string[];
-  needed: string[];
-  cycle: string[];
-}
-
-export interface PastEvent {
-  time: number;
-  event: string;
-  requestedBy: string[];
-  choice: string;
-}
-
-/** Why a vehicle does what it does. Times are in seconds. */
-export interface Why {
-  type: 'why';
-  vehicle: string;
-  time: number;
-  headline: string;
-  speed: number | null;
-  stillSince: number | null;
-  requests: Requested[];
-  changes: Change[];
-  events: PastEvent[];
-  doubts: string[];
-}
-
-export interface Ordered {
-  type: 'ordered';
-  tag: string;
-  id: number | null;
-}
-
-export interface Refusal {
-  type: 'error';
-  tag: string | null;
-  message: string;
-}
+export type Blocker = station.Blocker;
+export type Requested = station.Request;
+export type Change = station.Change;
+export type PastEvent = station.EventNote;
+export type Why = With<Told<'why'>, { situation: Doubtful<Pick<station.Situation, 'speed_m_s' | 'still_since_s'>, 'speed_m_s'> }>;
 
 /** What a script's file says. */
-export interface ScriptAnswer {
-  type: 'script';
-  tag: string;
-  script: Script;
-}
-
 export interface Script {
   name: string;
   about: string;
@@ -187,55 +73,29 @@ export interface Parameter {
 
 export type Argument = number | string | Vec3 | Vec3[];
 
-export type ServerMessage = Scene | Fleet | Orders | Events | Why | Ordered | ScriptAnswer | Refusal;
+export type ServerMessage =
+  | Scene
+  | Fleet
+  | With<Told<'orders'>, { orders: Order[] }>
+  | Told<'events'>
+  | Why
+  | With<Told<'ordered'>, { tag: string; id: number | null }>
+  | With<Told<'script'>, { tag: string; script: Script }>
+  | Told<'error'>;
 
-export type Command = 'hold' | 'resume' | 'return' | 'land' | 'goto' | 'abort' | 'launch' | 'launch_together';
+export type What = station.What;
+
+/** The orders that have a button of their own. */
+export type Command = Exclude<station.What, 'hand_back' | 'load' | 'unload'>;
 
 /** A go-to's place; without a height every vehicle keeps its own. */
 export type Point = [x: number, y: number, z: number | null];
 
-export interface OrderRequest {
-  type: 'order';
-  tag: string;
-  what: Command;
-  to: 'all' | string[];
-  point?: Point;
-}
-
 /** Asks to be told why a vehicle does what it does, again and again; `null` ends that. */
-export interface Question {
-  type: 'why';
-  vehicle: string | null;
-}
+export type Question = Asked<'why'>;
 
-/** Asks what a script's file says. */
-export interface ReadingRequest {
-  type: 'read_script';
-  tag: string;
-  file: string;
-  text: string;
-}
-
-/** Sends a script to vehicles, with values for its parameters. */
-export interface ScriptRequest {
-  type: 'order';
-  tag: string;
-  what: 'load';
-  to: 'all' | string[];
-  script: { script: unknown; with: Record<string, Argument> };
-}
-
-/** Takes a script back. */
-export interface WithdrawalRequest {
-  type: 'order';
-  tag: string;
-  what: 'unload';
-  name: string;
-  to: string[];
-}
-
-/** What this console says. */
-export type ClientMessage = OrderRequest | ReadingRequest | ScriptRequest | WithdrawalRequest | Question;
+/** What this console says. But for questions, all of it is answered under its tag. */
+export type ClientMessage = ((Asked<'order'> | Asked<'read_script'>) & { tag: string }) | Question;
 
 /** Reads a message of the station; `null` if it is none that this console knows. */
 export function readMessage(text: string): ServerMessage | null {
@@ -252,8 +112,8 @@ export function readMessage(text: string): ServerMessage | null {
     case 'fleet':
       return {
         type: 'fleet',
-        time: number(json.time_s) ?? 0,
-        outcome: readOutcome(json.outcome),
+        time_s: number(json.time_s) ?? 0,
+        outcome: isRecord(json.outcome) ? readOutcome(json.outcome) : null,
         vehicles: list(json.vehicles, readVehicle),
       };
     case 'orders':
@@ -277,9 +137,7 @@ export function readMessage(text: string): ServerMessage | null {
   }
 }
 
-type Json = Record<string, unknown>;
-
-function readScene(json: Json): Scene {
+function readScene(json: Raw<Told<'scene'>>): Scene {
   const min = isRecord(json.bounds) ? vector(json.bounds.min) : null;
   const max = isRecord(json.bounds) ? vector(json.bounds.max) : null;
   return {
@@ -292,7 +150,7 @@ function readScene(json: Json): Scene {
   };
 }
 
-function readObstacle(json: Json): Obstacle | null {
+function readObstacle(json: Raw<station.Obstacle>): Obstacle | null {
   const position = vector(json.position);
   if (!position) return null;
   const place = { position, orientation: quaternion(json.orientation) };
@@ -311,27 +169,27 @@ function readObstacle(json: Json): Obstacle | null {
   return null;
 }
 
-function readVehicle(json: Json): Vehicle | null {
+function readVehicle(json: Raw<station.VehicleView | station.StateView>): Vehicle | null {
   const name = string(json.name);
   if (!name) return null;
-  const link = isRecord(json.link) ? json.link : {};
+  const link: Raw<station.LinkView> = isRecord(json.link) ? json.link : {};
   const heard = json.heard === true;
   return {
     name,
     heard,
     position: heard ? vector(json.position) : null,
     velocity: vector(json.velocity),
-    yaw: number(json.yaw_rad),
-    radius: number(json.radius_m) ?? 0.25,
+    yaw_rad: number(json.yaw_rad),
+    radius_m: number(json.radius_m) ?? 0.25,
     mode: string(json.mode),
     armed: json.armed === true,
     battery: number(json.battery),
     task: string(json.task),
-    waitingFor: string(json.waiting_for),
+    waiting_for: string(json.waiting_for),
     mission: json.mission === 'complete' || json.mission === 'failed' || json.mission === 'under_way' ? json.mission : null,
     path: Array.isArray(json.path) ? json.path.map(vector).filter((point) => point !== null) : [],
     scripts: strings(json.scripts),
-    link: { alive: link.alive === true, ageMs: number(link.age_ms) },
+    link: { alive: link.alive === true, age_ms: number(link.age_ms) },
     notes: strings(json.notes),
   };
 }
@@ -356,8 +214,7 @@ function readParameter(name: string, json: Json): Parameter | null {
   return { name, about: string(json.about), kind, unit: string(json.unit), default: (json.default as Argument | undefined) ?? null, min, max };
 }
 
-function readOutcome(json: unknown): Outcome | null {
-  if (!isRecord(json)) return null;
+function readOutcome(json: Raw<station.OutcomeView>): Outcome {
   const failed = isRecord(json.failed) ? json.failed : {};
   return {
     succeeded: json.succeeded === true,
@@ -365,7 +222,7 @@ function readOutcome(json: unknown): Outcome | null {
   };
 }
 
-function readOrder(json: Json): Order | null {
+function readOrder(json: Raw<station.OrderView>): Order | null {
   const id = number(json.id);
   if (id === null) return null;
   const answers = isRecord(json.answers) ? json.answers : {};
@@ -373,16 +230,16 @@ function readOrder(json: Json): Order | null {
     id,
     what: string(json.what),
     script: string(json.script),
-    time: number(json.time_s) ?? 0,
+    time_s: number(json.time_s) ?? 0,
     answers: Object.fromEntries(Object.entries(answers).map(([name, answer]) => [name, readAnswer(answer)])),
   };
 }
 
 function readAnswer(json: unknown): Answer {
-  const answer = isRecord(json) ? json : {};
+  const answer: Raw<station.AnswerView> = isRecord(json) ? json : {};
   switch (answer.state) {
     case 'acknowledged':
-      return { state: 'acknowledged', afterMs: number(answer.after_ms) };
+      return { state: 'acknowledged', after_ms: number(answer.after_ms) };
     case 'missing':
       return { state: 'missing' };
     case 'refused':
@@ -392,32 +249,30 @@ function readAnswer(json: unknown): Answer {
   }
 }
 
-function readEvent(json: Json): SwarmEvent | null {
+function readEvent(json: Raw<station.EventView>): SwarmEvent | null {
   const name = string(json.name);
   if (!name) return null;
   return {
-    time: number(json.time_s) ?? 0,
+    time_s: number(json.time_s) ?? 0,
     home: string(json.home),
     seq: number(json.seq) ?? 0,
     name,
     data: isRecord(json.data) ? json.data : {},
-    requestedBy: strings(json.requested_by),
-    blockedBy: strings(json.blocked_by),
-    leaseAgeMs: number(json.lease_age_ms),
+    requested_by: strings(json.requested_by),
+    blocked_by: strings(json.blocked_by),
   };
 }
 
-function readWhy(json: Json): Why {
-  const situation = isRecord(json.situation) ? json.situation : {};
+function readWhy(json: Raw<Told<'why'>>): Why {
+  const situation: Raw<station.Situation> = isRecord(json.situation) ? json.situation : {};
   return {
     type: 'why',
     vehicle: string(json.vehicle),
-    time: number(json.time_s) ?? 0,
+    time_s: number(json.time_s) ?? 0,
     headline: string(json.headline),
-    speed: number(situation.speed_m_s),
-    stillSince: number(situation.still_since_s),
+    situation: { speed_m_s: number(situation.speed_m_s), still_since_s: number(situation.still_since_s) },
     requests: list(json.requests, readRequested),
-    changes: list(json.changes, ({ because, needed, cycle }) => ({
+    changes: list(json.changes, ({ because, needed, cycle }: Raw<station.Change>) => ({
       because: strings(because),
       needed: strings(needed),
       cycle: strings(cycle),
@@ -427,27 +282,33 @@ function readWhy(json: Json): Why {
   };
 }
 
-function readRequested(json: Json): Requested | null {
+function readRequested(json: Raw<station.Request>): Requested | null {
   const event = string(json.event);
   if (!event) return null;
   return {
     event,
     by: string(json.by),
     priority: number(json.priority),
-    blockedBy: list(json.blocked_by, (blocker) => ({
+    blocked_by: list(json.blocked_by, (blocker: Raw<station.Blocker>) => ({
       node: string(blocker.node),
       bthread: string(blocker.bthread),
       local: blocker.local === true,
-      leaseAge: number(blocker.lease_age_s),
-      lease: number(blocker.lease_s),
+      lease_age_s: number(blocker.lease_age_s),
+      lease_s: number(blocker.lease_s),
     })),
   };
 }
 
-function readPastEvent(json: Json): PastEvent | null {
+function readPastEvent(json: Raw<station.EventNote>): PastEvent | null {
   const event = string(json.event);
   if (!event) return null;
-  return { time: number(json.time_s) ?? 0, event, requestedBy: strings(json.requested_by), choice: string(json.choice) };
+  return {
+    time_s: number(json.time_s) ?? 0,
+    event,
+    home: string(json.home),
+    requested_by: strings(json.requested_by),
+    choice: string(json.choice) || null,
+  };
 }
 
 function isRecord(json: unknown): json is Json {

@@ -141,7 +141,7 @@ class Row {
 
     setText(this.task, taskWords(vehicle, link));
     setAttribute(this.task, 'title', this.task.textContent);
-    const waiting = link === 'alive' ? waitingWords(vehicle.waitingFor) : '';
+    const waiting = link === 'alive' ? waitingWords(vehicle.waiting_for) : '';
     setText(this.waiting, waiting);
     setAttribute(this.waiting, 'title', waiting || null);
     this.waiting.hidden = !waiting;
@@ -160,7 +160,7 @@ class Row {
   }
 }
 
-function linkWords({ link: { ageMs } }: Vehicle, link: 'alive' | 'lost' | 'unheard'): string {
+function linkWords({ link: { age_ms: ageMs } }: Vehicle, link: 'alive' | 'lost' | 'unheard'): string {
   if (link === 'unheard') return 'never heard';
   if (link === 'lost') return 'link lost';
   return ageMs === null ? 'alive' : durationWords(ageMs);
@@ -169,7 +169,7 @@ function linkWords({ link: { ageMs } }: Vehicle, link: 'alive' | 'lost' | 'unhea
 function taskWords(vehicle: Vehicle, link: 'alive' | 'lost' | 'unheard'): string {
   if (link === 'unheard') return 'No word from it since the station started';
   if (link === 'lost') {
-    const { ageMs } = vehicle.link;
+    const { age_ms: ageMs } = vehicle.link;
     const last = vehicle.task || spaced(vehicle.mode);
     return [ageMs === null ? 'Silent' : `Silent for ${durationWords(ageMs)}`, last && `last: ${last}`].filter(Boolean).join(' · ');
   }

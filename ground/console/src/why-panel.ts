@@ -58,8 +58,8 @@ export class WhyPanel {
 }
 
 /** `Why uav/3 stands still, for 12 s`. */
-function titleWords({ vehicle, time, stillSince, speed }: Why): string {
-  if (stillSince !== null) return `Why ${vehicle} stands still, for ${durationWords(Math.max(1000, (time - stillSince) * 1000))}`;
+function titleWords({ vehicle, time_s, situation: { still_since_s: stillSince, speed_m_s: speed } }: Why): string {
+  if (stillSince !== null) return `Why ${vehicle} stands still, for ${durationWords(Math.max(1000, (time_s - stillSince) * 1000))}`;
   return speed === null ? `Why ${vehicle}` : `Why ${vehicle} does what it does`;
 }
 
@@ -78,25 +78,25 @@ function changeItem({ because, needed, cycle }: Change): HTMLElement {
   );
 }
 
-function requestItem({ event, by, priority, blockedBy }: Requested): HTMLElement {
+function requestItem({ event, by, priority, blocked_by: blockedBy }: Requested): HTMLElement {
   const item = html('li', { class: 'reason', 'data-kind': blockedBy.length > 0 ? 'blocked' : 'free' });
   item.append(html('strong', {}, event), ` by ${spaced(by)}${priority === null ? '' : `, priority ${priority}`}`);
   for (const blocker of blockedBy) item.append(html('p', { class: 'reason-blocked' }, `✕ blocked by ${blockerWords(blocker)}`));
   return item;
 }
 
-function blockerWords({ node, bthread, local, leaseAge, lease }: Blocker): string {
+function blockerWords({ node, bthread, local, lease_age_s: leaseAge, lease_s: lease }: Blocker): string {
   if (local) return `its own ${spaced(bthread)}`;
   const age = leaseAge === null ? '' : `, renewed ${durationWords(leaseAge * 1000)} ago`;
   return `${node}: ${spaced(bthread)}${age}${lease === null ? '' : `, lease ${durationWords(lease * 1000)}`}`;
 }
 
-function eventItem({ time, event, requestedBy, choice }: PastEvent): HTMLElement {
+function eventItem({ time_s, event, requested_by: requestedBy, choice }: PastEvent): HTMLElement {
   const asked = requestedBy.length > 0 ? `requested by ${requestedBy.map(spaced).join(', ')}` : 'a report';
   return html(
     'li',
     { class: 'reason' },
-    html('time', {}, clockWords(time)),
+    html('time', {}, clockWords(time_s)),
     ' ',
     html('strong', {}, event),
     ` ${[asked, choice].filter(Boolean).join('; ')}`,

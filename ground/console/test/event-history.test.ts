@@ -5,14 +5,13 @@ import type { SwarmEvent } from '../src/protocol';
 
 function event(seq: number, over: Partial<SwarmEvent> = {}): SwarmEvent {
   return {
-    time: seq,
+    time_s: seq,
     home: 'uav/1',
     seq,
     name: 'uav/1/takeoff',
     data: {},
-    requestedBy: [],
-    blockedBy: [],
-    leaseAgeMs: null,
+    requested_by: [],
+    blocked_by: [],
     ...over,
   };
 }
@@ -28,7 +27,7 @@ test('what a reconnection repeats is added once', () => {
 test('events differ by home, sequence, time and name', () => {
   const history = new EventHistory();
   const same = event(0);
-  const others = [event(0, { home: 'uav/2' }), event(0, { time: 1 }), event(0, { name: 'uav/1/landed' })];
+  const others = [event(0, { home: 'uav/2' }), event(0, { time_s: 1 }), event(0, { name: 'uav/1/landed' })];
   assert.equal(history.add([same, same, ...others]).length, 4);
 });
 
@@ -42,12 +41,12 @@ test('the oldest make room, and are forgotten', () => {
 test('a filter by vehicle lets through what concerns it', () => {
   const only = { text: '', vehicles: new Set(['uav/1']) };
   assert.ok(passes(event(1), only));
-  assert.ok(passes(event(1, { home: 'uav/2', name: 'uav/2/enter', blockedBy: ['uav/1#right_of_way'] }), only));
-  assert.ok(!passes(event(1, { home: 'uav/10', name: 'uav/10/enter', requestedBy: ['uav/12#x'] }), only));
+  assert.ok(passes(event(1, { home: 'uav/2', name: 'uav/2/enter', blocked_by: ['uav/1#right_of_way'] }), only));
+  assert.ok(!passes(event(1, { home: 'uav/10', name: 'uav/10/enter', requested_by: ['uav/12#x'] }), only));
 });
 
 test('a filter by text looks everywhere', () => {
-  const planned = event(1, { data: { why: 'New waypoint' }, requestedBy: ['uav/1#mission'] });
+  const planned = event(1, { data: { why: 'New waypoint' }, requested_by: ['uav/1#mission'] });
   for (const text of ['take', 'UAV/1', 'mission', 'new way', ' ']) assert.ok(passes(planned, { text, vehicles: null }), text);
   assert.ok(!passes(planned, { text: 'landed', vehicles: null }));
 });

@@ -3,10 +3,10 @@ import test from 'node:test';
 import { orderState, orderSummary } from '../src/order-summary';
 import type { Answer } from '../src/protocol';
 
-const acknowledged: Answer = { state: 'acknowledged', afterMs: 12 };
+const acknowledged: Answer = { state: 'acknowledged', after_ms: 12 };
 
 function order(answers: Record<string, Answer>) {
-  return { id: 1, what: 'hold', script: '', time: 0, answers };
+  return { id: 1, what: 'hold', script: '', time_s: 0, answers };
 }
 
 test('who is missing is named', () => {

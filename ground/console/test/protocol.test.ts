@@ -26,7 +26,7 @@ test('a vehicle never heard of has nulls and throws nothing', () => {
   assert.ok(vehicle);
   assert.equal(vehicle.heard, false);
   assert.equal(vehicle.position, null);
-  assert.deepEqual(vehicle.link, { alive: false, ageMs: null });
+  assert.deepEqual(vehicle.link, { alive: false, age_ms: null });
   assert.deepEqual(vehicle.notes, []);
 });
 
@@ -49,7 +49,7 @@ test('an answer of an unknown kind is still pending', () => {
   });
   assert.ok(orders?.type === 'orders');
   assert.deepEqual(orders.orders[0]?.answers, {
-    a: { state: 'acknowledged', afterMs: 3 },
+    a: { state: 'acknowledged', after_ms: 3 },
     b: { state: 'refused', why: 'no' },
     c: { state: 'pending' },
   });
@@ -78,9 +78,9 @@ test('an explanation keeps what it can read, and one of a vehicle never heard ha
     events: [{ time_s: 2, event: 'uav/3/takeoff', requested_by: ['ground/main#launch'], choice: null }],
   });
   assert.ok(why?.type === 'why');
-  assert.deepEqual([why.speed, why.stillSince], [null, null]);
-  const blockedBy = [{ node: 'ground/main', bthread: 'hold', local: false, leaseAge: 0.2, lease: null }];
-  assert.deepEqual(why.requests, [{ event: 'uav/3/advance', by: 'navigation', priority: 10, blockedBy }]);
+  assert.deepEqual(why.situation, { speed_m_s: null, still_since_s: null });
+  const blocked_by = [{ node: 'ground/main', bthread: 'hold', local: false, lease_age_s: 0.2, lease_s: null }];
+  assert.deepEqual(why.requests, [{ event: 'uav/3/advance', by: 'navigation', priority: 10, blocked_by }]);
   assert.deepEqual(why.changes, [{ because: ['so'], needed: [], cycle: [] }]);
-  assert.deepEqual(why.events, [{ time: 2, event: 'uav/3/takeoff', requestedBy: ['ground/main#launch'], choice: '' }]);
+  assert.deepEqual(why.events, [{ time_s: 2, event: 'uav/3/takeoff', home: '', requested_by: ['ground/main#launch'], choice: null }]);
 });

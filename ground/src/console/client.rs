@@ -1,15 +1,16 @@
 //! One browser: it is told what is so, and brings orders.
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use axum::extract::ws::{Message, WebSocket};
-use serde_json::json;
+use axum::extract::ws::{self, WebSocket};
 use tokio::sync::{broadcast::error::RecvError, watch};
 use tokio::time::timeout;
 
-use super::feed::{Question, Reasons, Subscription, Text};
+use super::feed::Message;
 use super::request::{self, Mailbox, Request};
-use crate::Order;
+use super::subscription::{Pictures, Question, Reasons, Subscription, Text};
+use crate::order::Order;
 
 /// A browser that takes nothing for this long is let go.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -20,7 +21,8 @@ struct Gone;
 /// Attends a browser until it goes.
 pub(super) async fn attend(mut socket: WebSocket, mut subscription: Subscription, mailbox: &Mailbox) {
     let history = subscription.history();
-    let mut outcome = send(&mut socket, &history).await;
+    let mut outcome = say(&mut socket, &Message::events(history.iter())).await;
+    let mut shown = Pictures::new();
     let mut question: Option<Question> = None;
     while outcome.is_ok() {
         outcome = tokio::select! {
@@ -33,33 +35,37 @@ pub(super) async fn attend(mut socket: WebSocket, mut subscription: Subscription
                         Ok(())
                     }
                     Some((tag, Ok(Request::Script(script)))) => {
-                        send(&mut socket, &json!({ "type": "script", "tag": tag, "script": script }).to_string()).await
+                        say(&mut socket, &Message::Script { tag, script }).await
                     }
                     Some((tag, Ok(Request::Order(order)))) => give(&mut socket, tag, order, mailbox).await,
-                    Some((tag, Err(why))) => refuse(&mut socket, tag, &why).await,
-                    None if matches!(message, Message::Close(_)) => Err(Gone),
+                    Some((tag, Err(message))) => say(&mut socket, &Message::Error { tag, message }).await,
+                    None if matches!(message, ws::Message::Close(_)) => Err(Gone),
                     None => Ok(()),
                 },
                 Some(Err(_)) | None => Err(Gone),
             },
-            orders = newest(&mut subscription.orders) => tell(&mut socket, orders).await,
-            scene = newest(&mut subscription.scene) => tell(&mut socket, scene).await,
+            pictures = newest(&mut subscription.pictures) => match pictures {
+                Ok(pictures) => show(&mut socket, pictures, &mut shown).await,
+                Err(gone) => Err(gone),
+            },
             events = subscription.events.recv() => match events {
                 Ok(events) => send(&mut socket, &events).await,
                 // What it was too slow for is in the recording.
                 Err(RecvError::Lagged(_)) => Ok(()),
                 Err(RecvError::Closed) => Err(Gone),
             },
-            fleet = newest(&mut subscription.fleet) => tell(&mut socket, fleet).await,
             reasons = newest(&mut subscription.reasons) => match reasons {
-                Ok(reasons) => tell(&mut socket, Ok(reason(&reasons, question.as_ref()))).await,
+                Ok(reasons) => match reason(&reasons, question.as_ref()) {
+                    Some(reason) => send(&mut socket, &reason).await,
+                    None => Ok(()),
+                },
                 Err(gone) => Err(gone),
             },
         };
     }
 }
 
-/// What is so, once it has changed.
+/// The newest value, once there is one.
 async fn newest<T: Clone>(watch: &mut watch::Receiver<T>) -> Result<T, Gone> {
     watch.changed().await.map_err(|_| Gone)?;
     Ok(watch.borrow_and_update().clone())
@@ -70,26 +76,34 @@ fn reason(reasons: &Reasons, question: Option<&Question>) -> Option<Text> {
     reasons.get(&question?.vehicle).cloned()
 }
 
-async fn tell(socket: &mut WebSocket, message: Result<Option<Text>, Gone>) -> Result<(), Gone> {
-    match message? {
-        Some(text) => send(socket, &text).await,
-        None => Ok(()),
+/// Sends those pictures that are not yet shown.
+async fn show(socket: &mut WebSocket, pictures: Pictures, shown: &mut Pictures) -> Result<(), Gone> {
+    for (kind, picture) in &pictures {
+        if shown.get(kind).is_none_or(|shown| !Arc::ptr_eq(shown, picture)) {
+            send(socket, picture).await?;
+        }
     }
+    *shown = pictures;
+    Ok(())
+}
+
+async fn say(socket: &mut WebSocket, message: &Message<'_>) -> Result<(), Gone> {
+    send(socket, &message.text()).await
 }
 
 async fn send(socket: &mut WebSocket, text: &str) -> Result<(), Gone> {
-    match timeout(PATIENCE, socket.send(Message::text(text))).await {
+    match timeout(PATIENCE, socket.send(ws::Message::text(text))).await {
         Ok(Ok(())) => Ok(()),
         _ => Err(Gone),
     }
 }
 
-/// What a browser wants, and the tag under which it is to be answered; none if it says nothing.
-fn read(message: &Message) -> Option<(Option<String>, Result<Request, String>)> {
+/// The request of a browser, and the tag under which it is to be answered; none if it says nothing.
+fn read(message: &ws::Message) -> Option<(Option<String>, Result<Request, String>)> {
     match message {
-        Message::Text(text) => Some(request::read(text)),
-        Message::Binary(_) => Some(request::read("a binary message")),
-        Message::Close(_) | Message::Ping(_) | Message::Pong(_) => None,
+        ws::Message::Text(text) => Some(request::read(text)),
+        ws::Message::Binary(_) => Some(request::read("a binary message")),
+        ws::Message::Close(_) | ws::Message::Ping(_) | ws::Message::Pong(_) => None,
     }
 }
 
@@ -104,11 +118,7 @@ async fn give(
         Err(why) => Err(why.to_owned()),
     };
     match given.and_then(|given| given.map_err(|stranger| stranger.to_string())) {
-        Ok(id) => send(socket, &json!({ "type": "ordered", "tag": tag, "id": id }).to_string()).await,
-        Err(why) => refuse(socket, tag, &why).await,
+        Ok(id) => say(socket, &Message::Ordered { tag, id }).await,
+        Err(message) => say(socket, &Message::Error { tag, message }).await,
     }
-}
-
-async fn refuse(socket: &mut WebSocket, tag: Option<String>, why: &str) -> Result<(), Gone> {
-    send(socket, &json!({ "type": "error", "tag": tag, "message": why }).to_string()).await
 }

@@ -1,119 +1,44 @@
-//! What browsers are told: `scene`, `fleet`, `orders` as they are now, `events` as they happen, and `why` a vehicle does what
-//! it does, to whoever asks about it.
+//! The messages to browsers: `scene`, `fleet` and `orders` as they are now, `events` as they happen, `why` a vehicle does
+//! what it does, to whoever asks about it, and answers to requests.
+//!
+//! The console's own types are made of these: see `typescript.rs`.
 
-use std::collections::{BTreeMap, VecDeque};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use nalgebra::Vector3;
 use serde::Serialize;
+use skein_bp::Value;
+use skein_bp::script::ScriptFile;
 use skein_dbp::{Happened, NodeName, Peer};
-use skein_wire::proto::{TraceEvent, value::Kind};
 use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
 use skein_wire::{Form, MissionState, Scene, State};
-use tokio::sync::{broadcast, watch};
 
+use super::subscription::{Broadcast, Subscription, Text};
+use crate::core::GroundCore;
 use crate::explain::Explanation;
-use crate::{Answer, GroundCore, OrderRecord};
+use crate::order_log::{Answer, OrderRecord};
 
 /// The swarm is shown this often.
 const FLEET_PERIOD: Duration = Duration::from_millis(100);
 /// Vehicles that somebody asks about are explained this often.
 const WHY_PERIOD: Duration = Duration::from_millis(400);
-/// Events that a browser gets when it connects.
-const EVENTS_KEPT: usize = 300;
-/// How far a browser may lag behind the events before it misses some.
-const EVENTS_UNREAD: usize = 256;
 
-/// A message for browsers, as text.
-pub(super) type Text = Arc<str>;
-
-/// Explanations by vehicle.
-pub(super) type Reasons = Arc<BTreeMap<NodeName, Text>>;
-
-/// Which vehicles browsers ask about, and how many of them each.
-type Questions = Arc<Mutex<BTreeMap<NodeName, usize>>>;
-
-/// The station's end.
+/// Tells browsers what is so.
 pub(super) struct Feed {
-    scene: watch::Sender<Option<Text>>,
-    fleet: watch::Sender<Option<Text>>,
-    orders: watch::Sender<Option<Text>>,
-    events: broadcast::Sender<Text>,
-    reasons: watch::Sender<Reasons>,
-    history: Arc<Mutex<VecDeque<EventView>>>,
-    questions: Questions,
+    browsers: Broadcast,
     fleet_due: Duration,
     reasons_due: Duration,
     orders_shown: Option<u64>,
 }
 
-/// The browsers' end, one for each.
-pub(super) struct Subscription {
-    pub(super) scene: watch::Receiver<Option<Text>>,
-    pub(super) fleet: watch::Receiver<Option<Text>>,
-    pub(super) orders: watch::Receiver<Option<Text>>,
-    pub(super) events: broadcast::Receiver<Text>,
-    pub(super) reasons: watch::Receiver<Reasons>,
-    history: Arc<Mutex<VecDeque<EventView>>>,
-    questions: Questions,
-}
-
-/// A browser's question about a vehicle, for as long as it is asked.
-pub(super) struct Question {
-    pub(super) vehicle: NodeName,
-    questions: Questions,
-}
-
-impl Drop for Question {
-    fn drop(&mut self) {
-        let mut questions = self.questions.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(asking) = questions.get_mut(&self.vehicle) {
-            *asking -= 1;
-            if *asking == 0 {
-                questions.remove(&self.vehicle);
-            }
-        }
-    }
-}
-
-impl Clone for Subscription {
-    /// What has been so is news to a new browser.
-    fn clone(&self) -> Self {
-        let mut clone = Self {
-            scene: self.scene.clone(),
-            fleet: self.fleet.clone(),
-            orders: self.orders.clone(),
-            events: self.events.resubscribe(),
-            reasons: self.reasons.clone(),
-            history: self.history.clone(),
-            questions: self.questions.clone(),
-        };
-        clone.scene.mark_changed();
-        clone.fleet.mark_changed();
-        clone.orders.mark_changed();
-        clone
-    }
-}
-
-impl Subscription {
-    /// Asks why a vehicle does what it does, until the question is dropped.
-    pub(super) fn ask_about(&self, vehicle: NodeName) -> Question {
-        let mut questions = self.questions.lock().unwrap_or_else(PoisonError::into_inner);
-        *questions.entry(vehicle.clone()).or_default() += 1;
-        Question { vehicle, questions: self.questions.clone() }
-    }
-
-    /// The latest events, as one message.
-    pub(super) fn history(&self) -> Text {
-        let history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
-        text(&Message::Events { events: history.iter().cloned().collect() })
-    }
-}
-
+/// A message for browsers.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[cfg_attr(test, ts(rename = "ServerMessage"))]
 #[serde(tag = "type", rename_all = "snake_case")]
-enum Message<'a> {
+pub(super) enum Message<'a> {
     Scene {
         fleet: &'a str,
         station: &'a str,
@@ -130,23 +55,41 @@ enum Message<'a> {
         orders: Vec<OrderView<'a>>,
     },
     Events {
-        events: Vec<EventView>,
+        events: Vec<EventView<'a>>,
     },
     Why {
         headline: String,
         #[serde(flatten)]
         explanation: Explanation,
     },
+    /// An order is given, under this number.
+    Ordered {
+        tag: Option<String>,
+        id: u64,
+    },
+    /// A script as its file says it.
+    Script {
+        tag: Option<String>,
+        #[cfg_attr(test, ts(type = "unknown"))]
+        script: Box<ScriptFile>,
+    },
+    /// A request is refused.
+    Error {
+        tag: Option<String>,
+        message: String,
+    },
 }
 
 #[derive(Serialize)]
-struct Bounds {
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct Bounds {
     min: [f64; 3],
     max: [f64; 3],
 }
 
 #[derive(Serialize)]
-struct Obstacle {
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct Obstacle {
     #[serde(flatten)]
     form: FormView,
     position: [f64; 3],
@@ -154,37 +97,44 @@ struct Obstacle {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "form", rename_all = "snake_case")]
-enum FormView {
+pub(super) enum FormView {
     Box { size: [f64; 3] },
     Cylinder { radius: f64, height: f64 },
     Sphere { radius: f64 },
 }
 
 #[derive(Serialize)]
-struct OutcomeView {
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct OutcomeView {
     succeeded: bool,
     failed: BTreeMap<String, String>,
 }
 
 #[derive(Serialize)]
-struct VehicleView<'a> {
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct VehicleView<'a> {
     name: &'a str,
     heard: bool,
     link: LinkView,
     notes: Vec<String>,
+    /// All fields of a [`StateView`], or none.
+    #[cfg_attr(test, ts(skip))]
     #[serde(flatten)]
     state: Option<StateView<'a>>,
 }
 
 #[derive(Serialize)]
-struct LinkView {
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct LinkView {
     alive: bool,
     age_ms: Option<f64>,
 }
 
 #[derive(Serialize)]
-struct StateView<'a> {
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct StateView<'a> {
     position: [f64; 3],
     velocity: [f64; 3],
     yaw_rad: f64,
@@ -194,13 +144,23 @@ struct StateView<'a> {
     battery: f64,
     task: &'a str,
     waiting_for: &'a str,
-    mission: &'static str,
+    mission: MissionView,
     path: Vec<[f64; 3]>,
     scripts: &'a [String],
 }
 
 #[derive(Serialize)]
-struct OrderView<'a> {
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "snake_case")]
+pub(super) enum MissionView {
+    UnderWay,
+    Complete,
+    Failed,
+}
+
+#[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct OrderView<'a> {
     id: u64,
     what: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -210,64 +170,33 @@ struct OrderView<'a> {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "state", rename_all = "snake_case")]
-enum AnswerView<'a> {
+pub(super) enum AnswerView<'a> {
     Pending,
     Missing,
     Acknowledged { after_ms: f64 },
     Refused { why: &'a str },
 }
 
-#[derive(Clone, Serialize)]
-struct EventView {
+#[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct EventView<'a> {
     time_s: f64,
-    home: String,
+    home: &'a str,
     seq: u64,
-    name: String,
-    data: BTreeMap<String, Datum>,
-    requested_by: Vec<String>,
-    blocked_by: Vec<String>,
-    lease_age_ms: Option<f64>,
-}
-
-#[derive(Clone, Serialize)]
-#[serde(untagged)]
-enum Datum {
-    Flag(bool),
-    Integer(i64),
-    Real(f64),
-    Text(String),
+    name: &'a str,
+    #[cfg_attr(test, ts(type = "Record<string, unknown>"))]
+    data: BTreeMap<&'a str, &'a Value>,
+    requested_by: &'a [Arc<str>],
+    blocked_by: Vec<&'a str>,
 }
 
 impl Feed {
     pub(super) fn new() -> (Self, Subscription) {
-        let (scene, scene_read) = watch::channel(None);
-        let (fleet, fleet_read) = watch::channel(None);
-        let (orders, orders_read) = watch::channel(None);
-        let (events, events_read) = broadcast::channel(EVENTS_UNREAD);
-        let (reasons, reasons_read) = watch::channel(Reasons::default());
-        let (history, questions) = (Arc::new(Mutex::new(VecDeque::new())), Questions::default());
-        let subscription = Subscription {
-            scene: scene_read,
-            fleet: fleet_read,
-            orders: orders_read,
-            events: events_read,
-            reasons: reasons_read,
-            history: history.clone(),
-            questions: questions.clone(),
-        };
-        let feed = Self {
-            scene,
-            fleet,
-            orders,
-            events,
-            reasons,
-            history,
-            questions,
-            fleet_due: Duration::ZERO,
-            reasons_due: Duration::ZERO,
-            orders_shown: None,
-        };
+        let (browsers, subscription) = Broadcast::new();
+        let feed =
+            Self { browsers, fleet_due: Duration::ZERO, reasons_due: Duration::ZERO, orders_shown: None };
         (feed, subscription)
     }
 
@@ -289,7 +218,7 @@ impl Feed {
             bounds: scene.map(|scene| Bounds { min: scene.min.into(), max: scene.max.into() }),
             obstacles: obstacles.collect(),
         };
-        self.scene.send_replace(Some(text(&message)));
+        self.browsers.show("scene", message.text());
     }
 
     pub(super) fn publish(&mut self, now: Duration, station: &GroundCore, happened: &[Happened]) {
@@ -297,11 +226,11 @@ impl Feed {
         if self.orders_shown != Some(station.orders_revision()) {
             self.orders_shown = Some(station.orders_revision());
             let orders = station.orders().map(order_view).collect();
-            self.orders.send_replace(Some(text(&Message::Orders { orders })));
+            self.browsers.show("orders", Message::Orders { orders }.text());
         }
         if now >= self.fleet_due {
             self.fleet_due = now + FLEET_PERIOD;
-            self.fleet.send_replace(Some(text(&fleet(now, station))));
+            self.browsers.show("fleet", fleet(now, station).text());
         }
         if now >= self.reasons_due {
             self.reasons_due = now + WHY_PERIOD;
@@ -310,16 +239,15 @@ impl Feed {
     }
 
     fn publish_reasons(&self, station: &GroundCore) {
-        let asked: Vec<NodeName> =
-            self.questions.lock().unwrap_or_else(PoisonError::into_inner).keys().cloned().collect();
+        let asked = self.browsers.asked();
         if asked.is_empty() {
             return;
         }
         let why = |vehicle: NodeName| {
             let explanation = station.explain(&vehicle)?;
-            Some((vehicle, text(&Message::Why { headline: explanation.headline(), explanation })))
+            Some((vehicle, Message::Why { headline: explanation.headline(), explanation }.text()))
         };
-        self.reasons.send_replace(Arc::new(asked.into_iter().filter_map(why).collect()));
+        self.browsers.explain(asked.into_iter().filter_map(why).collect());
     }
 
     fn publish_events(&mut self, station: &NodeName, happened: &[Happened]) {
@@ -328,22 +256,25 @@ impl Feed {
             let repeated = matches!(happened.event.kind(), ADVANCE | HOMEWARD);
             !(repeated || happened.home == *station && is_about_leave(happened))
         };
-        let views: Vec<EventView> =
-            happened.iter().filter(tells).map(|happened| event_view(station, happened)).collect();
-        if views.is_empty() {
-            return;
+        let told: Vec<&Happened> = happened.iter().filter(tells).collect();
+        if !told.is_empty() {
+            self.browsers.tell(&told, Message::events(told.iter().copied()).text());
         }
-        let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
-        history.extend(views.iter().cloned());
-        let excess = history.len().saturating_sub(EVENTS_KEPT);
-        history.drain(..excess);
-        drop(history);
-        // Nobody watches: that is no error.
-        let _ = self.events.send(text(&Message::Events { events: views }));
     }
 }
 
-/// Whether a fact of the station is about a leave to move that came too late to matter.
+impl<'a> Message<'a> {
+    pub(super) fn events(happened: impl Iterator<Item = &'a Happened>) -> Self {
+        Self::Events { events: happened.map(event_view).collect() }
+    }
+
+    /// No message holds a map with keys that are no texts, so that writing it cannot fail.
+    pub(super) fn text(&self) -> Text {
+        serde_json::to_string(self).unwrap_or_default().into()
+    }
+}
+
+/// Tells facts of the station about a leave to move, which came too late to matter.
 fn is_about_leave(happened: &Happened) -> bool {
     happened.event.text("event").is_some_and(|event| event.ends_with(ADVANCE))
 }
@@ -398,9 +329,9 @@ fn state_view(state: &State) -> StateView<'_> {
         task: &state.task,
         waiting_for: &state.waiting_for,
         mission: match state.mission {
-            MissionState::UnderWay => "under_way",
-            MissionState::Complete => "complete",
-            MissionState::Failed => "failed",
+            MissionState::UnderWay => MissionView::UnderWay,
+            MissionState::Complete => MissionView::Complete,
+            MissionState::Failed => MissionView::Failed,
         },
         path: state.path.iter().map(array).collect(),
         scripts: &state.scripts,
@@ -423,27 +354,14 @@ fn order_view(record: &OrderRecord) -> OrderView<'_> {
     }
 }
 
-fn event_view(station: &NodeName, happened: &Happened) -> EventView {
-    let event = TraceEvent::new(station, happened);
-    let datum = |value: skein_wire::proto::Value| match value.kind? {
-        Kind::Flag(flag) => Some(Datum::Flag(flag)),
-        Kind::Integer(integer) => Some(Datum::Integer(integer)),
-        Kind::Real(real) => Some(Datum::Real(real)),
-        Kind::Text(text) => Some(Datum::Text(text)),
-    };
+fn event_view(happened: &Happened) -> EventView<'_> {
     EventView {
         time_s: happened.at.as_secs_f64(),
-        home: event.home,
-        seq: event.seq,
-        name: event.event,
-        data: event.data.into_iter().filter_map(|(key, value)| Some((key, datum(value)?))).collect(),
-        requested_by: event.requested_by,
-        blocked_by: event.blocked_by,
-        lease_age_ms: event.lease_age_ms,
+        home: happened.home.as_str(),
+        seq: happened.seq,
+        name: happened.event.name(),
+        data: happened.event.data().collect(),
+        requested_by: &happened.requested_by,
+        blocked_by: happened.event.text("by").into_iter().collect(),
     }
-}
-
-/// No message holds a map with keys that are no texts, so that writing it cannot fail.
-fn text(message: &Message<'_>) -> Text {
-    serde_json::to_string(message).unwrap_or_default().into()
 }

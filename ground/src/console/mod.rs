@@ -11,6 +11,9 @@ mod client;
 mod feed;
 mod request;
 mod server;
+mod subscription;
+#[cfg(test)]
+mod typescript;
 
 use std::net::SocketAddr;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -22,9 +25,9 @@ use tokio::sync::oneshot;
 
 pub use self::request::Wish;
 use self::{feed::Feed, request::Mailbox};
-use crate::GroundCore;
+use crate::core::GroundCore;
 
-/// How many orders may wait for the station's loop.
+/// So many orders may wait for the station's loop.
 const ORDERS_WAITING: usize = 64;
 
 /// Why the console cannot be served.
@@ -72,7 +75,7 @@ impl Console {
         Ok(Self { address: bound, feed, orders, _stop: stop })
     }
 
-    /// Where to point a browser.
+    /// The address for a browser.
     #[must_use]
     pub fn url(&self) -> String {
         format!("http://{}", self.address)

@@ -1,4 +1,4 @@
-//! What browsers ask for: that something is done, or why a vehicle does what it does.
+//! The requests of browsers: that something is done, or to be told why a vehicle does what it does.
 
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
@@ -8,11 +8,11 @@ use skein_bp::script::{Assignment, ScriptFile};
 use skein_dbp::NodeName;
 use tokio::sync::oneshot;
 
-use crate::{Destination, Order, SentScript, UnknownVehicle, Who};
+use crate::core::UnknownVehicle;
+use crate::order::{Destination, Order, SentScript, Who};
 
 /// An operator's order that waits for the station.
 pub struct Wish {
-    /// What to do.
     pub order: Order,
     answer: oneshot::Sender<Given>,
 }
@@ -28,7 +28,7 @@ impl Wish {
     }
 }
 
-/// Where browsers put their orders.
+/// The box into which browsers put their orders.
 #[derive(Clone)]
 pub(super) struct Mailbox {
     put: SyncSender<Wish>,
@@ -49,7 +49,7 @@ impl Mailbox {
     }
 }
 
-/// What a browser wants.
+/// The request of a browser.
 #[derive(Debug, PartialEq)]
 pub(super) enum Request {
     /// That something is done.
@@ -62,30 +62,45 @@ pub(super) enum Request {
 
 /// A message of a browser.
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[cfg_attr(test, ts(rename = "ClientMessage"))]
 #[serde(tag = "type", rename_all = "snake_case")]
-enum Message {
+pub(super) enum Message {
     Order(Box<OrderMessage>),
-    Why { vehicle: Option<NodeName> },
-    ReadScript { tag: Option<String>, file: String, text: String },
+    Why {
+        #[cfg_attr(test, ts(type = "string | null"))]
+        vehicle: Option<NodeName>,
+    },
+    ReadScript {
+        tag: Option<String>,
+        file: String,
+        text: String,
+    },
 }
 
 #[derive(Deserialize)]
-struct OrderMessage {
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct OrderMessage {
     #[serde(default)]
+    #[cfg_attr(test, ts(optional))]
     tag: Option<String>,
     what: What,
     to: To,
     #[serde(default)]
+    #[cfg_attr(test, ts(optional))]
     point: Option<(f64, f64, Option<f64>)>,
     /// For `load`: a script with values for its parameters.
     #[serde(default)]
+    #[cfg_attr(test, ts(optional, type = "{ script: unknown, with: Record<string, unknown> }"))]
     script: Option<Assignment>,
     /// For `unload`: the name that the script runs under.
     #[serde(default)]
+    #[cfg_attr(test, ts(optional))]
     name: Option<String>,
 }
 
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "snake_case")]
 enum What {
     Launch,
@@ -103,6 +118,7 @@ enum What {
 }
 
 #[derive(Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(untagged)]
 enum To {
     Word(String),

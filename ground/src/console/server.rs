@@ -16,10 +16,10 @@ use tokio::sync::{Semaphore, oneshot};
 
 use super::assets::ASSETS;
 use super::client;
-use super::feed::Subscription;
 use super::request::Mailbox;
+use super::subscription::Subscription;
 
-/// How many browsers may watch at once.
+/// So many browsers may watch at once.
 const MOST_BROWSERS: usize = 64;
 /// Longest message that a browser may send, in bytes.
 const LONGEST_REQUEST: usize = 64 << 10;

@@ -3,11 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
-use skein_bp::Event;
 use skein_dbp::{Board, Happened, NodeName};
-use skein_wire::proto::{self, TraceEvent};
+use skein_wire::State;
 use skein_wire::vocabulary::{ADVANCE, ENTER, GOTO, HOMEWARD, PLAN, TAKEOFF};
-use skein_wire::{DecodeError, State};
 
 use super::party::Party;
 use super::stillness::Stillness;
@@ -41,52 +39,11 @@ pub(super) struct Vehicle {
     pub(super) state: Option<Noted<State>>,
     pub(super) stillness: Stillness,
     /// Oldest first, without leaves to move.
-    events: VecDeque<Occurred>,
+    events: VecDeque<Happened>,
     /// The latest leave to move.
-    leave: Option<Occurred>,
+    leave: Option<Happened>,
     /// Its b-threads that have asked for a move.
     pub(super) movers: BTreeSet<String>,
-}
-
-/// An event that has happened.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Occurred {
-    /// When, on the listener's clock.
-    pub at: Duration,
-    pub home: NodeName,
-    pub event: Event,
-    /// Who requested it, as its home names them.
-    pub requested_by: Vec<String>,
-    /// Why this event and no other, as its home tells it.
-    pub choice: Option<String>,
-}
-
-impl From<&Happened> for Occurred {
-    fn from(happened: &Happened) -> Self {
-        Self {
-            at: happened.at,
-            home: happened.home.clone(),
-            event: happened.event.clone(),
-            requested_by: happened.requested_by.iter().map(|name| name.as_ref().into()).collect(),
-            choice: happened.choice.as_deref().map(Into::into),
-        }
-    }
-}
-
-impl TryFrom<TraceEvent> for Occurred {
-    type Error = DecodeError;
-
-    fn try_from(trace: TraceEvent) -> Result<Self, DecodeError> {
-        let home = NodeName::new(&trace.home)
-            .map_err(|source| DecodeError::Name { field: "TraceEvent.home", source })?;
-        Ok(Self {
-            at: Duration::from_nanos(trace.time_ns),
-            home,
-            event: proto::Event { name: trace.event, data: trace.data }.try_into()?,
-            requested_by: trace.requested_by,
-            choice: Some(trace.choice).filter(|choice| !choice.is_empty()),
-        })
-    }
 }
 
 impl Evidence {
@@ -107,25 +64,25 @@ impl Evidence {
         self.boards.insert(board.node.clone(), Noted { at: now, what: board });
     }
 
-    /// Something has happened.
-    pub fn note_event(&mut self, occurred: Occurred) {
-        let requested_by = || occurred.requested_by.iter().map(|name| Party::read(&occurred.home, name));
-        if occurred.event.kind() == TAKEOFF && self.launchers.len() < MOST_MOVERS {
+    /// An event has happened, at a time on the clock of who listens.
+    pub fn note_event(&mut self, happened: Happened) {
+        let requested_by = || happened.requested_by.iter().map(|name| Party::read(&happened.home, name));
+        if happened.event.kind() == TAKEOFF && self.launchers.len() < MOST_MOVERS {
             self.launchers.extend(requested_by());
         }
-        let Some(vehicle) = self.vehicles.get_mut(&occurred.home) else { return };
-        if MOVES.contains(&occurred.event.kind()) && vehicle.movers.len() < MOST_MOVERS {
-            let own = requested_by().filter(|party| party.node == occurred.home);
+        let Some(vehicle) = self.vehicles.get_mut(&happened.home) else { return };
+        if MOVES.contains(&happened.event.kind()) && vehicle.movers.len() < MOST_MOVERS {
+            let own = requested_by().filter(|party| party.node == happened.home);
             vehicle.movers.extend(own.map(|party| party.bthread));
         }
-        if matches!(occurred.event.kind(), ADVANCE | HOMEWARD) {
-            vehicle.leave = Some(occurred);
+        if matches!(happened.event.kind(), ADVANCE | HOMEWARD) {
+            vehicle.leave = Some(happened);
             return;
         }
         if vehicle.events.len() == EVENTS_KEPT {
             vehicle.events.pop_front();
         }
-        vehicle.events.push_back(occurred);
+        vehicle.events.push_back(happened);
     }
 
     pub fn vehicles(&self) -> impl Iterator<Item = &NodeName> {
@@ -152,9 +109,9 @@ impl Evidence {
 
 impl Vehicle {
     /// Newest first; of the leaves to move the latest only.
-    pub(super) fn latest_events(&self) -> impl Iterator<Item = &Occurred> {
-        let mut events: Vec<&Occurred> = self.events.iter().chain(&self.leave).collect();
-        events.sort_by_key(|occurred| occurred.at);
+    pub(super) fn latest_events(&self) -> impl Iterator<Item = &Happened> {
+        let mut events: Vec<&Happened> = self.events.iter().chain(&self.leave).collect();
+        events.sort_by_key(|happened| happened.at);
         events.into_iter().rev().take(EVENTS_KEPT)
     }
 }

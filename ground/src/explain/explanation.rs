@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::Occurred;
+use skein_dbp::Happened;
 
 /// Who is slower than this does not get anywhere, m/s.
 const SLOW_M_S: f64 = 0.2;
@@ -13,6 +13,7 @@ const SLOW_M_S: f64 = 0.2;
 ///
 /// B-threads of the vehicle are named plainly, those elsewhere as `node#bthread`. Times are the listener's, in seconds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Explanation {
     pub vehicle: String,
     pub time_s: f64,
@@ -30,6 +31,7 @@ pub struct Explanation {
 
 /// Where a vehicle is and what it does.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Situation {
     /// How old this is.
     pub age_s: f64,
@@ -51,6 +53,7 @@ pub struct Situation {
 
 /// An event that has happened.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct EventNote {
     pub time_s: f64,
     /// Its name and data.
@@ -65,6 +68,7 @@ pub struct EventNote {
 
 /// Something that is requested.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Request {
     /// Its name and data.
     pub event: String,
@@ -77,6 +81,7 @@ pub struct Request {
 
 /// Who blocks a request.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Blocker {
     pub node: String,
     pub bthread: String,
@@ -90,6 +95,7 @@ pub struct Blocker {
 
 /// One reason for which a vehicle stands still, and what would end it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Change {
     /// Sentences, from the vehicle to what is behind it all.
     pub because: Vec<String>,
@@ -99,14 +105,14 @@ pub struct Change {
     pub cycle: Vec<String>,
 }
 
-impl From<&Occurred> for EventNote {
-    fn from(occurred: &Occurred) -> Self {
+impl From<&Happened> for EventNote {
+    fn from(happened: &Happened) -> Self {
         Self {
-            time_s: occurred.at.as_secs_f64(),
-            event: occurred.event.to_string(),
-            home: occurred.home.to_string(),
-            requested_by: occurred.requested_by.clone(),
-            choice: occurred.choice.clone(),
+            time_s: happened.at.as_secs_f64(),
+            event: happened.event.to_string(),
+            home: happened.home.to_string(),
+            requested_by: happened.requested_by.iter().map(ToString::to_string).collect(),
+            choice: happened.choice.as_deref().map(Into::into),
         }
     }
 }

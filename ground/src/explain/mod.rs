@@ -38,7 +38,7 @@ use std::time::Duration;
 use skein_dbp::{Board, NodeName};
 use skein_wire::MissionState;
 
-pub use self::evidence::{Evidence, Occurred};
+pub use self::evidence::Evidence;
 pub use self::explanation::{Blocker, Change, EventNote, Explanation, Request, Situation};
 pub use self::recorded::{Recorded, RecordedError};
 

@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use mcap::McapError;
 use prost::Message as _;
-use skein_dbp::Board;
+use skein_dbp::{Board, Happened};
 use skein_wire::proto::{self, TraceEvent};
 use skein_wire::{DecodeError, State};
 
-use super::{Evidence, Occurred};
+use super::Evidence;
 
 /// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -41,7 +41,7 @@ pub struct Recorded {
 enum Note {
     State(Box<State>),
     Board(Board),
-    Event(Occurred),
+    Event(Happened),
 }
 
 impl Recorded {
@@ -118,7 +118,7 @@ impl Recorded {
             match note {
                 Note::State(state) => evidence.note_state(*when, state),
                 Note::Board(board) => evidence.note_board(*when, board.clone()),
-                Note::Event(occurred) => evidence.note_event(occurred.clone()),
+                Note::Event(happened) => evidence.note_event(happened.clone()),
             }
         }
         evidence

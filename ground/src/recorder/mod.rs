@@ -31,9 +31,9 @@ use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 use nalgebra::{Isometry3, Vector3};
 use prost::Message;
-use skein_dbp::{Board, NodeName};
+use skein_dbp::{Board, Happened, NodeName};
 use skein_wire::proto::{self, TraceEvent};
-use skein_wire::{Solid, State};
+use skein_wire::{Scan, Solid, State};
 use thiserror::Error;
 
 pub use foxglove::messages::log::Level;
@@ -58,17 +58,6 @@ pub enum RecorderError {
     /// The file cannot be continued, for instance because the disk is full.
     #[error("recording to `{}` failed: {source}", path.display())]
     Write { path: PathBuf, source: McapError },
-}
-
-/// A planar laser scan in its vehicle's xy plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scan<'a> {
-    /// Metres, counter-clockwise; infinite or NaN where nothing came back.
-    pub ranges_m: &'a [f32],
-    /// Angle of the first ray from body +x, radians.
-    pub angle_min: f64,
-    /// From one ray to the next, radians.
-    pub angle_step: f64,
 }
 
 /// Writes one mission to a file.
@@ -145,7 +134,7 @@ impl Recorder {
         })
     }
 
-    /// What stands in the world, for `/scene`.
+    /// The obstacles of the world, for `/scene`.
     ///
     /// # Errors
     /// [`RecorderError::Write`], as for all that follow.
@@ -166,7 +155,7 @@ impl Recorder {
         self.write("/scene", now, &SceneUpdate { entities, ..SceneUpdate::default() })
     }
 
-    /// Where the vehicles are (body FLU to world ENU, metres), for `/tf` and `/uav/N/pose`: all in one call.
+    /// The poses of the vehicles (body FLU to world ENU, metres), for `/tf` and `/uav/N/pose`: all in one call.
     ///
     /// # Errors
     /// [`RecorderError::Write`].
@@ -208,11 +197,11 @@ impl Recorder {
         self.write(&format!("/{vehicle}/path"), now, &SceneUpdate { entities, ..SceneUpdate::default() })
     }
 
-    /// What a vehicle's lidar sees, for `/uav/N/scan`.
+    /// One turn of a vehicle's lidar, for `/uav/N/scan`.
     ///
     /// # Errors
     /// [`RecorderError::Write`].
-    pub fn scan(&mut self, now: Duration, vehicle: &str, scan: Scan<'_>) -> Result<(), RecorderError> {
+    pub fn scan(&mut self, now: Duration, vehicle: &str, scan: &Scan) -> Result<(), RecorderError> {
         if self.scans_due.get(vehicle).is_some_and(|due| now < *due) {
             return Ok(());
         }
@@ -251,16 +240,16 @@ impl Recorder {
         self.write("/log", now, &message)
     }
 
-    /// An event that a node selected or heard of, for `/skein/trace`, at the event's own time.
+    /// An event that `node` selected or heard of, for `/skein/trace`, at the event's own time.
     ///
     /// # Errors
     /// [`RecorderError::Write`].
-    pub fn trace(&mut self, event: &TraceEvent) -> Result<(), RecorderError> {
-        let at = Duration::from_nanos(event.time_ns);
-        self.write_own("/skein/trace", "skein.TraceEvent", at, event)
+    pub fn trace(&mut self, node: &NodeName, happened: &Happened) -> Result<(), RecorderError> {
+        let event = TraceEvent::new(node, happened);
+        self.write_own("/skein/trace", "skein.TraceEvent", happened.at, &event)
     }
 
-    /// What a vehicle tells of itself, for `/uav/N/state`, unless it has been written already; its path has a topic of its
+    /// The state of a vehicle, for `/uav/N/state`, unless it has been written already; its path has a topic of its
     /// own.
     ///
     /// # Errors
@@ -275,7 +264,7 @@ impl Recorder {
         self.write_own(&format!("/{}/state", state.node), "skein.State", now, &message)
     }
 
-    /// What a node has on its board, for `/uav/N/board`, unless it has been written already.
+    /// The board of a node, for `/uav/N/board`, unless it has been written already.
     ///
     /// # Errors
     /// [`RecorderError::Write`].

@@ -10,7 +10,7 @@ use crate::vocabulary::{
 /// First chunk of a vehicle's name.
 const VEHICLE: &str = "uav";
 
-/// Who decides together in the first term: the ground station, which coordinates, and the vehicles of the fleet.
+/// The roster of the first term: the ground station, which coordinates, and the vehicles of the fleet.
 #[must_use]
 pub fn joint_roster<'a>(ground: NodeName, fleet: impl IntoIterator<Item = &'a NodeName>) -> Roster {
     let vehicles = fleet.into_iter().filter(|node| node.kind() == VEHICLE).cloned();

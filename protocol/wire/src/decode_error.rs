@@ -1,8 +1,8 @@
-//! What may be wrong with bytes from outside.
+//! Faults of bytes from outside.
 
 use skein_dbp::NodeNameError;
 
-use crate::payload::{MAX_PAYLOAD, VERSION};
+use crate::proto::{MAX_PAYLOAD, VERSION};
 
 /// Bytes that are not a message.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -12,35 +12,22 @@ pub enum DecodeError {
     Protobuf(#[from] prost::DecodeError),
     /// From a version that this build does not read.
     #[error("message version {given}: expected 1 to {VERSION}; update the older of the two nodes")]
-    Version {
-        /// The version found.
-        given: u32,
-    },
+    Version { given: u32 },
     /// Longer than any message may be.
     #[error("payload of {bytes} bytes: expected at most {MAX_PAYLOAD}")]
     TooLong { bytes: usize },
     /// A field without which the message means nothing.
     #[error("`{field}` is missing")]
-    Missing {
-        /// The field at fault.
-        field: &'static str,
-    },
+    Missing { field: &'static str },
     /// A field outside its range.
     #[error("`{field}` is {given}: expected {expected}")]
     Range {
-        /// The field at fault.
         field: &'static str,
-        /// The value found.
         given: String,
-        /// What may stand there.
+        /// The values that are allowed.
         expected: &'static str,
     },
     /// A node's name that is none.
     #[error("`{field}`: {source}")]
-    Name {
-        /// The field at fault.
-        field: &'static str,
-        /// What is wrong with it.
-        source: NodeNameError,
-    },
+    Name { field: &'static str, source: NodeNameError },
 }

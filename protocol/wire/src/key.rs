@@ -4,7 +4,9 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use skein_dbp::{NodeName, is_chunk};
+use skein_dbp::{Board, NodeName, is_chunk};
+
+use crate::message::{KINDS, Kind, Payload, Record};
 
 /// The first chunk of every key.
 const ROOT: &str = "skein";
@@ -15,7 +17,7 @@ const ROOT: &str = "skein";
 /// keys that its node may put.
 ///
 /// ```
-/// use skein_wire::{Key, Topic};
+/// use skein_wire::Key;
 /// let key: Key = "skein/demo/bid/ground/main/uav/3".parse()?;
 /// assert_eq!(key.sender().as_str(), "ground/main");
 /// assert_eq!(key.recipient().map(|node| node.as_str()), Some("uav/3"));
@@ -25,46 +27,14 @@ const ROOT: &str = "skein";
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Key {
     fleet: Fleet,
-    topic: Topic,
+    kind: &'static Kind,
+    sender: NodeName,
+    recipient: Option<NodeName>,
 }
 
 /// The name of a fleet: one chunk of letters, digits, `_`, `.` or `-`. Fleets on one network do not hear one another.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Fleet(Arc<str>);
-
-/// What is said, by whom and to whom.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Topic {
-    /// `bid/<from>/<home>`: the bids of a node for the events of a home.
-    Bid { from: NodeName, home: NodeName },
-    /// `ack/<home>/<node>`: the home's answer.
-    Ack { home: NodeName, node: NodeName },
-    /// `occ/<home>`: the home's occurrences; `occ/<home>/<node>` when repeated for one.
-    Occurrence {
-        home: NodeName,
-        /// Who asked for it again, if any.
-        to: Option<NodeName>,
-    },
-    /// `repair/<from>/<home>`: a wish to hear occurrences again.
-    Repair { from: NodeName, home: NodeName },
-    /// `presence/<node>`: a sign of life.
-    Presence { node: NodeName },
-    /// `state/<node>`: a vehicle's state.
-    State { node: NodeName },
-    /// `scan/<sensor>/<vehicle>`: what a vehicle's lidar sees.
-    Scan {
-        /// The node that reads the lidar.
-        sensor: NodeName,
-        vehicle: NodeName,
-    },
-    /// `scene/<node>`: what stands in a world.
-    Scene {
-        /// Who hosts the world.
-        node: NodeName,
-    },
-    /// `board/<node>`: what all b-threads bid at a node.
-    Board { node: NodeName },
-}
 
 /// A text that is not one of Skein's keys.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -79,7 +49,9 @@ pub enum KeyError {
     },
     /// The key has another form.
     #[error(
-        "`{given}` is not a key: expected `{ROOT}/<fleet>/<what>/<node>`, `<what>` being bid, ack, occ, repair, presence, state, scan, scene or board, and a second node where it is for one"
+        "`{given}` is not a key: expected `{ROOT}/<fleet>/<what>/<node>`, `<what>` one of {}, \
+         and a second node where it is for one",
+        words()
     )]
     Form {
         /// The text at fault.
@@ -107,10 +79,42 @@ impl fmt::Display for Fleet {
 }
 
 impl Key {
-    /// The key of `topic` in `fleet`.
+    /// The key under which `sender` says to all what an `R` holds.
+    ///
+    /// Does not compile for a message that is for one node.
     #[must_use]
-    pub fn new(fleet: &Fleet, topic: Topic) -> Self {
-        Self { fleet: fleet.clone(), topic }
+    pub fn to_all<R: Record>(fleet: &Fleet, sender: NodeName) -> Self {
+        const { assert!(R::KIND.may_be_for_all(), "this message is for one node") };
+        Self { fleet: fleet.clone(), kind: &R::KIND, sender, recipient: None }
+    }
+
+    /// The key under which `sender` says to one node what an `R` holds.
+    ///
+    /// Does not compile for a message that is for all.
+    #[must_use]
+    pub fn to_one<R: Record>(fleet: &Fleet, sender: NodeName, recipient: NodeName) -> Self {
+        const { assert!(R::KIND.may_be_for_one(), "this message is for all") };
+        Self { fleet: fleet.clone(), kind: &R::KIND, sender, recipient: Some(recipient) }
+    }
+
+    /// The key under which `sender` puts `payload` for `recipient`, none being all.
+    pub(crate) fn of(
+        payload: &Payload,
+        fleet: &Fleet,
+        sender: &NodeName,
+        recipient: Option<NodeName>,
+    ) -> Self {
+        let (kind, _, named) = payload.heading();
+        let recipient = named.cloned().or(recipient).filter(|_| kind.may_be_for_one());
+        Self { fleet: fleet.clone(), kind, sender: sender.clone(), recipient }
+    }
+
+    /// Whether `payload` is of this key's kind, and claims no other sender or recipient than the key names.
+    pub(crate) fn fits(&self, payload: &Payload) -> bool {
+        let (kind, sender, recipient) = payload.heading();
+        kind == self.kind
+            && sender.is_none_or(|sender| *sender == self.sender)
+            && recipient.is_none_or(|recipient| Some(recipient) == self.recipient.as_ref())
     }
 
     #[must_use]
@@ -118,89 +122,58 @@ impl Key {
         &self.fleet
     }
 
-    /// What is said.
+    /// Whether an `R` is put under it.
     #[must_use]
-    pub fn topic(&self) -> &Topic {
-        &self.topic
+    pub fn is_of<R: Record>(&self) -> bool {
+        *self.kind == R::KIND
     }
 
     #[must_use]
     pub fn sender(&self) -> &NodeName {
-        match &self.topic {
-            Topic::Bid { from: node, .. }
-            | Topic::Ack { home: node, .. }
-            | Topic::Occurrence { home: node, .. }
-            | Topic::Repair { from: node, .. }
-            | Topic::Presence { node }
-            | Topic::State { node }
-            | Topic::Scan { sensor: node, .. }
-            | Topic::Scene { node }
-            | Topic::Board { node } => node,
-        }
+        &self.sender
     }
 
     /// Whom it is for; none if for all.
     #[must_use]
     pub fn recipient(&self) -> Option<&NodeName> {
-        match &self.topic {
-            Topic::Bid { home: node, .. } | Topic::Ack { node, .. } | Topic::Repair { home: node, .. } => {
-                Some(node)
-            }
-            Topic::Occurrence { to, .. } => to.as_ref(),
-            Topic::Scan { vehicle, .. } => Some(vehicle),
-            Topic::Presence { .. } | Topic::State { .. } | Topic::Scene { .. } | Topic::Board { .. } => None,
-        }
+        self.recipient.as_ref()
     }
 
-    /// The pattern, in Zenoh's language, of all states.
+    /// The pattern, in Zenoh's language, of all keys under which an `R` is put for all.
     #[must_use]
-    pub fn states(fleet: &Fleet) -> String {
-        format!("{ROOT}/{fleet}/state/*/*")
+    pub fn pattern<R: Record>(fleet: &Fleet) -> String {
+        const { assert!(R::KIND.may_be_for_all(), "this message is for one node") };
+        pattern(fleet, &R::KIND)
     }
 
-    /// The pattern of all occurrences, as they happen.
-    #[must_use]
-    pub fn occurrences(fleet: &Fleet) -> String {
-        format!("{ROOT}/{fleet}/occ/*/*")
-    }
-
-    /// The pattern of all scenes.
-    #[must_use]
-    pub fn scenes(fleet: &Fleet) -> String {
-        format!("{ROOT}/{fleet}/scene/*/*")
-    }
-
-    /// The patterns, in Zenoh's language, of all keys that a node of this name wants to hear.
+    /// The patterns of all keys that a node of this name wants to hear.
     #[must_use]
     pub fn subscriptions(fleet: &Fleet, node: &NodeName) -> Vec<String> {
-        let to_all = ["occ", "presence", "state"].map(|what| format!("{ROOT}/{fleet}/{what}/*/*"));
-        let to_one = ["bid", "ack", "occ", "repair"].map(|what| format!("{ROOT}/{fleet}/{what}/*/*/{node}"));
-        to_all.into_iter().chain(to_one).collect()
+        let heard = || KINDS.iter().filter(|kind| kind.every_node_listens);
+        let to_all = heard().filter(|kind| kind.may_be_for_all()).map(|kind| pattern(fleet, kind));
+        let to_one = heard().filter(|kind| kind.may_be_for_one());
+        to_all.chain(to_one.map(|kind| format!("{}/{node}", pattern(fleet, kind)))).collect()
     }
 
     /// The same for a node that also reads the boards of all.
     #[must_use]
     pub fn subscriptions_with_boards(fleet: &Fleet, node: &NodeName) -> Vec<String> {
-        let boards = format!("{ROOT}/{fleet}/board/*/*");
-        Self::subscriptions(fleet, node).into_iter().chain([boards]).collect()
+        Self::subscriptions(fleet, node).into_iter().chain([Self::pattern::<Board>(fleet)]).collect()
     }
+}
+
+fn pattern(fleet: &Fleet, kind: &Kind) -> String {
+    format!("{ROOT}/{fleet}/{}/*/*", kind.word)
+}
+
+fn words() -> String {
+    KINDS.iter().map(|kind| kind.word).collect::<Vec<_>>().join(", ")
 }
 
 impl fmt::Display for Key {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let what = match &self.topic {
-            Topic::Bid { .. } => "bid",
-            Topic::Ack { .. } => "ack",
-            Topic::Occurrence { .. } => "occ",
-            Topic::Repair { .. } => "repair",
-            Topic::Presence { .. } => "presence",
-            Topic::State { .. } => "state",
-            Topic::Scan { .. } => "scan",
-            Topic::Scene { .. } => "scene",
-            Topic::Board { .. } => "board",
-        };
-        write!(f, "{ROOT}/{}/{what}/{}", self.fleet, self.sender())?;
-        self.recipient().map_or(Ok(()), |node| write!(f, "/{node}"))
+        write!(f, "{ROOT}/{}/{}/{}", self.fleet, self.kind.word, self.sender)?;
+        self.recipient.iter().try_for_each(|recipient| write!(f, "/{recipient}"))
     }
 }
 
@@ -218,19 +191,12 @@ impl FromStr for Key {
             [kind, id] => Some(node(kind, id)?),
             _ => return Err(form()),
         };
-        let topic = match (*what, recipient) {
-            ("bid", Some(home)) => Topic::Bid { from: sender, home },
-            ("ack", Some(node)) => Topic::Ack { home: sender, node },
-            ("occ", to) => Topic::Occurrence { home: sender, to },
-            ("repair", Some(home)) => Topic::Repair { from: sender, home },
-            ("presence", None) => Topic::Presence { node: sender },
-            ("state", None) => Topic::State { node: sender },
-            ("scan", Some(vehicle)) => Topic::Scan { sensor: sender, vehicle },
-            ("scene", None) => Topic::Scene { node: sender },
-            ("board", None) => Topic::Board { node: sender },
-            _ => return Err(form()),
+        let fits = |kind: &Kind| {
+            let fits = if recipient.is_some() { kind.may_be_for_one() } else { kind.may_be_for_all() };
+            kind.word == *what && fits
         };
-        Ok(Self { fleet: Fleet::new(fleet)?, topic })
+        let kind = KINDS.iter().find(|kind| fits(kind)).ok_or_else(form)?;
+        Ok(Self { fleet: Fleet::new(fleet)?, kind, sender, recipient })
     }
 }
 
@@ -243,25 +209,41 @@ mod tests {
     }
 
     #[test]
-    fn every_topic_survives_text() {
-        let (a, b) = (node("uav/1"), node("ground/main"));
-        let topics = [
-            Topic::Bid { from: a.clone(), home: b.clone() },
-            Topic::Ack { home: a.clone(), node: b.clone() },
-            Topic::Occurrence { home: a.clone(), to: None },
-            Topic::Occurrence { home: a.clone(), to: Some(b.clone()) },
-            Topic::Repair { from: a.clone(), home: b.clone() },
-            Topic::Presence { node: a.clone() },
-            Topic::State { node: a.clone() },
-            Topic::Scan { sensor: b.clone(), vehicle: a.clone() },
-            Topic::Scene { node: a.clone() },
-            Topic::Board { node: a },
-        ];
-        let fleet = Fleet::new("demo").unwrap();
-        for topic in topics {
-            let key = Key::new(&fleet, topic);
-            assert_eq!(key.to_string().parse::<Key>().as_ref(), Ok(&key));
+    fn every_key_survives_text() {
+        let (fleet, a, b) = (Fleet::new("demo").unwrap(), node("uav/1"), node("ground/main"));
+        let mut keys = 0;
+        for kind in KINDS {
+            for recipient in [None, Some(b.clone())] {
+                let key = Key { fleet: fleet.clone(), kind, sender: a.clone(), recipient };
+                let fits =
+                    if key.recipient.is_some() { kind.may_be_for_one() } else { kind.may_be_for_all() };
+                assert_eq!(key.to_string().parse::<Key>().ok(), fits.then_some(key));
+                keys += usize::from(fits);
+            }
         }
+        assert_eq!(keys, KINDS.len() + 1, "occurrences alone are for all or for one");
+    }
+
+    #[test]
+    fn no_two_kinds_have_one_word() {
+        let words: std::collections::BTreeSet<_> = KINDS.iter().map(|kind| kind.word).collect();
+        assert_eq!(words.len(), KINDS.len());
+    }
+
+    #[test]
+    fn a_node_listens_to_what_is_for_it_and_for_all() {
+        let patterns = Key::subscriptions_with_boards(&Fleet::new("demo").unwrap(), &node("uav/1"));
+        let expected = [
+            "occ/*/*",
+            "presence/*/*",
+            "state/*/*",
+            "bid/*/*/uav/1",
+            "ack/*/*/uav/1",
+            "occ/*/*/uav/1",
+            "repair/*/*/uav/1",
+            "board/*/*",
+        ];
+        assert_eq!(patterns, expected.map(|pattern| format!("skein/demo/{pattern}")));
     }
 
     #[test]

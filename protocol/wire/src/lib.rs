@@ -1,4 +1,4 @@
-//! What nodes say to one another: messages, keys, the [`Link`] seam and a [`Network`] in memory.
+//! The messages between nodes: their forms and keys, the [`Link`] seam and a [`Network`] in memory.
 //!
 //! The protocol's records ([`skein_dbp::Message`]) and each vehicle's [`State`] travel as protobuf under keys
 //! `skein/<fleet>/<what>/<node>/...`. A [`NodeLink`] couples a [`skein_dbp::Node`] to any [`Link`]; the
@@ -29,18 +29,13 @@
 //! ```
 
 mod authority;
-mod convert;
 mod decode_error;
 mod key;
 mod link;
+mod message;
 mod network;
 mod node_link;
-mod payload;
 pub mod proto;
-mod replace_file;
-mod scan;
-mod scene;
-mod state;
 mod store;
 mod trace;
 pub mod vocabulary;
@@ -50,14 +45,11 @@ pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "
 
 pub use authority::{joint_roster, standard_authority};
 pub use decode_error::DecodeError;
-pub use key::{Fleet, Key, KeyError, Topic};
+pub use key::{Fleet, Key, KeyError};
 pub use link::Link;
+pub use message::{Addressee, Echo, Form, Kind, MissionState, Payload, Record, Scan, Scene, Solid, State};
 pub use network::{MemoryLink, Network, NetworkConfig, NetworkStats};
 pub use node_link::{NodeLink, NodeLinkStats};
-pub use payload::{MAX_PAYLOAD, Payload, VERSION};
-pub use replace_file::replace_file;
-pub use scan::Scan;
-pub use scene::{Form, Scene, Solid};
+pub use proto::{MAX_PAYLOAD, VERSION};
 pub use skein_dbp::{NodeName, NodeNameError};
-pub use state::{Echo, MissionState, State};
-pub use store::{MemoryStore, Store};
+pub use store::{KeptScript, MemoryStore, Store};

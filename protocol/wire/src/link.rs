@@ -1,6 +1,6 @@
 //! The seam between a node and whatever carries its messages.
 
-use crate::Key;
+use crate::key::Key;
 
 /// A node's way to the others: Zenoh on vehicles, memory in lockstep.
 ///

@@ -8,9 +8,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use skein_dbp::NodeName;
 
-use crate::{Key, Link};
+use crate::key::Key;
+use crate::link::Link;
 
-/// How the network treats messages. Probabilities are from 0 to 1, for each message and receiver.
+/// The faults and delays of a network. Probabilities are from 0 to 1, for each message and receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NetworkConfig {
     /// Least and greatest time that a message takes, drawn evenly.
@@ -35,7 +36,7 @@ impl Default for NetworkConfig {
     }
 }
 
-/// What the network has carried.
+/// Counts of the messages that a network has carried.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NetworkStats {
     /// Messages put by all nodes.
@@ -58,11 +59,11 @@ pub struct NetworkStats {
 ///
 /// ```
 /// use std::time::Duration;
-/// use skein_wire::{Fleet, Key, Link, Network, NetworkConfig, NodeName, Topic};
+/// use skein_wire::{Fleet, Key, Link, Network, NetworkConfig, NodeName, State};
 /// let (one, two) = (NodeName::new("uav/1")?, NodeName::new("uav/2")?);
 /// let network = Network::new(NetworkConfig::default(), 7);
 /// let (mut a, mut b) = (network.join(&one), network.join(&two));
-/// let key = Key::new(&Fleet::new("demo")?, Topic::State { node: one });
+/// let key = Key::to_all::<State>(&Fleet::new("demo")?, one);
 /// a.put(&key, vec![1, 2, 3]);
 /// assert_eq!(b.poll(), None);
 /// network.advance(Duration::from_millis(1));
@@ -169,7 +170,6 @@ impl Network {
         self.lock().groups.clear();
     }
 
-    /// What has been carried so far.
     #[must_use]
     pub fn stats(&self) -> NetworkStats {
         self.lock().stats

@@ -3,11 +3,15 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use skein_dbp::{Board, Kept, Message, Node, NodeError, NodeName, Recipient};
+use skein_dbp::{Board, Kept, Node, NodeError, NodeName, Recipient};
 
-use crate::{DecodeError, Fleet, Key, Link, Payload, State, Store, Topic};
+use crate::decode_error::DecodeError;
+use crate::key::{Fleet, Key};
+use crate::link::Link;
+use crate::message::{Payload, State};
+use crate::store::Store;
 
-/// How many messages one pump takes in, so that a flood cannot keep a node from going on.
+/// One pump takes in so many messages at most, so that a flood cannot keep a node from going on.
 const MOST_PER_PUMP: usize = 4096;
 
 /// Of how many nodes it is remembered that they speak another version.
@@ -31,7 +35,7 @@ pub struct NodeLink {
     node: Node,
     fleet: Fleet,
     store: Option<Box<dyn Store>>,
-    /// What the store has not taken yet.
+    /// Promises that the store has not taken yet.
     unsaved: Option<Kept>,
     states: Vec<State>,
     /// Other nodes' boards, for who reads them.
@@ -42,7 +46,7 @@ pub struct NodeLink {
     skewed: BTreeMap<NodeName, u32>,
 }
 
-/// What has come in that was not understood.
+/// Counts of the messages that have come and gone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NodeLinkStats {
     /// Messages taken in.
@@ -99,7 +103,7 @@ impl NodeLink {
 
     /// Tells all what state this node's vehicle is in.
     pub fn put_state(&mut self, state: &State, link: &mut dyn Link) {
-        let key = Key::new(&self.fleet, Topic::State { node: self.node.name().clone() });
+        let key = Key::to_all::<State>(&self.fleet, self.node.name().clone());
         link.put(&key, Payload::State(state.clone()).encode());
         self.stats.sent += 1;
     }
@@ -123,7 +127,7 @@ impl NodeLink {
         if !due {
             return None;
         }
-        let key = Key::new(&self.fleet, Topic::Board { node: self.node.name().clone() });
+        let key = Key::to_all::<Board>(&self.fleet, self.node.name().clone());
         link.put(&key, Payload::Board(board.clone()).encode());
         self.stats.sent += 1;
         Some(self.told_board.insert(board))
@@ -155,7 +159,6 @@ impl NodeLink {
         &self.fleet
     }
 
-    /// What has come and gone.
     #[must_use]
     pub fn stats(&self) -> NodeLinkStats {
         self.stats
@@ -165,14 +168,14 @@ impl NodeLink {
     pub fn receive(&mut self, now: Duration, link: &mut dyn Link) {
         for (key, payload) in std::iter::from_fn(|| link.poll()).take(MOST_PER_PUMP) {
             self.stats.received += 1;
-            if self.boards.is_none() && matches!(key.topic(), Topic::Board { .. }) {
+            if self.boards.is_none() && key.is_of::<Board>() {
                 continue;
             }
             let payload = Payload::decode(&payload);
             self.note_version(key.sender(), &payload);
             match payload {
                 Err(_) => self.stats.undecodable += 1,
-                Ok(payload) if !speaks_for_itself(&key, &payload) => self.stats.forged += 1,
+                Ok(payload) if !key.fits(&payload) => self.stats.forged += 1,
                 Ok(Payload::State(state)) if state.node == *self.node.name() => {}
                 Ok(Payload::State(state)) => self.states.push(state),
                 Ok(Payload::Board(board)) => self.note_board(board),
@@ -214,15 +217,20 @@ impl NodeLink {
             return;
         }
         for (recipient, message) in self.node.take_outgoing() {
-            let key = Key::new(&self.fleet, topic(self.node.name(), recipient, &message));
-            link.put(&key, Payload::Message(message).encode());
+            let recipient = match recipient {
+                Recipient::Node(recipient) => Some(recipient),
+                Recipient::All => None,
+            };
+            let payload = Payload::Message(message);
+            let key = Key::of(&payload, &self.fleet, self.node.name(), recipient);
+            link.put(&key, payload.encode());
             self.stats.sent += 1;
         }
     }
 }
 
 impl NodeLink {
-    /// Whether nothing is left to be kept.
+    /// Saves the promises; returns whether all of them are kept.
     fn keep(&mut self) -> bool {
         self.unsaved = self.node.take_unsaved().or_else(|| self.unsaved.take());
         let (Some(kept), Some(store)) = (&self.unsaved, &mut self.store) else { return true };
@@ -234,44 +242,6 @@ impl NodeLink {
     }
 }
 
-/// The topic under which `node` puts a message.
-fn topic(node: &NodeName, recipient: Recipient, message: &Message) -> Topic {
-    let to = match recipient {
-        Recipient::Node(to) => Some(to),
-        Recipient::All => None,
-    };
-    let node = node.clone();
-    match message {
-        Message::Bid(bid) => Topic::Bid { from: node, home: bid.home.clone() },
-        Message::Ack(ack) => Topic::Ack { home: node, node: ack.node.clone() },
-        Message::Occurrence(_) => Topic::Occurrence { home: node, to },
-        Message::Repair(repair) => Topic::Repair { from: node, home: repair.home.clone() },
-        Message::Presence(_) => Topic::Presence { node },
-    }
-}
-
-/// Whether a payload says nothing but what the sender of its key may say there.
-fn speaks_for_itself(key: &Key, payload: &Payload) -> bool {
-    match (key.topic(), payload) {
-        (Topic::State { node }, Payload::State(state)) => *node == state.node,
-        (Topic::Board { node }, Payload::Board(board)) => *node == board.node,
-        (Topic::Bid { from, home }, Payload::Message(Message::Bid(bid))) => {
-            *from == bid.node && *home == bid.home
-        }
-        (Topic::Ack { home, node }, Payload::Message(Message::Ack(ack))) => {
-            *home == ack.home && *node == ack.node
-        }
-        (Topic::Occurrence { home, .. }, Payload::Message(Message::Occurrence(occurrence))) => {
-            *home == occurrence.home
-        }
-        (Topic::Repair { from, home }, Payload::Message(Message::Repair(repair))) => {
-            *from == repair.requester && *home == repair.home
-        }
-        (Topic::Presence { node }, Payload::Message(Message::Presence(presence))) => *node == presence.node,
-        _ => false,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use prost::Message as _;
@@ -279,7 +249,8 @@ mod tests {
     use skein_dbp::NodeConfig;
 
     use super::*;
-    use crate::{Network, NetworkConfig, VERSION, proto};
+    use crate::network::{Network, NetworkConfig};
+    use crate::proto::{self, VERSION};
 
     #[test]
     fn a_node_that_speaks_another_version_is_named_until_it_does_not() {
@@ -291,7 +262,7 @@ mod tests {
         let node =
             Node::new(NodeConfig::new(me, 1, vec![other.clone()]), Program::new(ProgramConfig::default()));
         let mut node = NodeLink::new(node, fleet.clone());
-        let key = Key::new(&fleet, Topic::State { node: other.clone() });
+        let key = Key::to_all::<State>(&fleet, other.clone());
         let newer = proto::Packet { version: VERSION + 1, body: None }.encode_to_vec();
         let current = Payload::State(State::new(other.clone())).encode();
         for (sent, named) in [(newer, vec![(&other, VERSION + 1)]), (current, vec![])] {

@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use skein_wire::{Fleet, Key, Link, MemoryLink, Network, NetworkConfig, NodeName, Topic};
+use skein_dbp::{BidRecord, Presence};
+use skein_wire::{Fleet, Key, Link, MemoryLink, Network, NetworkConfig, NodeName, State};
 
 const MS: Duration = Duration::from_millis(1);
 
@@ -10,7 +11,7 @@ fn setup(config: NetworkConfig, seed: u64) -> (Network, MemoryLink, MemoryLink, 
     let (a, b) = (NodeName::new("uav/1").unwrap(), NodeName::new("uav/2").unwrap());
     let network = Network::new(config, seed);
     let links = (network.join(&a), network.join(&b));
-    let key = Key::new(&Fleet::new("test").unwrap(), Topic::State { node: a });
+    let key = Key::to_all::<State>(&Fleet::new("test").unwrap(), a);
     (network, links.0, links.1, key)
 }
 
@@ -58,9 +59,9 @@ fn messages_reach_whom_they_are_for() {
     let names = ["uav/1", "uav/2", "ground/main"].map(|name| NodeName::new(name).unwrap());
     let network = Network::new(NetworkConfig::default(), 1);
     let mut links = names.each_ref().map(|name| network.join(name));
-    let bid = Topic::Bid { from: names[0].clone(), home: names[2].clone() };
-    links[0].put(&Key::new(&fleet, bid), vec![]);
-    links[0].put(&Key::new(&fleet, Topic::Presence { node: names[0].clone() }), vec![]);
+    let bid = Key::to_one::<BidRecord>(&fleet, names[0].clone(), names[2].clone());
+    links[0].put(&bid, vec![]);
+    links[0].put(&Key::to_all::<Presence>(&fleet, names[0].clone()), vec![]);
     network.advance(MS);
     assert_eq!(links.each_mut().map(|link| std::iter::from_fn(|| link.poll()).count()), [0, 1, 2]);
 }

@@ -1,4 +1,4 @@
-//! What comes in that is of no use, in a line a second at most.
+//! Complaints about useless messages, in a line a second at most.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use skein_wire::{NodeLink, NodeName};
 
-use crate::ZenohLink;
+use crate::link::ZenohLink;
 
 /// Between two lines.
 const PERIOD: Duration = Duration::from_secs(1);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use skein_wire::Fleet;
 
-use crate::ZenohError;
+use crate::error::ZenohError;
 
 /// Longest message that Zenoh puts together from its fragments, in bytes: more than any that Skein reads.
 const MOST_REASSEMBLED: usize = 16 << 20;

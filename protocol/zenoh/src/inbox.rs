@@ -1,4 +1,4 @@
-//! What has arrived for one link.
+//! The messages that wait at one link.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -6,9 +6,9 @@ use std::sync::{Mutex, PoisonError};
 
 use skein_wire::{Key, MAX_PAYLOAD};
 
-use crate::Bell;
+use crate::bell::Bell;
 
-/// How many bytes may wait at a link, however few messages they are.
+/// So many bytes may wait at a link, however few messages they are.
 const MOST_BYTES: usize = 64 << 20;
 
 /// A bounded ring: when it is full, the oldest message makes room, because newer ones supersede it.

@@ -7,7 +7,6 @@
 //!
 //! Several nodes of one process share a session; other processes connect to its [`locators`](ZenohSession::locators).
 //! Without security configured, only the loopback interface is used, and nothing is announced by multicast.
-//! [`next_incarnation`] is the number by which others tell a node's lives apart.
 //!
 //! ```
 //! use skein_wire::{Fleet, NodeName};
@@ -25,9 +24,8 @@ mod complaints;
 mod config;
 mod error;
 mod inbox;
-mod incarnation;
-mod kept;
 mod link;
+mod queue;
 mod runtime;
 mod session;
 
@@ -35,8 +33,7 @@ pub use bell::Bell;
 pub use complaints::Complaints;
 pub use config::{Mode, NetworkSettings, Security, ZenohConfig};
 pub use error::ZenohError;
-pub use incarnation::{IncarnationError, next_incarnation};
-pub use kept::{FileStore, KeptError};
 pub use link::{ZenohLink, ZenohLinkStats};
+pub use queue::ZenohStats;
 pub use runtime::share_threads;
-pub use session::{ZenohSession, ZenohStats};
+pub use session::ZenohSession;

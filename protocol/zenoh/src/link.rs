@@ -5,18 +5,20 @@ use std::sync::atomic::Ordering;
 
 use skein_wire::{Key, Link};
 
+use crate::bell::Bell;
 use crate::inbox::Inbox;
-use crate::{Bell, ZenohSession};
+use crate::queue::Entry;
 
-/// One node's link over a [`ZenohSession`]. It never waits.
+/// One node's link over a [`ZenohSession`](crate::ZenohSession). It never waits.
 #[derive(Debug)]
 pub struct ZenohLink {
-    session: ZenohSession,
+    /// Keeps the session open.
+    session: Arc<Entry>,
     port: u64,
     inbox: Arc<Inbox>,
 }
 
-/// What has arrived at a link.
+/// Counts of the messages that have arrived at a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ZenohLinkStats {
     /// Messages that arrived.
@@ -30,7 +32,7 @@ pub struct ZenohLinkStats {
 }
 
 impl ZenohLink {
-    pub(crate) fn new(session: ZenohSession, port: u64, inbox: Arc<Inbox>) -> Self {
+    pub(crate) fn new(session: Arc<Entry>, port: u64, inbox: Arc<Inbox>) -> Self {
         Self { session, port, inbox }
     }
 
@@ -40,13 +42,11 @@ impl ZenohLink {
         self.inbox.bell.clone()
     }
 
-    /// Whether no message waits to be taken.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.inbox.is_empty()
     }
 
-    /// What has arrived so far.
     #[must_use]
     pub fn stats(&self) -> ZenohLinkStats {
         ZenohLinkStats {

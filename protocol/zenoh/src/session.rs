@@ -1,26 +1,27 @@
-//! A Zenoh session behind a bounded queue.
+//! A Zenoh session behind its queue.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
-use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use skein_wire::{Fleet, Key, NodeName};
-use tokio::sync::mpsc::{Receiver, Sender, UnboundedReceiver, UnboundedSender, channel, unbounded_channel};
 use zenoh::Wait;
 use zenoh::internal::runtime::ZRuntime;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
 use zenoh::sample::Locality;
 
+use crate::config::{Mode, ZenohConfig};
+use crate::error::ZenohError;
 use crate::inbox::Inbox;
-use crate::{Mode, ZenohConfig, ZenohError, ZenohLink};
+use crate::link::ZenohLink;
+use crate::queue::{Asked, Command, Entry, Put, Queue, ZenohStats, queue};
 
-/// How often opening is tried when the port that was free has been taken meanwhile.
+/// Opening is tried so often when the port that was free has been taken meanwhile.
 const OPENING_TRIES: usize = 8;
-/// How many keys have a publisher; what is put under others travels all the same.
+/// So many keys have a publisher; messages under others travel all the same.
 const MOST_PUBLISHERS: usize = 1024;
 /// A client looks for its router this often.
 const TRY_AGAIN: Duration = Duration::from_millis(200);
@@ -36,83 +37,15 @@ const MOST_WHOLE: usize = 32 << 10;
 #[derive(Clone, Debug)]
 pub struct ZenohSession(Arc<Shared>);
 
-/// What has passed through a session.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ZenohStats {
-    pub messages: u64,
-    /// Bytes of keys and payloads put.
-    pub bytes: u64,
-    /// Messages dropped because the queue was full.
-    pub dropped: u64,
-    /// Messages that Zenoh refused.
-    pub failed: u64,
-}
-
 #[derive(Debug)]
 struct Shared {
     fleet: Fleet,
     locators: Vec<String>,
     incoming_capacity: usize,
-    /// Whether commands are carried out at once.
+    /// Commands are carried out at once.
     waits: bool,
     next_port: AtomicU64,
-    counters: Arc<Counters>,
-    /// Gone only while the session closes.
-    queue: Option<QueueEntry>,
-    thread: Mutex<Option<JoinHandle<()>>>,
-}
-
-#[derive(Debug, Default)]
-struct Counters {
-    messages: AtomicU64,
-    bytes: AtomicU64,
-    dropped: AtomicU64,
-    failed: AtomicU64,
-}
-
-/// A message to put.
-struct Put {
-    port: u64,
-    key: Key,
-    payload: Vec<u8>,
-}
-
-/// What else the session is asked to do.
-enum Command {
-    Join { port: u64, patterns: Vec<String>, inbox: Arc<Inbox>, answer: SyncSender<Result<(), ZenohError>> },
-    Leave { port: u64 },
-    CountPeers { answer: SyncSender<usize> },
-}
-
-/// Where messages to put wait, so many at most, and orders, which are few.
-#[derive(Debug)]
-struct QueueEntry {
-    puts: Sender<Put>,
-    commands: UnboundedSender<Command>,
-}
-
-/// The queue's other end.
-struct Queue {
-    puts: Receiver<Put>,
-    commands: UnboundedReceiver<Command>,
-}
-
-/// What comes out of the queue.
-enum Asked {
-    Put(Put),
-    Command(Command),
-}
-
-impl Queue {
-    /// The next one; none when nobody can ask any more.
-    async fn next(&mut self) -> Option<Asked> {
-        tokio::select! {
-            biased;
-            Some(command) = self.commands.recv() => Some(Asked::Command(command)),
-            Some(put) = self.puts.recv() => Some(Asked::Put(put)),
-            else => None,
-        }
-    }
+    entry: Arc<Entry>,
 }
 
 impl ZenohSession {
@@ -124,22 +57,19 @@ impl ZenohSession {
     /// # Errors
     /// [`ZenohError`] when an endpoint is none, cannot be listened on, or could reach others without security.
     pub fn open(config: ZenohConfig) -> Result<Self, ZenohError> {
-        let counters = Arc::new(Counters::default());
-        let (puts, puts_out) = channel(config.outgoing_capacity.max(1));
-        let (commands, commands_out) = unbounded_channel();
-        let mut queue = Queue { puts: puts_out, commands: commands_out };
+        let (senders, mut queue) = queue(config.outgoing_capacity);
         let (answer, opened) = sync_channel(1);
         let thread = std::thread::Builder::new().name("zenoh session".into()).spawn({
-            let (config, counters) = (config.clone(), counters.clone());
+            let config = config.clone();
             move || {
                 let opened = match config.network.mode {
-                    Mode::Client => await_router(&config, &mut queue, &counters, &answer),
+                    Mode::Client => await_router(&config, &mut queue, &answer),
                     Mode::Peer | Mode::Router => {
                         open_at_once(&config, &answer).map(|session| (session, Vec::new()))
                     }
                 };
                 if let Some((session, waited)) = opened {
-                    let served = ZRuntime::TX.spawn(serve(session, waited, queue, counters));
+                    let served = ZRuntime::TX.spawn(serve(session, waited, queue));
                     // Its panic, if any, has been reported where it happened.
                     let _ = ZRuntime::TX.block_on(served);
                 }
@@ -153,9 +83,7 @@ impl ZenohSession {
             incoming_capacity: config.incoming_capacity.max(1),
             waits: config.network.mode != Mode::Client,
             next_port: AtomicU64::new(0),
-            counters,
-            queue: Some(QueueEntry { puts, commands }),
-            thread: Mutex::new(Some(thread)),
+            entry: Arc::new(Entry::new(senders, thread)),
         })))
     }
 
@@ -175,15 +103,15 @@ impl ZenohSession {
         let port = self.0.next_port.fetch_add(1, Ordering::Relaxed);
         let inbox = Arc::new(Inbox::new(self.0.incoming_capacity));
         let (answer, joined) = sync_channel(1);
-        self.ask(Command::Join { port, patterns, inbox: inbox.clone(), answer })?;
+        self.0.entry.ask(Command::Join { port, patterns, inbox: inbox.clone(), answer })?;
         // A client joins once its router is there.
         if self.0.waits {
             joined.recv().map_err(|_| ZenohError::ThreadGone)??;
         }
-        Ok(ZenohLink::new(self.clone(), port, inbox))
+        Ok(ZenohLink::new(self.0.entry.clone(), port, inbox))
     }
 
-    /// Where others can connect to this session.
+    /// The endpoints of this session, for others to connect to.
     #[must_use]
     pub fn locators(&self) -> &[String] {
         &self.0.locators
@@ -193,51 +121,12 @@ impl ZenohSession {
     #[must_use]
     pub fn connected_peers(&self) -> usize {
         let (answer, peers) = sync_channel(1);
-        self.ask(Command::CountPeers { answer }).ok().and_then(|()| peers.recv().ok()).unwrap_or(0)
+        self.0.entry.ask(Command::CountPeers { answer }).ok().and_then(|()| peers.recv().ok()).unwrap_or(0)
     }
 
-    /// What has passed through.
     #[must_use]
     pub fn stats(&self) -> ZenohStats {
-        let Counters { messages, bytes, dropped, failed } = &*self.0.counters;
-        let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
-        ZenohStats {
-            messages: read(messages),
-            bytes: read(bytes),
-            dropped: read(dropped),
-            failed: read(failed),
-        }
-    }
-
-    /// Hands a message over for sending, or drops it when too many wait.
-    pub(crate) fn put(&self, port: u64, key: &Key, payload: Vec<u8>) {
-        let put = Put { port, key: key.clone(), payload };
-        let taken = self.0.queue.as_ref().map(|queue| queue.puts.try_send(put));
-        if !matches!(taken, Some(Ok(()))) {
-            self.0.counters.dropped.fetch_add(1, Ordering::Relaxed);
-        }
-    }
-
-    /// Ends a link.
-    pub(crate) fn leave(&self, port: u64) {
-        // Where nobody serves any more, there is nothing to leave.
-        let _ = self.ask(Command::Leave { port });
-    }
-
-    fn ask(&self, command: Command) -> Result<(), ZenohError> {
-        let queue = self.0.queue.as_ref().ok_or(ZenohError::ThreadGone)?;
-        queue.commands.send(command).map_err(|_| ZenohError::ThreadGone)
-    }
-}
-
-impl Drop for Shared {
-    /// Ends the thread, which sends what still waits and closes the session.
-    fn drop(&mut self) {
-        self.queue = None;
-        if let Some(thread) = self.thread.get_mut().ok().and_then(Option::take) {
-            // Its panic, if any, has been reported where it happened.
-            let _ = thread.join();
-        }
+        self.0.entry.stats()
     }
 }
 
@@ -271,7 +160,6 @@ fn open_at_once(
 fn await_router(
     config: &ZenohConfig,
     queue: &mut Queue,
-    counters: &Counters,
     answer: &SyncSender<Result<Vec<String>, ZenohError>>,
 ) -> Option<(zenoh::Session, Vec<Command>)> {
     // What is wrong with the configuration is said at once; a router that is not there is not wrong.
@@ -286,7 +174,7 @@ fn await_router(
         let until_nobody_asks = async {
             while let Some(asked) = queue.next().await {
                 match asked {
-                    Asked::Put(_) => drop(counters.dropped.fetch_add(1, Ordering::Relaxed)),
+                    Asked::Put(_) => drop(queue.counters.dropped.fetch_add(1, Ordering::Relaxed)),
                     Asked::Command(Command::CountPeers { answer }) => drop(answer.send(0)),
                     Asked::Command(command) => waiting.push(command),
                 }
@@ -300,7 +188,7 @@ fn await_router(
 }
 
 /// The life of a session, until the last handle is gone. First it does what has `waited`.
-async fn serve(session: zenoh::Session, waited: Vec<Command>, mut queue: Queue, counters: Arc<Counters>) {
+async fn serve(session: zenoh::Session, waited: Vec<Command>, mut queue: Queue) {
     let mut subscribers: BTreeMap<u64, Vec<Subscriber<()>>> = BTreeMap::new();
     let mut publishers =
         Publishers { session: &session, destination: Locality::Remote, declared: BTreeMap::new() };
@@ -313,10 +201,10 @@ async fn serve(session: zenoh::Session, waited: Vec<Command>, mut queue: Queue, 
         match asked {
             Some(Asked::Put(Put { port, key, payload })) => {
                 let key = key.to_string();
-                counters.messages.fetch_add(1, Ordering::Relaxed);
-                counters.bytes.fetch_add((key.len() + payload.len()) as u64, Ordering::Relaxed);
+                queue.counters.messages.fetch_add(1, Ordering::Relaxed);
+                queue.counters.bytes.fetch_add((key.len() + payload.len()) as u64, Ordering::Relaxed);
                 if let Err(error) = publishers.put(key, payload, port) {
-                    counters.failed.fetch_add(1, Ordering::Relaxed);
+                    queue.counters.failed.fetch_add(1, Ordering::Relaxed);
                     tracing::debug!("Zenoh did not put: {error}");
                 }
             }
@@ -347,7 +235,7 @@ async fn serve(session: zenoh::Session, waited: Vec<Command>, mut queue: Queue, 
 /// A publisher for each key that has been put, so that Zenoh finds out once, and not with each message, who hears it.
 struct Publishers<'a> {
     session: &'a zenoh::Session,
-    /// Whether what is put has listeners in this session too.
+    /// Everybody, if this session has listeners of its own; else only other sessions.
     destination: Locality,
     declared: BTreeMap<String, Publisher<'a>>,
 }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use skein_wire::{Fleet, Key, Link as _, NodeName, Topic};
+use skein_wire::{Fleet, Key, Link as _, NodeName, State};
 use skein_zenoh::{Mode, NetworkSettings, Security, ZenohConfig, ZenohSession};
 
 fn fleet() -> Fleet {
@@ -25,7 +25,7 @@ fn free_port() -> u16 {
 fn speaks_to(one: &ZenohSession, other: &ZenohSession) -> bool {
     let mut from = one.link(&name("uav/1")).unwrap();
     let mut to = other.link(&name("uav/2")).unwrap();
-    let key = Key::new(&fleet(), Topic::State { node: name("uav/1") });
+    let key = Key::to_all::<State>(&fleet(), name("uav/1"));
     let deadline = Instant::now() + Duration::from_secs(10);
     while Instant::now() < deadline {
         from.put(&key, vec![1]);

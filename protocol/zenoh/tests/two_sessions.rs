@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
-use skein_wire::{Fleet, Key, Link, NodeLink, Payload, State, Topic};
+use skein_wire::{Fleet, Key, Link, NodeLink, Payload, State};
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohError, ZenohLink, ZenohSession};
 
 /// States one bid until one of its events happens.
@@ -132,7 +132,7 @@ fn nodes_of_one_session_hear_one_another_and_not_themselves() {
     let session = ZenohSession::open(config(Vec::new())).unwrap();
     let mut one = session.link(&name("uav/1")).unwrap();
     let state = Payload::State(State::new(name("uav/1"))).encode();
-    let key = Key::new(&fleet(), Topic::State { node: name("uav/1") });
+    let key = Key::to_all::<State>(&fleet(), name("uav/1"));
     // Alone in the session it is heard by nobody, and from then on by who joins.
     one.put(&key, vec![1]);
     wait_until("the first is put", || session.stats().messages == 1);
@@ -154,8 +154,8 @@ fn another_fleet_is_not_heard() {
     let (first, second) = sessions();
     let mut link = first.link(&name("uav/1")).unwrap();
     let mut other = second.link(&name("uav/2")).unwrap();
-    other.put(&Key::new(&Fleet::new("other").unwrap(), Topic::State { node: name("uav/2") }), vec![1]);
-    let key = Key::new(&fleet(), Topic::State { node: name("uav/2") });
+    other.put(&Key::to_all::<State>(&Fleet::new("other").unwrap(), name("uav/2")), vec![1]);
+    let key = Key::to_all::<State>(&fleet(), name("uav/2"));
     // The first message after connecting may come before the subscription is known.
     let mut heard = None;
     wait_until("the own fleet is heard", || {
@@ -171,7 +171,7 @@ fn putting_never_waits_and_what_does_not_fit_is_counted() {
     let config = ZenohConfig { outgoing_capacity: 8, ..config(Vec::new()) };
     let session = ZenohSession::open(config).unwrap();
     let mut link = session.link(&name("uav/1")).unwrap();
-    let key = Key::new(&fleet(), Topic::State { node: name("uav/1") });
+    let key = Key::to_all::<State>(&fleet(), name("uav/1"));
     let start = Instant::now();
     for _ in 0..20_000 {
         link.put(&key, vec![0; 64]);
@@ -186,7 +186,7 @@ fn a_long_message_arrives_whole() {
     let (first, second) = sessions();
     let mut link = first.link(&name("uav/1")).unwrap();
     let mut other = second.link(&name("uav/2")).unwrap();
-    let key = Key::new(&fleet(), Topic::State { node: name("uav/2") });
+    let key = Key::to_all::<State>(&fleet(), name("uav/2"));
     let long: Vec<u8> = (0..skein_wire::MAX_PAYLOAD).map(|n| n as u8).collect();
     let mut heard = None;
     wait_until("it is heard", || {
@@ -204,7 +204,7 @@ fn messages_under_ever_new_keys_arrive() {
     let mut link = first.link(&name("uav/0")).unwrap();
     let mut other = second.link(&name("uav/1")).unwrap();
     let mut missing: BTreeSet<Key> =
-        (1..=1200).map(|n| Key::new(&fleet(), Topic::State { node: name(&format!("uav/{n}")) })).collect();
+        (1..=1200).map(|n| Key::to_all::<State>(&fleet(), name(&format!("uav/{n}")))).collect();
     // What comes before the subscription is known, or does not fit, is lost and put again.
     wait_until("something under each key is heard", || {
         missing.iter().take(64).for_each(|key| other.put(key, vec![7]));

@@ -4,8 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use skein_ground::GroundCore;
-use skein_ground::recorder::{Level, Recorder, RecorderError, Scan};
-use skein_wire::proto::TraceEvent;
+use skein_ground::recorder::{Level, Recorder, RecorderError};
 use skein_wire::vocabulary::ADVANCE;
 
 use super::{
@@ -54,8 +53,7 @@ impl Recording {
         let now = swarm.now();
         for (index, scan) in &happenings.scans {
             if let Some(name) = self.names.get(*index) {
-                let (angle_min, angle_step) = (scan.angle_min, scan.angle_step);
-                self.recorder.scan(now, name, Scan { ranges_m: &scan.ranges_m, angle_min, angle_step })?;
+                self.recorder.scan(now, name, scan)?;
             }
         }
         if happenings.ticked {
@@ -86,7 +84,7 @@ impl Recording {
 
     fn events(&mut self, now: Duration, happenings: &Happenings) -> Result<(), RecorderError> {
         for happened in &happenings.selections {
-            self.recorder.trace(&TraceEvent::new(&happened.home, happened))?;
+            self.recorder.trace(&happened.home, happened)?;
             // The trace holds every leave to move; people do not need to read each.
             if happened.event.kind() != ADVANCE {
                 self.recorder.log(now, Level::Info, happened.home.as_str(), &happened.event.to_string())?;

@@ -4,11 +4,11 @@
 
 use std::time::{Duration, Instant};
 
-use skein_agent::{AgentConfig, AgentCore, AgentError, Outcome, Scan};
+use skein_agent::{AgentConfig, AgentCore, AgentError, Outcome};
 use skein_dbp::{Happened, NodeName};
 use skein_ground::{GroundConfig, GroundCore, Order, UnknownVehicle};
-use skein_wire::{Link, MemoryStore};
-use skein_world::{LidarScan, Simulation, Truth};
+use skein_wire::{Link, MemoryStore, Scan};
+use skein_world::{Simulation, Truth};
 
 use super::{account::Account, plan_times::PlanTimes, trace_hash::TraceHash};
 use crate::summary::{EventCounts, Traffic};
@@ -47,7 +47,7 @@ pub struct Happenings {
     /// Selections at their homes, by node.
     pub selections: Vec<Happened>,
     /// Lidar scans, by vehicle.
-    pub scans: Vec<(usize, LidarScan)>,
+    pub scans: Vec<(usize, Scan)>,
     /// MAVLink from each autopilot.
     pub mavlink: Vec<Vec<u8>>,
     /// Agents and ground ticked in this step.
@@ -98,8 +98,7 @@ impl Swarm {
         }
         for (index, scan) in &happenings.scans {
             if let Some(vehicle) = self.vehicles.get_mut(*index) {
-                let scan = scan_for_agent(scan);
-                timed(&mut self.stopwatch, || vehicle.agent.sense(now, &scan));
+                timed(&mut self.stopwatch, || vehicle.agent.sense(now, scan));
             }
         }
         if self.steps.is_multiple_of(STEPS_PER_TICK) {
@@ -265,18 +264,4 @@ fn is_requested_from_afar(selection: &Happened) -> bool {
 /// A node hears of all occurrences; each is recorded once, at its home.
 fn keep_own(selections: &mut Vec<Happened>, node: &NodeName) {
     selections.retain(|selection| selection.home == *node);
-}
-
-/// The part of a scan that an agent gets: all but the true pose, which it never learns.
-#[must_use]
-pub fn scan_for_agent(scan: &LidarScan) -> Scan {
-    Scan {
-        stamp: scan.stamp,
-        angle_min: scan.angle_min,
-        angle_step: scan.angle_step,
-        max_range_m: scan.max_range_m,
-        ranges_m: scan.ranges_m.clone(),
-        up_m: scan.up_m,
-        down_m: scan.down_m,
-    }
 }

@@ -52,7 +52,7 @@ pub mod wind;
 
 pub use aabb::Aabb;
 pub use csv::CsvError;
-pub use lidar::{Hull, Lidar, LidarScan, Surroundings};
+pub use lidar::{Hull, Lidar, Surroundings};
 pub use obstacle::{Obstacle, Shape};
 pub use quadrotor::{MotorCommands, Quadrotor, RigidState, STEP};
 pub use scene::{Nearest, Scene};

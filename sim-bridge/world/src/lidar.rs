@@ -8,6 +8,7 @@ use std::f64::consts::{PI, TAU};
 use std::time::Duration;
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use skein_wire::Scan;
 
 use crate::noise::Noise;
 use crate::obstacle::{Obstacle, Shape};
@@ -19,26 +20,6 @@ const RIM_RAYS: u32 = 8;
 /// Below this cosine between an obstacle's own z axis and the scan plane's normal the obstacle's
 /// outline is replaced by its bounding ball.
 const LEAST_COSINE: f64 = 0.2;
-
-/// One turn of the scanner, as seen from the body; the agent places it with its own estimate.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LidarScan {
-    /// When, since the run began.
-    pub stamp: Duration,
-    /// Range of each ray from the vehicle's centre, m, from `angle_min` counter-clockwise;
-    /// infinite where nothing came back.
-    pub ranges_m: Vec<f32>,
-    /// Angle of the first ray from body +x in the body's xy plane, rad.
-    pub angle_min: f64,
-    /// From one ray to the next, rad.
-    pub angle_step: f64,
-    /// Largest range a ray can report, m.
-    pub max_range_m: f64,
-    /// Shortest range inside of a cone about body +z, m.
-    pub up_m: Option<f32>,
-    /// Shortest range inside of a cone about body -z, m.
-    pub down_m: Option<f32>,
-}
 
 /// A vehicle as other vehicles see it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,17 +91,12 @@ impl Lidar {
         Self { model, rays, ranges_m: Vec::new(), noise: Noise::new(seed, stream) }
     }
 
-    /// Scans from a body at `pose` (body FLU to world ENU).
-    pub fn scan(
-        &mut self,
-        stamp: Duration,
-        pose: &Isometry3<f64>,
-        surroundings: &Surroundings<'_>,
-    ) -> LidarScan {
+    /// Scans from a body at `pose` (body FLU to world ENU), `stamp` after the run began.
+    pub fn scan(&mut self, stamp: Duration, pose: &Isometry3<f64>, surroundings: &Surroundings<'_>) -> Scan {
         self.trace(pose, surroundings);
         let origin = Point3::from(pose.translation.vector);
         let up = pose.rotation * Vector3::z();
-        LidarScan {
+        Scan {
             stamp,
             ranges_m: self.report_ranges(),
             angle_min: -PI,

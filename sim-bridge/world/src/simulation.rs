@@ -4,9 +4,10 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_mav::Battery;
+use skein_wire::Scan;
 
 use crate::autopilot::{Autopilot, AutopilotConfig};
-use crate::lidar::{Hull, Lidar, LidarScan, Surroundings};
+use crate::lidar::{Hull, Lidar, Surroundings};
 use crate::noise::Noise;
 use crate::quadrotor::{MotorCommands, Quadrotor, RigidState, STEP};
 use crate::scene::Scene;
@@ -74,7 +75,7 @@ struct Vehicle {
     lidar: Lidar,
     /// Shifts the instruments in time, in steps.
     phase: u64,
-    scan: Option<LidarScan>,
+    scan: Option<Scan>,
     path_length_m: f64,
     lifted_off: Option<Duration>,
     last_airborne: Duration,
@@ -162,7 +163,7 @@ impl Simulation {
 
     /// Takes the lidar scans that have come since the last call, each with its vehicle's index;
     /// of several by one vehicle the newest. Vehicles scan in turn, not all at once.
-    pub fn take_scans(&mut self) -> Vec<(usize, LidarScan)> {
+    pub fn take_scans(&mut self) -> Vec<(usize, Scan)> {
         let vehicles = self.vehicles.iter_mut().enumerate();
         vehicles.filter_map(|(index, vehicle)| Some((index, vehicle.scan.take()?))).collect()
     }

@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
+use skein_wire::Scan;
 use skein_world::vehicle::LidarModel;
-use skein_world::{Hull, Lidar, LidarScan, Obstacle, Scene, Shape, Surroundings};
+use skein_world::{Hull, Lidar, Obstacle, Scene, Shape, Surroundings};
 
 const MODEL: LidarModel = LidarModel {
     rays: 720,
@@ -18,7 +19,7 @@ const MODEL: LidarModel = LidarModel {
 };
 
 /// Vehicle 0 looks from `pose`; `others` are the other vehicles.
-fn scan(model: LidarModel, scene: &Scene, pose: Isometry3<f64>, others: &[Hull]) -> LidarScan {
+fn scan(model: LidarModel, scene: &Scene, pose: Isometry3<f64>, others: &[Hull]) -> Scan {
     let own = Hull { centre: pose.translation.vector, radius_m: 0.25 };
     let hulls: Vec<Hull> = std::iter::once(own).chain(others.iter().copied()).collect();
     let surroundings = Surroundings { scene, hulls: &hulls, own: 0 };

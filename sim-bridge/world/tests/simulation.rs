@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 use nalgebra::{UnitQuaternion, Vector3};
+use skein_wire::Scan;
 use skein_world::{
-    LidarScan, MotorCommands, Obstacle, RigidState, Scene, SensorReadings, Simulation, SimulationConfig,
-    VehicleModel, VehicleSetup, WindConfig,
+    MotorCommands, Obstacle, RigidState, Scene, SensorReadings, Simulation, SimulationConfig, VehicleModel,
+    VehicleSetup, WindConfig,
 };
 
 fn simulation(obstacles: Vec<Obstacle>, places: &[[f64; 3]], seed: u64) -> Simulation {
@@ -240,7 +241,7 @@ fn nothing_is_recorded_of_vehicles_that_stay_on_the_ground() {
 }
 
 /// Every number that a run makes.
-fn record(seed: u64) -> (Vec<RigidState>, Vec<SensorReadings>, Vec<LidarScan>) {
+fn record(seed: u64) -> (Vec<RigidState>, Vec<SensorReadings>, Vec<Scan>) {
     let oak = Obstacle::trunk("oak", 5.0, 0.0, 0.5, 12.0);
     let places = [[0.0; 3], [3.0, 3.0, 0.0]];
     let mut simulation = simulation(vec![oak], &places, seed);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use skein_dbp::{BidRecord, Message, NodeName};
-use skein_wire::{Key, Link, MemoryLink, Payload, Topic};
+use skein_wire::{Key, Link, MemoryLink, Payload, State};
 
 /// A node's link, and the records of bids that have come over it.
 #[derive(Debug)]
@@ -32,7 +32,7 @@ impl Link for TappedLink {
 
     fn poll(&mut self) -> Option<(Key, Vec<u8>)> {
         let (key, payload) = self.link.poll()?;
-        if !matches!(key.topic(), Topic::State { .. })
+        if !key.is_of::<State>()
             && let Ok(Payload::Message(message)) = Payload::decode(&payload)
         {
             self.sees(message);

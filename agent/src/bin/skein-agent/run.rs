@@ -5,10 +5,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::Context as _;
-use skein_agent::{AgentCore, Scan, scripts::FileScriptStore};
+use skein_agent::AgentCore;
+use skein_disk::{PromiseStore, ScriptStore, next_incarnation};
 use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
-use skein_wire::{Fleet, Key, Link as _, Payload, Topic};
-use skein_zenoh::{Bell, Complaints, FileStore, ZenohConfig, ZenohLink, ZenohSession, next_incarnation};
+use skein_wire::{Fleet, Key, Link as _, Payload, Scan};
+use skein_zenoh::{Bell, Complaints, ZenohConfig, ZenohLink, ZenohSession};
 
 use crate::autopilot_link::AutopilotLink;
 use crate::config::{Config, LidarSource};
@@ -67,9 +68,9 @@ struct Driver {
 impl Driver {
     fn open(mut config: Config) -> anyhow::Result<Self> {
         config.agent.incarnation = next_incarnation(&config.state, &config.name)?;
-        let (store, kept) = FileStore::open(&config.state, &config.name)?;
+        let (store, kept) = PromiseStore::open(&config.state, &config.name)?;
         config.agent.kept = kept;
-        let (script_store, scripts) = FileScriptStore::open(&config.state, &config.name);
+        let (script_store, scripts) = ScriptStore::open(&config.state, &config.name);
         let scripts = scripts.unwrap_or_else(|lost| {
             tracing::warn!("{lost}");
             Vec::new()
@@ -78,10 +79,10 @@ impl Driver {
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
         let link = session.link(&config.name)?;
         let scans = config.lidar.map(|LidarSource { sensor, network }| {
-            let topic = Topic::Scan { sensor, vehicle: config.name.clone() };
+            let key = Key::to_one::<Scan>(&fleet, sensor, config.name.clone());
             let own = network.map(|network| ZenohSession::open(ZenohConfig::new(fleet.clone(), network)));
             let session = own.transpose()?.unwrap_or_else(|| session.clone());
-            session.listen(vec![Key::new(&fleet, topic).to_string()])
+            session.listen(vec![key.to_string()])
         });
         tracing::info!(
             "{} of fleet {fleet}, life {}, Zenoh on {:?}, autopilot {}",
@@ -141,9 +142,9 @@ impl Driver {
                 continue;
             };
             let unix = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
-            let age = match unix.checked_sub(scan.measured_at_unix) {
+            let age = match unix.checked_sub(scan.stamp) {
                 Some(age) => age,
-                None if scan.measured_at_unix - unix <= CLOCK_TOLERANCE => Duration::ZERO,
+                None if scan.stamp - unix <= CLOCK_TOLERANCE => Duration::ZERO,
                 None => {
                     self.strange_scans += 1;
                     if self.strange_scans.is_power_of_two() {
@@ -155,18 +156,7 @@ impl Driver {
                 }
             };
             let Some(stamp) = now.checked_sub(age) else { continue };
-            self.core.sense(
-                now,
-                &Scan {
-                    stamp,
-                    angle_min: scan.angle_min,
-                    angle_step: scan.angle_step,
-                    max_range_m: scan.max_range_m,
-                    ranges_m: scan.ranges_m,
-                    up_m: scan.up_m,
-                    down_m: scan.down_m,
-                },
-            );
+            self.core.sense(now, &Scan { stamp, ..scan });
         }
     }
 

@@ -29,5 +29,5 @@ export function makeGlyph(colour: Color, noseColour: Color, fine: boolean): Buff
 export function glyphRadius(vehicle: Vehicle, position: Vec3, eye: Eye): number {
   const seen = eye.project(position);
   const least = seen ? eye.metresPerPixel(seen.distance) * LEAST_RADIUS_PX : 0;
-  return Math.max(vehicle.radius, least);
+  return Math.max(vehicle.radius_m, least);
 }

@@ -133,7 +133,7 @@ export class Labels {
 function words(vehicle: Vehicle, picked: boolean, roomForNames: boolean, groundZ: number): string {
   const words = roomForNames || picked ? [vehicle.name] : [];
   if (!vehicle.link.alive) {
-    words.push(vehicle.link.ageMs === null ? 'silent' : `silent for ${durationWords(vehicle.link.ageMs)}`);
+    words.push(vehicle.link.age_ms === null ? 'silent' : `silent for ${durationWords(vehicle.link.age_ms)}`);
   } else if (picked && vehicle.position) {
     words.push(`${(vehicle.position[2] - groundZ).toFixed(1)} m`);
   }

@@ -88,7 +88,7 @@ export class Swarm {
   private place(vehicle: Vehicle, [x, y, z]: Vec3, colour: Color, radius: number, groundZ: number): void {
     const body = this.body(vehicle.name, colour);
     body.group.position.set(x, y, z);
-    body.group.rotation.z = vehicle.yaw ?? 0;
+    body.group.rotation.z = vehicle.yaw_rad ?? 0;
     body.group.scale.setScalar(radius);
     body.shadow.position.set(x, y, groundZ);
     body.shadow.scale.setScalar(radius * 0.62);

@@ -107,7 +107,7 @@ export class View {
     const names = fleet.vehicles.map(({ name }) => name);
     if (names.length !== this.looks.size || names.some((name) => !this.looks.has(name))) this.looks = identities(names);
     this.vehicles = fleet.vehicles;
-    this.swarm.record(fleet.time, fleet.vehicles);
+    this.swarm.record(fleet.time_s, fleet.vehicles);
     if (this.fitted === 'nothing' && this.vehicles.some(({ position }) => position)) {
       this.fitted = 'vehicles';
       this.build();

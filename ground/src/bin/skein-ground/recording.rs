@@ -8,7 +8,6 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use skein_dbp::Happened;
 use skein_ground::GroundCore;
 use skein_ground::recorder::{Level, Recorder, RecorderError};
-use skein_wire::proto::TraceEvent;
 use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
 use skein_wire::{Scene, State};
 
@@ -47,7 +46,7 @@ impl Recording {
     /// What has happened, and where the vehicles are.
     pub fn take_in(&mut self, now: Duration, station: &GroundCore, happened: &[Happened]) {
         for happened in happened {
-            self.write(|recorder| recorder.trace(&TraceEvent::new(station.name(), happened)));
+            self.write(|recorder| recorder.trace(station.name(), happened));
             // The trace holds every leave to move; people do not need to read each.
             if !matches!(happened.event.kind(), ADVANCE | HOMEWARD) {
                 self.note(now, Level::Info, happened.home.as_str(), &happened.event.to_string());

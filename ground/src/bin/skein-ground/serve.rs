@@ -5,11 +5,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
+use skein_disk::{PromiseStore, next_incarnation};
 use skein_ground::console::Console;
 use skein_ground::recorder::Level;
 use skein_ground::{GroundCore, MissionOutcome};
 use skein_wire::{Key, Payload, Scene};
-use skein_zenoh::{Complaints, FileStore, ZenohConfig, ZenohLink, ZenohSession, next_incarnation};
+use skein_zenoh::{Complaints, ZenohConfig, ZenohLink, ZenohSession};
 
 use crate::config::Config;
 use crate::recording::Recording;
@@ -56,12 +57,12 @@ impl Station {
     fn open(mut config: Config, stopping: &Arc<AtomicBool>) -> anyhow::Result<Self> {
         let recording = Recording::create(&config.record)?;
         config.station.incarnation = next_incarnation(&config.state, &config.station.name)?;
-        let (store, kept) = FileStore::open(&config.state, &config.station.name)?;
+        let (store, kept) = PromiseStore::open(&config.state, &config.station.name)?;
         config.station.kept = kept;
         let fleet = config.station.fleet.clone();
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
         let link = session.listen(Key::subscriptions_with_boards(&fleet, &config.station.name))?;
-        let scenes = session.listen(vec![Key::scenes(&fleet)])?;
+        let scenes = session.listen(vec![Key::pattern::<Scene>(&fleet)])?;
         let bell = link.bell();
         let mut console = Console::serve(config.console, {
             let bell = bell.clone();

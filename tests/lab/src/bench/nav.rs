@@ -182,7 +182,7 @@ impl<'a> Flight<'a> {
         let pose =
             Isometry3::from_parts(Translation3::from(self.motion.position), UnitQuaternion::identity());
         let seen = skein_world::Surroundings { scene: self.scene, hulls: &[], own: 0 };
-        let scan = scan_for_agent(&lidar.scan(now, &pose, &seen));
+        let scan = lidar.scan(now, &pose, &seen);
         let others: Vec<_> = neighbours.iter().map(Neighbour::predicted).collect();
 
         let began = cpu_time::this_thread()?;

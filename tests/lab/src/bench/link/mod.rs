@@ -18,10 +18,10 @@ use serde::Serialize;
 use serde_json::json;
 use skein_bp::script::{Op, Script};
 use skein_bp::{BThread, Bid, Context, Event, Program, ProgramConfig};
-use skein_dbp::{NodeName, facts};
+use skein_dbp::{BidRecord, NodeName, facts};
 use skein_sim::cli::Exit;
 use skein_wire::vocabulary::{ADVANCE, event, of_every_vehicle};
-use skein_wire::{Key, Link as _, Topic};
+use skein_wire::{Key, Link as _};
 use skein_zenoh::{ZenohLink, ZenohSession};
 
 use self::peer::{
@@ -182,7 +182,7 @@ impl Queues {
     fn start() -> anyhow::Result<Self> {
         let session = session(Vec::new())?;
         let me = NodeName::new(GROUND)?;
-        let there = Key::new(&fleet()?, Topic::Bid { from: me.clone(), home: home(1)? });
+        let there = Key::to_one::<BidRecord>(&fleet()?, me.clone(), home(1)?);
         let peer = Peer::start(Role::Queues, 1, 1, locator(&session)?)?;
         let mut queues = Self { link: session.link(&me)?, there, _peer: peer };
         meet(|| Ok(queues.ask(Duration::from_millis(50))))?;

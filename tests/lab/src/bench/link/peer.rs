@@ -12,10 +12,10 @@ use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use skein_bp::script::{Op, Script};
 use skein_bp::{Bid, Program, ProgramConfig};
-use skein_dbp::{Happened, Node, NodeConfig, NodeName, facts};
+use skein_dbp::{BidAck, Happened, Node, NodeConfig, NodeName, facts};
 use skein_sim::cli::Exit;
 use skein_wire::vocabulary::{ENTER, of_every_vehicle};
-use skein_wire::{Fleet, Key, Link as _, NodeLink, Topic};
+use skein_wire::{Fleet, Key, Link as _, NodeLink};
 use skein_zenoh::{Bell, NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
 use zenoh::Wait as _;
 use zenoh::qos::CongestionControl;
@@ -243,7 +243,7 @@ fn echo_over_zenoh(connect: &[String], sections: &Receiver<()>) -> anyhow::Resul
 fn echo_through_queues(connect: Vec<String>, sections: &Receiver<()>) -> anyhow::Result<()> {
     let me = home(1)?;
     let mut link = session(connect)?.link(&me)?;
-    let back = Key::new(&fleet()?, Topic::Ack { home: me, node: NodeName::new(GROUND)? });
+    let back = Key::to_one::<BidAck>(&fleet()?, me, NodeName::new(GROUND)?);
     let bell = link.bell();
     while sections.try_recv() != Err(TryRecvError::Disconnected) {
         bell.wait(LOOK);

@@ -10,14 +10,14 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 use skein_agent::Outcome;
-use skein_dbp::NodeName;
+use skein_dbp::{BidRecord, NodeName, Occurrence, Presence};
 use skein_sim::cli::{Network, Setup};
 use skein_sim::configure;
 use skein_sim::fly::{FLEET, GROUND, vehicle_name};
 use skein_sim::processes::Processes;
 use skein_sim::scenario::{Overrides, Scenario};
 use skein_sim::world_host;
-use skein_wire::{Fleet, Key, Link as _, Topic};
+use skein_wire::{Fleet, Key, Link as _, Scan, Scene, State};
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohSession};
 
 use super::cable::Cable;
@@ -318,23 +318,22 @@ impl Run {
         let endpoint = format!("tcp/127.0.0.1:{}", configure::router_port(self.swarm.port_offset()));
         let network = NetworkSettings::connected_to(vec![endpoint]);
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), network))?;
-        let mut link = session.listen(vec![Key::scenes(&fleet)])?;
+        let mut link = session.listen(vec![Key::pattern::<Scene>(&fleet)])?;
         let all: Vec<NodeName> = (0..self.vehicles).map(vehicle_name).chain([GROUND.clone()]).collect();
         let stranger = NodeName::new("uav/99")?;
         for round in 0..100_u32 {
             for node in &all {
-                for topic in [
-                    Topic::Bid { from: stranger.clone(), home: node.clone() },
-                    Topic::State { node: node.clone() },
-                    Topic::Occurrence { home: node.clone(), to: None },
-                    Topic::Scan { sensor: NodeName::new(world_host::WORLD)?, vehicle: node.clone() },
+                for key in [
+                    Key::to_one::<BidRecord>(&fleet, stranger.clone(), node.clone()),
+                    Key::to_all::<State>(&fleet, node.clone()),
+                    Key::to_all::<Occurrence>(&fleet, node.clone()),
+                    Key::to_one::<Scan>(&fleet, NodeName::new(world_host::WORLD)?, node.clone()),
                 ] {
-                    link.put(&Key::new(&fleet, topic), vec![round as u8; 1 + round as usize * 7]);
+                    link.put(&key, vec![round as u8; 1 + round as usize * 7]);
                 }
             }
             if round % 20 == 0 {
-                let topic = Topic::Presence { node: stranger.clone() };
-                link.put(&Key::new(&fleet, topic), vec![0xff; 10 << 20]);
+                link.put(&Key::to_all::<Presence>(&fleet, stranger.clone()), vec![0xff; 10 << 20]);
             }
             self.for_a_while(Duration::from_millis(50));
         }

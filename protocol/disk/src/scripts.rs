@@ -1,28 +1,26 @@
-//! Scripts kept in a file. For drivers: the agent's core does no I/O and knows only [`ScriptStore`].
+//! The scripts that a vehicle was sent.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use serde::{Deserialize, Serialize};
-use skein_wire::{NodeName, replace_file};
+use skein_wire::{KeptScript, NodeName, Store};
 
-use super::{KeptScript, ScriptStore};
+use crate::node_file;
 
 /// The version of the file's form.
 const VERSION: u32 = 1;
 
 /// Keeps the scripts that were sent to a vehicle in `<folder>/<node>.scripts.json`, written whole each time.
 #[derive(Debug)]
-pub struct FileScriptStore(PathBuf);
+pub struct ScriptStore(PathBuf);
 
 /// Scripts that were kept cannot be had: what is wrong with their file, and what has become of it.
 #[derive(Debug, thiserror::Error)]
 #[error("`{}`: {problem}; the scripts that this vehicle had been sent are kept there, as JSON. {fate}", path.display())]
 pub struct ScriptsLost {
     pub path: PathBuf,
-    /// What is wrong with it.
     pub problem: String,
-    /// Where it is now.
     fate: Fate,
 }
 
@@ -53,15 +51,15 @@ struct OwnedContent {
     scripts: Vec<KeptScript>,
 }
 
-impl FileScriptStore {
+impl ScriptStore {
     /// The store of `node` in `folder`, and the scripts that a former life has kept there. A file that cannot be understood
     /// is set aside as `<node>.scripts.json.damaged` and told of: for its sake no vehicle stays on the ground, or in the
     /// air without its agent.
     pub fn open(folder: &Path, node: &NodeName) -> (Self, Result<Vec<KeptScript>, ScriptsLost>) {
-        let path = folder.join(format!("{}.scripts.json", node.as_str().replace('/', "-")));
-        let kept = match fs::read(&path) {
-            Ok(text) => read(&text),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
+        let path = node_file::path_of(folder, node, "scripts.json");
+        let kept = match node_file::read(&path) {
+            Ok(Some(text)) => parse(&text),
+            Ok(None) => Ok(Vec::new()),
             Err(error) => Err(error.to_string()),
         };
         let kept = kept.map_err(|problem| {
@@ -76,17 +74,14 @@ impl FileScriptStore {
     }
 }
 
-impl ScriptStore for FileScriptStore {
-    fn save(&mut self, scripts: &[KeptScript]) -> Result<(), String> {
-        serde_json::to_vec_pretty(&Content { version: VERSION, scripts })
-            .map_err(io::Error::from)
-            .and_then(|text| replace_file(&self.0, &text))
-            .map_err(|error| format!("`{}`: {error}", self.0.display()))
+impl Store<Vec<KeptScript>> for ScriptStore {
+    fn save(&mut self, scripts: &Vec<KeptScript>) -> Result<(), String> {
+        node_file::replace(&self.0, &Content { version: VERSION, scripts })
     }
 }
 
 /// The scripts that a file holds. Its version is read first: another version's form may be any.
-fn read(text: &[u8]) -> Result<Vec<KeptScript>, String> {
+fn parse(text: &[u8]) -> Result<Vec<KeptScript>, String> {
     let Version { version } = serde_json::from_slice(text).map_err(|error| error.to_string())?;
     if version != VERSION {
         return Err(format!("`version` is {version}: expected {VERSION}"));
@@ -106,7 +101,8 @@ mod tests {
     }
 
     fn patrol() -> KeptScript {
-        let script = ScriptFile::parse("patrol.toml", include_str!("../../scripts/patrol.toml")).unwrap();
+        let script =
+            ScriptFile::parse("patrol.toml", include_str!("../../../agent/scripts/patrol.toml")).unwrap();
         let with = [("route".to_owned(), Argument::Route(vec![[0.1, 2.0, 1e-7]]))].into();
         let called = Some("round".to_owned());
         KeptScript {
@@ -119,11 +115,11 @@ mod tests {
     fn scripts_are_there_in_the_next_life_and_those_given_up_are_not() {
         let folder = tempfile::tempdir().unwrap();
         let state = folder.path().join("state");
-        let (mut store, nothing) = FileScriptStore::open(&state, &node());
+        let (mut store, nothing) = ScriptStore::open(&state, &node());
         assert_eq!(nothing.unwrap(), []);
         for kept in [vec![patrol()], vec![]] {
             store.save(&kept).unwrap();
-            assert_eq!(FileScriptStore::open(&state, &node()).1.unwrap(), kept);
+            assert_eq!(ScriptStore::open(&state, &node()).1.unwrap(), kept);
         }
         assert_eq!(fs::read_dir(state).unwrap().count(), 1, "nothing is left beside it");
     }
@@ -142,15 +138,15 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("uav-1.scripts.json");
             fs::write(&path, text).unwrap();
-            let (mut store, lost) = FileScriptStore::open(folder.path(), &node());
+            let (mut store, lost) = ScriptStore::open(folder.path(), &node());
             let lost = lost.unwrap_err().to_string();
             let aside = folder.path().join("uav-1.scripts.json.damaged");
             for part in [path.to_str().unwrap(), why, aside.to_str().unwrap()] {
                 assert!(lost.contains(part), "{lost} does not say {part}");
             }
             assert_eq!(fs::read_to_string(aside).unwrap(), text);
-            store.save(&[patrol()]).unwrap();
-            assert_eq!(FileScriptStore::open(folder.path(), &node()).1.unwrap(), [patrol()]);
+            store.save(&vec![patrol()]).unwrap();
+            assert_eq!(ScriptStore::open(folder.path(), &node()).1.unwrap(), [patrol()]);
         }
     }
 
@@ -159,7 +155,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file_not_folder = folder.path().join("state");
         fs::write(&file_not_folder, "").unwrap();
-        let (mut store, _) = FileScriptStore::open(&file_not_folder, &node());
-        assert!(store.save(&[]).unwrap_err().contains("uav-1.scripts.json"));
+        let (mut store, _) = ScriptStore::open(&file_not_folder, &node());
+        assert!(store.save(&vec![]).unwrap_err().contains("uav-1.scripts.json"));
     }
 }

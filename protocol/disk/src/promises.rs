@@ -1,59 +1,55 @@
-//! What a node must not forget, in a file.
+//! The promises that a node has made to others.
 
+use std::io;
 use std::path::{Path, PathBuf};
-use std::{fs, io};
 
 use skein_dbp::Kept;
-use skein_wire::{NodeName, Store, replace_file};
+use skein_wire::{NodeName, Store};
 
-/// Why what was kept cannot be had.
+use crate::node_file;
+
+/// The promises that were kept cannot be read.
 #[derive(Debug, thiserror::Error)]
-pub enum KeptError {
+pub enum PromisesError {
     /// The file cannot be read.
     #[error("`{}`: {source}; what this node must not forget is kept there", path.display())]
     File { path: PathBuf, source: io::Error },
     /// The file holds something else.
     #[error("`{}`: {source}; it should hold the blocks that this node must keep, as JSON. Remove it only if none of them is to hold any more", path.display())]
-    Content {
-        path: PathBuf,
-        /// What is wrong, with line and column.
-        source: serde_json::Error,
-    },
+    Content { path: PathBuf, source: serde_json::Error },
 }
 
-/// Keeps what a node must not forget in `<folder>/<node>.kept.json`, written whole each time.
+/// Keeps a node's promises in `<folder>/<node>.kept.json`, written whole each time.
 #[derive(Debug)]
-pub struct FileStore(PathBuf);
+pub struct PromiseStore(PathBuf);
 
-impl FileStore {
+impl PromiseStore {
     /// The store of `node` in `folder`, and what a former life has kept there.
     ///
     /// # Errors
-    /// [`KeptError`] when there is a file that cannot be understood: it is left alone.
-    pub fn open(folder: &Path, node: &NodeName) -> Result<(Self, Kept), KeptError> {
-        let path = folder.join(format!("{}.kept.json", node.as_str().replace('/', "-")));
-        let kept = match fs::read(&path) {
-            Ok(text) => serde_json::from_slice(&text)
-                .map_err(|source| KeptError::Content { path: path.clone(), source })?,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Kept::default(),
-            Err(source) => return Err(KeptError::File { path, source }),
+    /// [`PromisesError`] when there is a file that cannot be understood: it is left alone.
+    pub fn open(folder: &Path, node: &NodeName) -> Result<(Self, Kept), PromisesError> {
+        let path = node_file::path_of(folder, node, "kept.json");
+        let kept = match node_file::read(&path) {
+            Ok(Some(text)) => serde_json::from_slice(&text)
+                .map_err(|source| PromisesError::Content { path: path.clone(), source })?,
+            Ok(None) => Kept::default(),
+            Err(source) => return Err(PromisesError::File { path, source }),
         };
         Ok((Self(path), kept))
     }
-
-    fn write(&self, kept: &Kept) -> io::Result<()> {
-        replace_file(&self.0, &serde_json::to_vec_pretty(kept)?)
-    }
 }
 
-impl Store for FileStore {
+impl Store for PromiseStore {
     fn save(&mut self, kept: &Kept) -> Result<(), String> {
-        self.write(kept).map_err(|error| format!("`{}`: {error}", self.0.display()))
+        node_file::replace(&self.0, kept)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use skein_bp::EventSet;
     use skein_dbp::{KeptBlock, Roster};
 
@@ -63,7 +59,7 @@ mod tests {
     fn what_is_kept_is_there_in_the_next_life() {
         let folder = tempfile::tempdir().unwrap();
         let node = NodeName::new("uav/1").unwrap();
-        let (mut store, nothing) = FileStore::open(folder.path(), &node).unwrap();
+        let (mut store, nothing) = PromiseStore::open(folder.path(), &node).unwrap();
         assert_eq!(nothing, Kept::default());
         let block = KeptBlock {
             node: NodeName::new("ground/main").unwrap(),
@@ -76,7 +72,7 @@ mod tests {
         let decisions = vec![skein_bp::Event::new("swarm/launch").with("n", 1)];
         let kept = Kept { blocks: vec![block], roster, term: 1, decisions };
         store.save(&kept).unwrap();
-        assert_eq!(FileStore::open(folder.path(), &node).unwrap().1, kept);
+        assert_eq!(PromiseStore::open(folder.path(), &node).unwrap().1, kept);
     }
 
     #[test]
@@ -84,7 +80,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("uav-1.kept.json");
         fs::write(&path, "{\"blocks\": 3}").unwrap();
-        let error = FileStore::open(folder.path(), &NodeName::new("uav/1").unwrap()).unwrap_err().to_string();
+        let error =
+            PromiseStore::open(folder.path(), &NodeName::new("uav/1").unwrap()).unwrap_err().to_string();
         assert!(error.contains("uav-1.kept.json") && error.contains("line 1"), "{error}");
         assert!(path.exists());
     }

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use skein_wire::NodeName;
 
+use crate::node_file::path_of;
+
 /// Why the number cannot be had.
 #[derive(Debug, thiserror::Error)]
 pub enum IncarnationError {
@@ -14,11 +16,7 @@ pub enum IncarnationError {
     File { path: PathBuf, source: io::Error },
     /// The file holds something else.
     #[error("`{}` holds {found:?}: expected a number; put one there that is greater than any this node has had", path.display())]
-    Content {
-        path: PathBuf,
-        /// What stands there.
-        found: String,
-    },
+    Content { path: PathBuf, found: String },
 }
 
 /// The next incarnation of `node`: greater than every one before that had this `folder`, and on disk before it is
@@ -27,8 +25,8 @@ pub enum IncarnationError {
 /// ```
 /// let folder = std::env::temp_dir().join("skein-incarnation-example");
 /// let node = skein_wire::NodeName::new("uav/1")?;
-/// let first = skein_zenoh::next_incarnation(&folder, &node)?;
-/// assert_eq!(skein_zenoh::next_incarnation(&folder, &node)?, first + 1);
+/// let first = skein_disk::next_incarnation(&folder, &node)?;
+/// assert_eq!(skein_disk::next_incarnation(&folder, &node)?, first + 1);
 /// # std::fs::remove_dir_all(folder)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -36,7 +34,7 @@ pub enum IncarnationError {
 /// # Errors
 /// [`IncarnationError`] names the file at fault.
 pub fn next_incarnation(folder: &Path, node: &NodeName) -> Result<u64, IncarnationError> {
-    let path = folder.join(format!("{}.incarnation", node.as_str().replace('/', "-")));
+    let path = path_of(folder, node, "incarnation");
     let failed = |source| IncarnationError::File { path: path.clone(), source };
     fs::create_dir_all(folder).map_err(failed)?;
     let mut file =

@@ -1,0 +1,178 @@
+/**
+ * Station and console say these to each other. Made from the station's types in `ground/src`; to make it anew:
+ *
+ *     SKEIN_REFRESH=1 cargo test -p skein-ground --lib typescript
+ */
+
+export type AnswerView = { "state": "pending" } | { "state": "missing" } | { "state": "acknowledged", after_ms: number, } | { "state": "refused", why: string, };
+
+/**
+ * Who blocks a request.
+ */
+export type Blocker = { node: string, bthread: string,
+/**
+ * Whether it runs where it blocks.
+ */
+local: boolean,
+/**
+ * How long ago it renewed its block, if that comes from elsewhere.
+ */
+lease_age_s: number | null,
+/**
+ * After what age the block lapses.
+ */
+lease_s: number | null, };
+
+export type Bounds = { min: [number, number, number], max: [number, number, number], };
+
+/**
+ * One reason for which a vehicle stands still, and what would end it.
+ */
+export type Change = {
+/**
+ * Sentences, from the vehicle to what is behind it all.
+ */
+because: Array<string>,
+/**
+ * Any of these would end it. Empty if nothing known would.
+ */
+needed: Array<string>,
+/**
+ * The b-threads that wait for one another in a ring, if that is the reason.
+ */
+cycle: Array<string>, };
+
+/**
+ * A message of a browser.
+ */
+export type ClientMessage = { "type": "order" } & OrderMessage | { "type": "why", vehicle: string | null, } | { "type": "read_script", tag: string | null, file: string, text: string, };
+
+/**
+ * An event that has happened.
+ */
+export type EventNote = { time_s: number,
+/**
+ * Its name and data.
+ */
+event: string,
+/**
+ * Where it was decided.
+ */
+home: string,
+/**
+ * Who requested it; nobody if the node reports it.
+ */
+requested_by: Array<string>,
+/**
+ * At which priority, and which requests it went before.
+ */
+choice: string | null, };
+
+export type EventView = { time_s: number, home: string, seq: number, name: string, data: Record<string, unknown>, requested_by: Array<string>, blocked_by: Array<string>, };
+
+export type LinkView = { alive: boolean, age_ms: number | null, };
+
+export type MissionView = "under_way" | "complete" | "failed";
+
+export type Obstacle = { position: [number, number, number], orientation: [number, number, number, number], } & ({ "form": "box", size: [number, number, number], } | { "form": "cylinder", radius: number, height: number, } | { "form": "sphere", radius: number, });
+
+export type OrderMessage = { tag?: string, what: What, to: To, point?: [number, number, number | null],
+/**
+ * For `load`: a script with values for its parameters.
+ */
+script?: { script: unknown, with: Record<string, unknown> },
+/**
+ * For `unload`: the name that the script runs under.
+ */
+name?: string, };
+
+export type OrderView = { id: number, what: string, script: string | null, time_s: number, answers: { [key in string]: AnswerView }, };
+
+export type OutcomeView = { succeeded: boolean, failed: { [key in string]: string }, };
+
+/**
+ * Something that is requested.
+ */
+export type Request = {
+/**
+ * Its name and data.
+ */
+event: string, by: string,
+/**
+ * At which priority.
+ */
+priority: number | null,
+/**
+ * Who blocks it at its home.
+ */
+blocked_by: Array<Blocker>, };
+
+/**
+ * A message for browsers.
+ */
+export type ServerMessage = { "type": "scene", fleet: string, station: string, software: string, bounds: Bounds | null, obstacles: Array<Obstacle>, } | { "type": "fleet", time_s: number, outcome: OutcomeView | null, vehicles: Array<VehicleView>, } | { "type": "orders", orders: Array<OrderView>, } | { "type": "events", events: Array<EventView>, } | { "type": "why", headline: string, vehicle: string, time_s: number,
+/**
+ * Where it is and what it does; none of one that has not been heard.
+ */
+situation: Situation | null,
+/**
+ * What has happened at it last, newest first.
+ */
+events: Array<EventNote>,
+/**
+ * What is requested of it now, by its own b-threads and by others.
+ */
+requests: Array<Request>,
+/**
+ * What would let it move: one will do. Empty while it moves.
+ */
+changes: Array<Change>,
+/**
+ * What all this cannot be sure of.
+ */
+doubts: Array<string>, } | { "type": "ordered", tag: string | null, id: number, } | { "type": "script", tag: string | null, script: unknown, } | { "type": "error", tag: string | null, message: string, };
+
+/**
+ * Where a vehicle is and what it does.
+ */
+export type Situation = {
+/**
+ * How old this is.
+ */
+age_s: number,
+/**
+ * The autopilot's mode.
+ */
+mode: string,
+/**
+ * What the vehicle is about, as it says.
+ */
+task: string,
+/**
+ * Whether its motors are armed.
+ */
+armed: boolean,
+/**
+ * `under_way`, `complete` or `failed`.
+ */
+mission: string,
+/**
+ * ENU, metres.
+ */
+position: [number, number, number],
+/**
+ * Metres per second.
+ */
+speed_m_s: number,
+/**
+ * Since when it has not left this place; none if it moves.
+ */
+still_since_s: number | null, };
+
+export type StateView = { position: [number, number, number], velocity: [number, number, number], yaw_rad: number, radius_m: number, mode: string, armed: boolean, battery: number, task: string, waiting_for: string, mission: MissionView, path: Array<[number, number, number]>, scripts: Array<string>, };
+
+export type To = string | Array<string>;
+
+export type VehicleView = { name: string, heard: boolean, link: LinkView, notes: Array<string>, };
+
+export type What = "launch" | "launch_together" | "abort" | "hold" | "resume" | "return" | "land" | "goto" | "hand_back" | "load" | "unload";

@@ -1,0 +1,132 @@
+//! The way of messages from the station's loop to the browsers: nobody waits for anybody.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use skein_dbp::{Happened, NodeName};
+use tokio::sync::{broadcast, watch};
+
+/// Events that a browser gets when it connects.
+const EVENTS_KEPT: usize = 300;
+/// A browser may lag behind by so many events before it misses some.
+const EVENTS_UNREAD: usize = 256;
+
+/// A message for browsers, as text.
+pub(super) type Text = Arc<str>;
+
+/// The newest message of each kind that replaces the one before.
+pub(super) type Pictures = BTreeMap<&'static str, Text>;
+
+/// Explanations by vehicle.
+pub(super) type Reasons = Arc<BTreeMap<NodeName, Text>>;
+
+/// The number of browsers that ask about a vehicle.
+type Questions = Arc<Mutex<BTreeMap<NodeName, usize>>>;
+
+/// The station's end.
+pub(super) struct Broadcast {
+    pictures: watch::Sender<Pictures>,
+    events: broadcast::Sender<Text>,
+    reasons: watch::Sender<Reasons>,
+    history: Arc<Mutex<VecDeque<Happened>>>,
+    questions: Questions,
+}
+
+/// A browser's end.
+pub(super) struct Subscription {
+    pub(super) pictures: watch::Receiver<Pictures>,
+    pub(super) events: broadcast::Receiver<Text>,
+    pub(super) reasons: watch::Receiver<Reasons>,
+    history: Arc<Mutex<VecDeque<Happened>>>,
+    questions: Questions,
+}
+
+/// A browser's question about a vehicle, for as long as it is asked.
+pub(super) struct Question {
+    pub(super) vehicle: NodeName,
+    questions: Questions,
+}
+
+impl Broadcast {
+    pub(super) fn new() -> (Self, Subscription) {
+        let (pictures, pictures_read) = watch::channel(Pictures::new());
+        let (events, events_read) = broadcast::channel(EVENTS_UNREAD);
+        let (reasons, reasons_read) = watch::channel(Reasons::default());
+        let (history, questions) = (Arc::new(Mutex::new(VecDeque::new())), Questions::default());
+        let subscription = Subscription {
+            pictures: pictures_read,
+            events: events_read,
+            reasons: reasons_read,
+            history: history.clone(),
+            questions: questions.clone(),
+        };
+        (Self { pictures, events, reasons, history, questions }, subscription)
+    }
+
+    /// Shows this in the place of the last of its kind.
+    pub(super) fn show(&self, kind: &'static str, picture: Text) {
+        self.pictures.send_modify(|pictures| drop(pictures.insert(kind, picture)));
+    }
+
+    /// Tells what has happened, now and to browsers that come later.
+    pub(super) fn tell(&self, happened: &[&Happened], text: Text) {
+        let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
+        history.extend(happened.iter().copied().cloned());
+        let excess = history.len().saturating_sub(EVENTS_KEPT);
+        history.drain(..excess);
+        drop(history);
+        // Nobody watches: that is no error.
+        let _ = self.events.send(text);
+    }
+
+    /// The vehicles that somebody asks about.
+    pub(super) fn asked(&self) -> Vec<NodeName> {
+        self.questions.lock().unwrap_or_else(PoisonError::into_inner).keys().cloned().collect()
+    }
+
+    /// Answers the questions about some vehicles.
+    pub(super) fn explain(&self, reasons: BTreeMap<NodeName, Text>) {
+        self.reasons.send_replace(Arc::new(reasons));
+    }
+}
+
+impl Drop for Question {
+    fn drop(&mut self) {
+        let mut questions = self.questions.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(asking) = questions.get_mut(&self.vehicle) {
+            *asking -= 1;
+            if *asking == 0 {
+                questions.remove(&self.vehicle);
+            }
+        }
+    }
+}
+
+impl Clone for Subscription {
+    /// The newest pictures are news to a new browser.
+    fn clone(&self) -> Self {
+        let mut clone = Self {
+            pictures: self.pictures.clone(),
+            events: self.events.resubscribe(),
+            reasons: self.reasons.clone(),
+            history: self.history.clone(),
+            questions: self.questions.clone(),
+        };
+        clone.pictures.mark_changed();
+        clone
+    }
+}
+
+impl Subscription {
+    /// Asks why a vehicle does what it does, until the question is dropped.
+    pub(super) fn ask_about(&self, vehicle: NodeName) -> Question {
+        let mut questions = self.questions.lock().unwrap_or_else(PoisonError::into_inner);
+        *questions.entry(vehicle.clone()).or_default() += 1;
+        Question { vehicle, questions: self.questions.clone() }
+    }
+
+    /// The latest events.
+    pub(super) fn history(&self) -> Vec<Happened> {
+        self.history.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
+    }
+}
