@@ -26,7 +26,7 @@ use self::call_off::{CalledOff, interruptions};
 pub use self::{
     recording::Recording,
     setup::{FLEET, GROUND, agent_configs, ground_config, simulation_config, vehicle_name},
-    swarm::{Happenings, Links, Swarm, scan_for_agent},
+    swarm::{Happenings, Links, Swarm},
     trial::{Flown, Trial},
 };
 use crate::{

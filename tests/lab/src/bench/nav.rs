@@ -16,7 +16,7 @@ use skein_agent::{AgentConfig, Me};
 use skein_mav::SetPoint;
 use skein_planning::separation::{self, FilterConfig, Neighbour, filter};
 use skein_sim::cli::{Controller, Exit};
-use skein_sim::fly::{agent_configs, scan_for_agent};
+use skein_sim::fly::agent_configs;
 use skein_sim::scenario::Scenario;
 use skein_sim::summary::PlanTimes;
 use skein_wire::vocabulary::GOTO;
