@@ -79,7 +79,7 @@ fn px4_flies_only_with_failsafes_that_keep_it_in_the_air() {
         failsafe.judge(value.map(skein_mav::ParameterValue::Real))
     };
     for (parameter, safe, unsafe_) in [
-        ("COM_OF_LOSS_T", &[0.0, 0.5, 2.0][..], &[2.1, -1.0, f32::NAN][..]),
+        ("COM_OF_LOSS_T", &[0.0, 0.5, 2.0][..], &[2.5, -1.0, f32::NAN][..]),
         ("COM_OBL_RC_ACT", &[0.0, 1.0, 3.0, 4.0, 5.0], &[2.0, 6.0, 7.0, 8.0, -1.0, 3.5, f32::NAN]),
     ] {
         for value in safe {
