@@ -114,7 +114,7 @@ pub fn write(
         anyhow::Ok(path)
     };
     let plan = Plan { network, port_offset };
-    let agents = agent_configs(scenario, cli::Controller::Bp);
+    let agents = agent_configs(scenario);
     let world = save("world.toml", plan.world())?;
     let muster = ground_config(scenario, skein_wire::Fleet::new(FLEET)?, cli::Controller::Bp).muster;
     let ground = save("ground.toml", plan.ground(&agents, muster, launch_on_order))?;
@@ -266,7 +266,7 @@ mod tests {
     #[test]
     fn every_field_that_is_filled_in_is_one_of_the_example() {
         let scenario = Scenario::open("window", &crate::scenario::Overrides::default(), 3).unwrap();
-        let agents = agent_configs(&scenario, cli::Controller::Bp);
+        let agents = agent_configs(&scenario);
         for network in [Network::Peer, Network::Router, Network::Zenohd] {
             let plan = Plan { network, port_offset: 100 };
             let agent: toml::Table = plan.agent(1, &agents[1]).parse().unwrap();

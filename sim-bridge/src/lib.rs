@@ -21,6 +21,7 @@ pub mod operator;
 pub mod processes;
 pub mod scenario;
 mod scene_view;
+mod sequential;
 #[cfg(feature = "zenoh")]
 pub mod serve;
 pub mod summary;

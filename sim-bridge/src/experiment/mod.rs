@@ -8,6 +8,7 @@ mod dstar_grid;
 mod feasibility;
 mod figure;
 mod lsc;
+mod naive_right_of_way;
 mod performance;
 mod report;
 mod right_of_way;

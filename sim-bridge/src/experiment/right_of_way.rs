@@ -4,11 +4,12 @@
 use std::collections::BTreeMap;
 
 use serde_json::json;
-use skein_agent::PassageRule;
+use skein_agent::{Behaviour, Mind, Parts};
 use skein_bp::Event;
 use skein_dbp::{Happened, NodeName};
 use skein_wire::vocabulary::{ENTER, LANDED, LEAVE};
 
+use super::naive_right_of_way::Naive;
 use super::statistics::mean;
 use super::{Bound, Figure, Line, Options, Report, Style, runs};
 use crate::cli::Controller;
@@ -16,8 +17,9 @@ use crate::fly::Trial;
 use crate::scenario::Scenario;
 
 const RUNS: usize = 20;
-const RULES: [(PassageRule, &str); 2] =
-    [(PassageRule::Confirmed, "confirmed"), (PassageRule::Heard, "naive")];
+/// What decides on board by each rule.
+type Rule = fn() -> Box<dyn Mind>;
+const RULES: [(Rule, &str); 2] = [(|| Box::new(Behaviour), "confirmed"), (|| Box::new(Naive), "naive")];
 /// A network that is slow and loses messages: mean latency, milliseconds, and the share lost.
 const SLOW: (f64, f64) = (100.0, 0.2);
 /// Two places nearer than this, per axis, are in one passage, metres.
@@ -126,9 +128,10 @@ pub(super) fn run(options: &Options) -> anyhow::Result<Report> {
     Ok(report)
 }
 
-fn fly(scenario: &Scenario, rule: PassageRule) -> anyhow::Result<Flight> {
+fn fly(scenario: &Scenario, rule: Rule) -> anyhow::Result<Flight> {
     let mut passage = Passage::default();
-    let trial = Trial::new(scenario, Controller::Bp).with_agents(|agent| agent.passage_rule = rule);
+    let trial = Trial::new(scenario, Controller::Bp)
+        .with_parts(move |config| Parts { mind: rule(), ..Parts::of(config) });
     let summary = trial
         .fly(&mut |swarm, selections| {
             selections.iter().for_each(|happened| passage.watch(swarm.now().as_secs_f64(), happened));
@@ -144,7 +147,7 @@ fn fly(scenario: &Scenario, rule: PassageRule) -> anyhow::Result<Flight> {
 
 /// How many are inside over the time of one flight, by rule.
 fn inside(both: &[Flight; 2]) -> Figure {
-    let line = |((_, rule), flight): (&(PassageRule, &str), &Flight)| Line {
+    let line = |((_, rule), flight): (&(Rule, &str), &Flight)| Line {
         name: (*rule).to_owned(),
         style: Style::Solid,
         points: flight.passage.over_time.clone(),

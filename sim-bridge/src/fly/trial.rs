@@ -2,12 +2,10 @@
 
 use std::time::Duration;
 
-use skein_agent::AgentConfig;
+use skein_agent::{AgentConfig, Parts};
 use skein_dbp::Happened;
 
-use super::{
-    Flight, Happenings, Host, Lockstep, Swarm, agent_configs, interruptions, memory_links, memory_network,
-};
+use super::{Agents, Flight, Happenings, Host, Lockstep, Swarm, interruptions, memory_links, memory_network};
 use crate::cli::Controller;
 use crate::cpu_time;
 use crate::scenario::Scenario;
@@ -19,8 +17,7 @@ type Watch<'a> = dyn FnMut(&Swarm, &[Happened]) + 'a;
 /// A flight to be made.
 pub struct Trial<'a> {
     scenario: &'a Scenario,
-    controller: Controller,
-    agents: Vec<AgentConfig>,
+    agents: Agents,
 }
 
 /// What came of a trial.
@@ -37,13 +34,20 @@ pub struct Flown {
 impl<'a> Trial<'a> {
     #[must_use]
     pub fn new(scenario: &'a Scenario, controller: Controller) -> Self {
-        Self { scenario, controller, agents: agent_configs(scenario, controller) }
+        Self { scenario, agents: Agents::of(scenario, controller) }
     }
 
     /// Changes every agent's configuration.
     #[must_use]
     pub fn with_agents(mut self, change: impl FnMut(&mut AgentConfig)) -> Self {
-        self.agents.iter_mut().for_each(change);
+        self.agents.configs.iter_mut().for_each(change);
+        self
+    }
+
+    /// Makes every agent of these parts.
+    #[must_use]
+    pub fn with_parts(mut self, parts: impl Fn(&AgentConfig) -> Parts + 'static) -> Self {
+        self.agents.parts = Box::new(parts);
         self
     }
 
@@ -55,7 +59,7 @@ impl<'a> Trial<'a> {
         let began = cpu_time::this_thread()?;
         let network = memory_network(self.scenario);
         let links = memory_links(&network, self.scenario);
-        let flight = Flight::new(self.scenario, self.controller, self.agents, links, None, None)?;
+        let flight = Flight::new(self.scenario, self.agents, links, None, None)?;
         let mut agents_cpu = Duration::ZERO;
         let mut watch = |swarm: &Swarm, selections: &[Happened]| {
             agents_cpu = swarm.agents_cpu();
