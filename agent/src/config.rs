@@ -17,28 +17,6 @@ pub struct Fence {
     pub max: [f64; 3],
 }
 
-/// What decides on board.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Controller {
-    /// The behavioural program.
-    #[default]
-    Bp,
-    /// One loop around the same pipeline, without b-threads: see [`Sequential`](crate::sequential::Sequential).
-    Sequential,
-    /// No b-thread at all: everything else runs, and nothing flies (Wang 2023, feasibility).
-    None,
-}
-
-/// How a vehicle decides that it may enter a narrow passage.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PassageRule {
-    /// It blocks everyone else's entering, and enters once all homes have confirmed that.
-    #[default]
-    Confirmed,
-    /// It enters when nobody is heard to be inside. Two may be inside at once: for comparison only.
-    Heard,
-}
-
 /// What the vehicle can do, and the distances it keeps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Envelope {
@@ -116,29 +94,11 @@ impl LocalPlanner {
     }
 }
 
-/// A part of the pipeline that can be left out, to see what it is good for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Layer {
-    /// The path around what is known: straight to the waypoint instead.
-    GlobalPath,
-    /// What keeps the velocity off obstacles: straight along the path instead.
-    LocalAvoidance,
-    /// Repulsion between vehicles.
-    Repulsion,
-    SafetyFilter,
-    /// Planning anew where no way is made.
-    Escape,
-    /// Right of way in narrow passages.
-    RightOfWay,
-}
-
 /// Which planners the pipeline is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Planners {
     pub global: GlobalPlanner,
     pub local: LocalPlanner,
-    /// What is left out. For experiments alone: every layer is there for a reason.
-    pub without: Option<Layer>,
 }
 
 /// The configuration of one vehicle's agent.
@@ -177,9 +137,6 @@ pub struct AgentConfig {
     pub planners: Planners,
     /// What to do without the ground station.
     pub link_loss: LinkLossPolicy,
-    pub controller: Controller,
-    /// How it shares narrow passages.
-    pub passage_rule: PassageRule,
     /// The scripts that run from the start.
     pub scripts: Vec<Assignment>,
     /// Lease of the bids this node sends.

@@ -1,117 +1,32 @@
-//! The agent core: one vehicle's program around its pipeline, without I/O.
+//! The agent core: one vehicle's mission around its control, without I/O.
+//!
+//! [`Control`] flies the vehicle and [`Mission`] decides what for. They know nothing of one another: control says what it has
+//! found out in [reports](crate::report::Report), the mission what is to be done in
+//! [instructions](crate::instruction::Instruction), and this core carries both to and fro in a fixed order.
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use nalgebra::{UnitQuaternion, Vector3};
-use skein_bp::script::Assignment;
-use skein_bp::{Event, EventSet, Origin, Program, ProgramConfig};
-use skein_dbp::{Happened, Node, NodeConfig, NodeName};
-use skein_mav::{Companion, CompanionConfig, Landed, SetPoint};
-use skein_planning::airspace::{Airspace, KeepOut};
-use skein_planning::map::MapError;
-use skein_wire::vocabulary::{
-    ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, HOMEWARD, LAND, LANDED, LOAD, ORDER, PLAN, RETURN, SCRIPT,
-    UNLOAD,
-};
-use skein_wire::{
-    Fleet, KeptScript, Link, MissionState, NodeLink, Scan, State, Store, joint_roster, vocabulary,
-};
+use nalgebra::Vector3;
+use skein_dbp::{Happened, NodeName};
+use skein_wire::{KeptScript, Link, NodeLink, Scan, Store};
 
 use crate::{
-    bthreads,
-    config::{AgentConfig, Controller, Envelope},
-    failsafes::Failsafes,
-    flight::{Flight, FlightPhase},
-    me::Me,
-    neighbours::{Neighbour, Neighbours},
-    pipeline::{
-        guidance::{Guidance, Motion, Report, Surroundings},
-        perception::{Perception, Pose},
-        set_point::{FRESH_FOR, KeepAlive, SILENT_AFTER, keep_alive, oldest_age},
-        touchdown::Descent,
-    },
-    precedence,
-    scripts::{Begins, CONFIGURATION, Circumstances, RunningScript, ScriptFacts, Scripts},
-    sequential::Sequential,
-    verify::check_script,
-    watches::Watches,
+    agent_error::AgentError,
+    config::AgentConfig,
+    control::{Control, SetPointRecord},
+    mission::{Mission, Outcome},
+    parts::Parts,
+    pipeline::set_point::SILENT_AFTER,
+    scripts::RunningScript,
 };
 
-/// Standard deviation of the position that a vehicle tells others, m.
-const POSITION_SIGMA_M: f64 = 0.05;
-/// The map reaches this far above the highest waypoint, m: as far as a path may climb over something, and more.
-const ABOVE_WAYPOINTS_M: f64 = 4.0;
-/// A path may pass under something, this far below the lowest waypoint, m.
-const BELOW_WAYPOINTS_M: f64 = 1.0;
-/// No path is lower than this above the take-off place, m.
-const LEAST_HEIGHT_M: f64 = 0.6;
-/// Paths keep this far out of zones, m: what a vehicle strays from its path, the error of its position, and its hull.
-const ZONE_MARGIN_M: f64 = 1.0;
-/// Paths keep this high above terrain that is known, m.
-const TERRAIN_CLEARANCE_M: f64 = 1.0;
 /// An agent that has not run for this long has let its set-points fall silent, and does not take them up by itself.
 const LONGEST_PAUSE: Duration = SILENT_AFTER;
-/// Neighbours are heard this often at least, while they are, s.
-const NEIGHBOUR_PERIOD_S: f64 = 0.5;
-/// One that is silent may fly anywhere, from its last word until this vehicle is up, s.
-const CLIMB_S: f64 = 4.0;
-/// Beyond this it may be anywhere in the arena, s.
-const MOST_UNSEEN_S: f64 = 4.0;
-/// After so long a silence, s, its failsafe has landed it, or its mission is over.
-const SURELY_DOWN_S: f64 = 45.0;
-/// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for between
-/// two ticks. `skein-agent verify --script` looks at all.
-const STATES_TRIED: usize = 500;
-/// Who requested what the sequential navigator does, in the trace.
-const SEQUENTIAL: &str = "sequential";
 /// A navigation cycle and a state message to the others begin this often.
 const CYCLE_PERIOD: Duration = Duration::from_millis(100);
-
-/// Why an agent cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum AgentError {
-    /// A node name in the configuration is none.
-    #[error("agent configuration: `{field}` is {value:?}: {source}")]
-    Name {
-        field: &'static str,
-        value: String,
-        /// What is wrong with it.
-        source: skein_dbp::NodeNameError,
-    },
-    /// The fleet's name is none.
-    #[error("agent configuration: `fleet` is {value:?}: {source}")]
-    Fleet {
-        value: String,
-        /// What is wrong with it.
-        source: skein_wire::KeyError,
-    },
-    /// A script is not run.
-    #[error("agent configuration: script `{name}`: {why}")]
-    Script { name: String, why: String },
-    /// The fence is no space to fly in.
-    #[error("agent configuration: `fence`: {0}")]
-    Fence(#[from] MapError),
-}
-
-/// How a vehicle's mission ended.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// It reached its last waypoint and landed.
-    Complete,
-    /// It did not, and this is why.
-    Failed(String),
-}
-
-/// What set-points were made from: the keep-alive rule, observed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SetPointRecord {
-    /// Set-points of the pipeline.
-    pub commands: u64,
-    /// Zero velocities for want of fresh inputs.
-    pub stops: u64,
-    /// Age of the oldest input that a command was made from.
-    pub oldest_input: Duration,
-}
+/// Planning answers a decision with a new report, which deserves its turn in the same tick; so often.
+const ROUNDS: usize = 4;
 
 /// One line about a vehicle, for people.
 #[derive(Clone, Debug, PartialEq)]
@@ -129,29 +44,12 @@ pub struct Status {
 }
 
 /// One vehicle's agent. Feed it bytes and scans, tick it every 20 ms, carry its bytes away.
+#[derive(Debug)]
 pub struct AgentCore {
-    config: AgentConfig,
-    me: Me,
-    name: NodeName,
-    companion: Companion,
-    node: NodeLink,
-    /// What decides in place of the node's program.
-    sequential: Option<Sequential>,
-    neighbours: Neighbours,
-    perception: Perception,
-    watches: Watches,
-    failsafes: Failsafes,
-    flight: Flight,
-    guidance: Guidance,
-    scripts: Scripts,
-    script_facts: ScriptFacts,
+    control: Control,
+    mission: Mission,
     next_cycle: Duration,
     last_tick: Option<Duration>,
-    task: String,
-    outcome: Option<Outcome>,
-    selections: Vec<Happened>,
-    set_points: SetPointRecord,
-    fault: Option<String>,
 }
 
 impl AgentCore {
@@ -160,7 +58,8 @@ impl AgentCore {
     /// # Errors
     /// [`AgentError`] names the field of the configuration at fault.
     pub fn new(config: AgentConfig) -> Result<Self, AgentError> {
-        Self::with_store(config, None)
+        let parts = Parts::of(&config);
+        Self::with_parts(config, parts, None)
     }
 
     /// An agent that keeps what it promises in `store`, so that blocks on its events can outlive whoever stated them.
@@ -168,7 +67,24 @@ impl AgentCore {
     /// # Errors
     /// As [`new`](Self::new).
     pub fn durable(config: AgentConfig, store: Box<dyn Store>) -> Result<Self, AgentError> {
-        Self::with_store(config, Some(store))
+        let parts = Parts::of(&config);
+        Self::with_parts(config, parts, Some(store))
+    }
+
+    /// An agent of these parts. With a `store`, as [`durable`](Self::durable).
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_parts(
+        config: AgentConfig,
+        parts: Parts,
+        store: Option<Box<dyn Store>>,
+    ) -> Result<Self, AgentError> {
+        let config = Arc::new(config);
+        let Parts { mind, positioning, layers } = parts;
+        let mission = Mission::new(config.clone(), mind, store)?;
+        let control = Control::new(config, mission.name().clone(), positioning, layers)?;
+        Ok(Self { control, mission, next_cycle: Duration::ZERO, last_tick: None })
     }
 
     /// The same agent, which keeps the scripts that are sent to it in `store`. Of those `kept` by a former life, each runs
@@ -176,655 +92,168 @@ impl AgentCore {
     /// go on in the air; one that does not is refused, and forgotten.
     #[must_use]
     pub fn keeping_scripts(mut self, store: Box<dyn Store<Vec<KeptScript>>>, kept: &[KeptScript]) -> Self {
-        for KeptScript { from, assignment } in kept {
-            let outcome = self
-                .admit(assignment, from, Begins::WhenReleased)
-                .map_err(|why| format!("it was kept from the agent's last life, and passes no more: {why}"));
-            self.node.node_mut().enqueue(self.scripts.verdict(assignment.name(), outcome));
-        }
-        self.scripts.keep_in(store);
+        self.mission.keep_scripts(store, kept);
         self
-    }
-
-    fn with_store(config: AgentConfig, store: Option<Box<dyn Store>>) -> Result<Self, AgentError> {
-        let name = |field, value: &str| {
-            NodeName::new(value).map_err(|source| AgentError::Name { field, value: value.to_owned(), source })
-        };
-        let me = Me::new(&config.node);
-        let mut program = Program::new(ProgramConfig {
-            protected: safety_events(&me),
-            ..ProgramConfig::vehicle(config.seed)
-        });
-        if config.controller == Controller::Bp {
-            bthreads::load(&mut program, &config);
-        }
-        let mut scripts = Scripts::new(me.clone(), &config.roster);
-        for assignment in &config.scripts {
-            scripts
-                .load(&mut program, assignment, CONFIGURATION, Begins::WhenReleased)
-                .and_then(|()| check_script(&config, assignment, STATES_TRIED))
-                .map_err(|why| AgentError::Script { name: assignment.name().to_owned(), why })?;
-        }
-        let roster: Vec<_> =
-            config.roster.iter().map(|node| name("roster", node)).collect::<Result<_, _>>()?;
-        let own_name = name("node", &config.node)?;
-        let neighbours = Neighbours::new(own_name.clone(), config.incarnation);
-        let node_config = NodeConfig {
-            lease: config.lease,
-            safety: safety_events(&me),
-            gateway: me.any_of(&[ORDER, LOAD, UNLOAD]),
-            // What comes from afar never outranks a vehicle's own b-threads for its safety.
-            remote_priority: precedence::MISSION..=precedence::LINK,
-            authority: config.authority.clone(),
-            joint: Some(joint_roster(name("ground", &config.ground)?, &roster)),
-            durable: store.is_some(),
-            kept: config.kept.clone(),
-            ..NodeConfig::new(own_name.clone(), config.incarnation, roster)
-        };
-        let fleet = Fleet::new(&config.fleet)
-            .map_err(|source| AgentError::Fleet { value: config.fleet.clone(), source })?;
-        let home = Vector3::from(config.home);
-        Ok(Self {
-            companion: Companion::new(CompanionConfig {
-                system_id: config.system_id,
-                component_id: 191,
-                datum: config.datum,
-            }),
-            node: match store {
-                Some(store) => NodeLink::durable(Node::new(node_config, program), fleet, store),
-                None => NodeLink::new(Node::new(node_config, program), fleet),
-            },
-            sequential: (config.controller == Controller::Sequential).then(|| {
-                Sequential::new(me.clone(), &config.waypoints, [home.x, home.y, config.return_altitude_m])
-            }),
-            name: own_name,
-            neighbours,
-            perception: perception(&config)?,
-            watches: Watches::new(me.clone()),
-            failsafes: Failsafes::default(),
-            flight: Flight::new(me.clone(), config.takeoff_height_m),
-            guidance: Guidance::new(config.envelope, config.fence, config.planners),
-            scripts,
-            script_facts: ScriptFacts::default(),
-            next_cycle: Duration::ZERO,
-            last_tick: None,
-            task: "on the ground".to_owned(),
-            outcome: None,
-            selections: Vec::new(),
-            set_points: SetPointRecord::default(),
-            fault: None,
-            me,
-            config,
-        })
     }
 
     /// Takes in bytes from the autopilot.
     pub fn receive_mavlink(&mut self, now: Duration, bytes: &[u8]) {
-        self.companion.receive(now, bytes);
+        self.control.receive_mavlink(now, bytes);
     }
 
     /// Bytes for the autopilot.
     pub fn take_mavlink(&mut self) -> Vec<u8> {
-        self.companion.take_output()
+        self.control.take_mavlink()
     }
 
-    /// An order of whoever is at this vehicle's own computer: `what` as in [`vocabulary::order`].
+    /// An order of whoever is at this vehicle's own computer: `what` as in [`skein_wire::vocabulary::order`].
     pub fn order(&mut self, what: &str) {
-        self.node.node_mut().enqueue(vocabulary::order(&self.name, what));
+        self.mission.order(what);
     }
 
     /// Takes in a lidar scan.
     pub fn sense(&mut self, now: Duration, scan: &Scan) {
-        // What an old one saw would be drawn where the vehicle is now.
-        if now.saturating_sub(scan.stamp) > FRESH_FOR {
-            return;
-        }
-        let Some(pose) = self.pose_at(scan.stamp) else { return };
-        // From the ground there is little to see, and much of it is the ground.
-        if !self.is_airborne() {
-            return;
-        }
-        let others: Vec<_> = self.neighbours.at(now).map(|neighbour| neighbour.position()).collect();
-        self.perception.take_in(scan, &pose, &others);
-        let (returns, rays) = (self.perception.returns(), scan.ranges_m.len());
-        self.guidance.look(scan.stamp, &pose.position, returns, rays, self.perception.map());
-    }
-
-    /// The vehicle's estimated pose at a time near the newest telemetry.
-    fn pose_at(&self, at: Duration) -> Option<Pose> {
-        let telemetry = self.companion.telemetry();
-        let (position, velocity) = (telemetry.position?, telemetry.velocity?);
-        let (attitude, rate) = (telemetry.attitude?, telemetry.angular_rate?);
-        let lead_s = |stamp: Duration| (at.as_secs_f64() - stamp.as_secs_f64()).clamp(-0.2, 0.2);
-        // A degree of tilt is a hand's breadth at the far wall of a room.
-        let turned = UnitQuaternion::from_scaled_axis(rate.value * lead_s(attitude.stamp));
-        Some(Pose {
-            position: position.value + velocity.value * lead_s(position.stamp),
-            attitude: attitude.value * turned,
-        })
+        self.control.sense(now, scan);
     }
 
     /// One tick, every 20 ms: hears, decides, and answers with a set-point.
     pub fn tick(&mut self, now: Duration, link: &mut dyn Link) {
         self.note_pause(now);
-        self.companion.tick(now);
         self.hear(now, link);
-        let neighbours: Vec<Neighbour> = self.neighbours.at(now).collect();
-        self.follow_autopilot(now);
-        self.watch(now, &neighbours);
-        let report = self.guidance.go_on_planning(self.perception.map_mut());
-        self.hear_of_path(now, report);
+        for report in self.control.observe(now) {
+            self.mission.hear(now, report);
+        }
         if now >= self.next_cycle {
             self.next_cycle = now + CYCLE_PERIOD;
-            self.begin_cycle(now, &neighbours, link);
+            self.begin_cycle(now, link);
         }
-        self.decide(now, &neighbours);
-        self.steer(now, &neighbours);
-        self.node.send(link);
-        self.node.put_board(now, link);
+        self.decide(now);
+        self.control.steer(now);
+        self.mission.send(link);
+        self.mission.put_board(now, link);
     }
 
     /// Between two ticks: answers at once what other nodes say, without a set-point. Makes the swarm quick to hold.
     pub fn respond(&mut self, now: Duration, link: &mut dyn Link) {
         self.hear(now, link);
-        let neighbours: Vec<Neighbour> = self.neighbours.at(now).collect();
-        self.decide(now, &neighbours);
-        self.node.send(link);
-    }
-
-    fn hear(&mut self, now: Duration, link: &mut dyn Link) {
-        self.node.receive(now, link);
-        for state in self.node.take_states() {
-            self.neighbours.hear(now, state);
-        }
+        self.decide(now);
+        self.mission.send(link);
     }
 
     fn note_pause(&mut self, now: Duration) {
         let pause = self.last_tick.replace(now).map_or(Duration::ZERO, |last| now.saturating_sub(last));
         if pause > LONGEST_PAUSE
-            && let Some(event) = self.flight.wake(pause)
+            && let Some(report) = self.control.wake(pause)
         {
-            self.guidance.rest();
-            self.report(now, event);
+            self.mission.hear(now, report);
             // Before anything that was said meanwhile is heard.
-            self.decide(now, &[]);
+            self.decide(now);
         }
     }
 
-    fn follow_autopilot(&mut self, now: Duration) {
-        self.failsafes.ask(&mut self.companion);
-        while let Some(event) = self.companion.poll_event() {
-            self.failsafes.hear(&event, self.companion.dialect());
-            if let Some(event) = self.flight.hear(now, &event, &mut self.companion) {
-                self.report(now, event);
-            }
-        }
-        if let Some(event) = self.flight.follow(now, &mut self.companion) {
-            self.report(now, event);
-        }
-    }
-
-    /// Tells whoever decides what the vehicle's body has found out.
-    fn report(&mut self, now: Duration, event: Event) {
-        match &mut self.sequential {
-            Some(sequential) => sequential.hear(now, &event),
-            None => self.node.node_mut().enqueue(event),
-        }
-    }
-
-    fn watch(&mut self, now: Duration, neighbours: &[Neighbour]) {
-        let telemetry = self.companion.telemetry();
-        let mut events = Vec::new();
-        events.extend(self.watches.preflight(
-            now,
-            telemetry,
-            self.failsafes.are_sound(),
-            self.is_overhead_clear(neighbours),
-            self.flight.is_taking_off(),
-        ));
-        if let (true, Some(position)) = (self.is_airborne(), telemetry.position) {
-            if let Some(battery) = telemetry.battery {
-                let home = Vector3::from(self.config.home);
-                let seconds_home = (position.value - home).norm() / self.config.envelope.cruise_m_s + 10.0;
-                events.extend(self.watches.battery(now, battery.value, seconds_home));
-            }
-            events.extend(self.watches.fence(position.value, &self.config.fence));
-            events.extend(self.watches.separation(position.value, neighbours));
-        }
-        for event in events {
-            self.report(now, event);
-        }
-    }
-
-    /// Whether nobody flies where this vehicle would climb, as far as can be known: one that is silent may have come
-    /// closer meanwhile.
-    fn is_overhead_clear(&self, neighbours: &[Neighbour]) -> bool {
-        let Envelope { separation_m, cruise_m_s, .. } = self.config.envelope;
-        let [x, y, _] = self.config.home;
-        neighbours.iter().filter(|neighbour| neighbour.armed).all(|neighbour| {
-            let unseen_s = match neighbour.track.age_s {
-                age_s if !(NEIGHBOUR_PERIOD_S..=SURELY_DOWN_S).contains(&age_s) => 0.0,
-                age_s => age_s.min(MOST_UNSEEN_S) + CLIMB_S,
-            };
-            let offset = neighbour.position().xy() - nalgebra::Vector2::new(x, y);
-            offset.norm() > separation_m + unseen_s * cruise_m_s
-        })
-    }
-
-    /// Tells whoever decides what came of a plan, if something did.
-    fn hear_of_path(&mut self, now: Duration, report: Option<Report>) {
-        if let Some(report) = report {
-            self.report(now, report.into_event(&self.me));
-            self.script_facts.forget_path();
-        }
+    fn hear(&mut self, now: Duration, link: &mut dyn Link) {
+        let states = self.mission.receive(now, link);
+        self.control.hear(now, states);
     }
 
     /// A navigation cycle: looks along the path, and tells the others where this vehicle is.
-    fn begin_cycle(&mut self, now: Duration, neighbours: &[Neighbour], link: &mut dyn Link) {
-        if let (FlightPhase::Flying, Some(motion)) = (self.flight.phase(), self.motion()) {
-            let map = self.perception.map();
-            for report in self.guidance.look_ahead(now, &motion, map, neighbours) {
-                self.report(now, report.into_event(&self.me));
-            }
-            self.tell_scripts(&motion, neighbours);
+    fn begin_cycle(&mut self, now: Duration, link: &mut dyn Link) {
+        for report in self.control.look_ahead(now) {
+            self.mission.hear(now, report);
         }
-        self.scripts.catch_up(now);
-        if let Some(state) = self.state(now) {
-            let state = State { echo: self.neighbours.echo(now), ..state };
-            self.node.put_state(&state, link);
+        if let Some(circumstances) = self.control.circumstances() {
+            self.mission.tell_scripts(&circumstances);
         }
-    }
-
-    /// Tells scripts what they listen to.
-    fn tell_scripts(&mut self, motion: &Motion, neighbours: &[Neighbour]) {
-        let circumstances = Circumstances {
-            position: motion.position,
-            ahead: self.guidance.place_ahead(),
-            battery: self.companion.telemetry().battery.map(|battery| battery.value.fraction),
-            neighbours,
-        };
-        for event in self.script_facts.tell(&self.me, &self.scripts, &circumstances) {
-            self.node.node_mut().enqueue(event);
+        self.mission.catch_up(now);
+        if let Some(state) = self.control.state(now) {
+            self.mission.put_state(state, self.control.complaint(), link);
         }
     }
 
     /// Lets whoever decides do so until nothing new comes of it, and carries out what was decided.
-    fn decide(&mut self, now: Duration, neighbours: &[Neighbour]) {
-        // Planning answers a decision with a new report, which deserves its turn in the same tick.
-        for _ in 0..4 {
-            let selections = self.decisions(now);
-            if selections.is_empty() {
+    fn decide(&mut self, now: Duration) {
+        for _ in 0..ROUNDS {
+            let decided = self.mission.decide(now);
+            if decided.is_empty() {
                 break;
             }
-            for selection in &selections {
-                if selection.home == self.name {
-                    self.carry_out(now, &selection.event, neighbours);
-                    self.look_after_scripts(selection);
+            for happened in &decided {
+                let instruction = self.mission.follow(happened, self.control.flight().is_landing());
+                let report = instruction.and_then(|instruction| self.control.carry_out(now, instruction));
+                if let Some(report) = report {
+                    self.mission.hear(now, report);
                 }
             }
-            self.selections.extend(selections);
+            self.mission.record(decided);
         }
-    }
-
-    /// One step of whoever decides.
-    fn decisions(&mut self, now: Duration) -> Vec<Happened> {
-        if let Err(error) = self.node.node_mut().step(now) {
-            // Without fresh leave the vehicle hovers; its b-threads may yet recover.
-            self.fault = Some(error.to_string());
-        }
-        let selections = self.node.node_mut().take_selections();
-        let Some(sequential) = &mut self.sequential else { return selections };
-        let decided = sequential.step(now).into_iter().map(|event| Happened {
-            event,
-            home: self.name.clone(),
-            seq: 0,
-            term: 0,
-            origin: Origin::Internal,
-            requested_by: vec![SEQUENTIAL.into()],
-            choice: None,
-            at: now,
-        });
-        decided.collect()
-    }
-
-    fn carry_out(&mut self, now: Duration, event: &Event, neighbours: &[Neighbour]) {
-        self.flight.carry_out(now, event, &mut self.companion);
-        let why = event.text("why").unwrap_or_default();
-        match self.me.verb(event) {
-            Some(GOTO) => {
-                self.guidance.head_for(event);
-                self.task = match event.int("leg") {
-                    Some(bthreads::HOME_LEG) => "flying home".to_owned(),
-                    Some(bthreads::OPERATOR_LEG) => "going where the operator points".to_owned(),
-                    leg => format!("leg {} of {}", leg.unwrap_or_default() + 1, self.config.waypoints.len()),
-                };
-            }
-            Some(PLAN) => {
-                if let Some(motion) = self.motion() {
-                    let report = self.guidance.plan(why, &motion, self.perception.map_mut(), neighbours);
-                    self.hear_of_path(now, report);
-                }
-            }
-            Some(ADVANCE | HOMEWARD) => self.guidance.grant_leave(now),
-            Some(LAND) => {
-                self.task = format!("landing: {why}");
-                self.settle(now, neighbours);
-            }
-            Some(RETURN) if !self.flight.is_landing() => {
-                self.task = format!("returning: {why}");
-            }
-            Some(HOLD) => self.task = "holding".to_owned(),
-            Some(LANDED) => self.guidance.forget(),
-            Some(vocabulary::TAKEOFF) => self.task = "taking off".to_owned(),
-            Some(ORDER) if matches!(event.text("what"), Some("resume" | "return")) => self.flight.resume(now),
-            Some(COMPLETE) => self.end(Outcome::Complete, "arrived"),
-            Some(FAILED) => self.end(Outcome::Failed(why.to_owned()), why),
-            _ => {}
-        }
-    }
-
-    /// Runs the scripts that are sent, and answers what cannot be done.
-    fn look_after_scripts(&mut self, selection: &Happened) {
-        let event = &selection.event;
-        let verdict = match self.me.verb(event) {
-            Some(LOAD) => {
-                let (name, outcome) = self.load_script(selection);
-                self.scripts.verdict(&name, outcome)
-            }
-            Some(UNLOAD) => {
-                let name = event.text("name").unwrap_or_default();
-                if self.scripts.runs(name) {
-                    return;
-                }
-                self.scripts.verdict(name, Err("no script of this name runs".to_owned()))
-            }
-            Some(SCRIPT) => return self.scripts.hear(event),
-            _ => return,
-        };
-        self.node.node_mut().enqueue(verdict);
-    }
-
-    /// Runs a script that is sent; gives back its name, and why it is not run if it is not.
-    fn load_script(&mut self, selection: &Happened) -> (String, Result<(), String>) {
-        let text = selection.event.text("script").unwrap_or_default();
-        let assignment = match Assignment::from_json(text) {
-            Ok(assignment) => assignment,
-            Err(error) => return (String::new(), Err(error.to_string())),
-        };
-        let sender = selection.requested_by.iter().find(|bthread| bthread.contains('#'));
-        let from = sender.map_or(self.name.as_str(), |bthread| bthread).to_owned();
-        let outcome = self.admit(&assignment, &from, Begins::AtOnce);
-        (assignment.name().to_owned(), outcome)
-    }
-
-    /// Runs a script that `from` has sent, now or to a former life of this agent, if it passes all checks.
-    fn admit(&mut self, assignment: &Assignment, from: &str, begins: Begins) -> Result<(), String> {
-        if !self.may_send(assignment, from)? {
-            let node = from.split_once('#').map_or(from, |(node, _)| node);
-            return Err(format!(
-                "{node} may not send scripts: that is for the ground station and its operators"
-            ));
-        }
-        if !self.scripts.runs(assignment.name()) {
-            check_script(&self.config, assignment, STATES_TRIED)?;
-        }
-        self.script_facts.forget();
-        self.scripts.load(self.node.node_mut().program_mut(), assignment, from, begins)
-    }
-
-    /// Whether `from` has the right to send this script: the vehicle itself, or a b-thread of another node that is a member
-    /// and no vehicle.
-    fn may_send(&self, assignment: &Assignment, from: &str) -> Result<bool, String> {
-        let Some((node, bthread)) = from.split_once('#') else { return Ok(from == self.name.as_str()) };
-        let text = assignment.to_json().map_err(|error| error.to_string())?;
-        let load = self.me.event(LOAD).with("script", text);
-        let is_member = self.config.roster.iter().any(|member| member == node);
-        let may_request = |node| self.config.authority.may_request(&node, bthread, &load);
-        Ok(is_member && !node.starts_with("uav/") && NodeName::new(node).is_ok_and(may_request))
-    }
-
-    fn end(&mut self, outcome: Outcome, task: &str) {
-        self.outcome = Some(outcome);
-        self.task = task.to_owned();
-    }
-
-    /// When what set-points are made from was measured.
-    fn inputs(&self) -> Vec<Option<Duration>> {
-        let telemetry = self.companion.telemetry();
-        let position = telemetry.position.map(|position| position.stamp);
-        let attitude = telemetry.attitude.map(|attitude| attitude.stamp);
-        let scan = self.config.lidar.then(|| self.perception.last_scan());
-        [position, attitude].into_iter().chain(scan).collect()
-    }
-
-    /// A vehicle that is to land goes to where it can, and lands there; wherever it is in the end, or if it does not see.
-    fn settle(&mut self, now: Duration, neighbours: &[Neighbour]) {
-        let FlightPhase::Settling { until } = self.flight.phase() else { return };
-        let sees = keep_alive(now, &self.inputs()) == KeepAlive::Command;
-        let place = self.motion().filter(|_| sees && now < until).and_then(|motion| {
-            let descent = Descent {
-                name: &self.name,
-                position: motion.position,
-                stop: self.guidance.stop(&motion),
-                ground_m: self.config.home[2],
-                envelope: &self.config.envelope,
-                fence: &self.config.fence,
-                map: self.perception.map(),
-                neighbours,
-            };
-            descent.detour(self.guidance.settles_at())
-        });
-        self.guidance.settle_at(place);
-        if place.is_none() {
-            self.flight.touch_down(now, &mut self.companion);
-        }
-    }
-
-    /// The control loop: it waits for no b-thread and no network.
-    fn steer(&mut self, now: Duration, neighbours: &[Neighbour]) {
-        self.settle(now, neighbours);
-        if !self.flight.sends_set_points() {
-            self.guidance.rest();
-            return;
-        }
-        let Some(motion) = self.motion() else { return };
-        let tracks: Vec<_> =
-            neighbours.iter().filter(|neighbour| neighbour.armed).map(|neighbour| neighbour.track).collect();
-        let inputs = self.inputs();
-        match keep_alive(now, &inputs) {
-            KeepAlive::Command => {
-                let surroundings = Surroundings {
-                    map: self.perception.map(),
-                    obstacles: self.perception.obstacles(),
-                    neighbours: &tracks,
-                    rank: self.rank(neighbours),
-                };
-                let set_point = self.guidance.steer(now, &motion, &surroundings);
-                self.set_points.commands += 1;
-                let age = oldest_age(now, &inputs).unwrap_or_default();
-                self.set_points.oldest_input = self.set_points.oldest_input.max(age);
-                self.companion.set_point(now, set_point);
-            }
-            KeepAlive::Stop => {
-                self.set_points.stops += 1;
-                self.guidance.rest();
-                self.companion.set_point(now, SetPoint::Velocity { velocity: Vector3::zeros(), yaw: None });
-            }
-            KeepAlive::Silence => self.guidance.rest(),
-        }
-    }
-
-    /// How many of the neighbours have names that come before this vehicle's.
-    fn rank(&self, neighbours: &[Neighbour]) -> u32 {
-        let before = neighbours.iter().filter(|neighbour| neighbour.node < self.name);
-        u32::try_from(before.count()).unwrap_or(u32::MAX)
-    }
-
-    fn motion(&self) -> Option<Motion> {
-        let telemetry = self.companion.telemetry();
-        Some(Motion { position: telemetry.position?.value, velocity: telemetry.velocity?.value })
-    }
-
-    /// What this vehicle tells the others, ten times a second.
-    fn state(&self, now: Duration) -> Option<State> {
-        let telemetry = self.companion.telemetry();
-        let motion = self.motion()?;
-        let status = self.status(now);
-        Some(State {
-            incarnation: self.config.incarnation,
-            time: now,
-            position: motion.position,
-            velocity: motion.velocity,
-            yaw_rad: telemetry.attitude.map_or(0.0, |attitude| attitude.value.euler_angles().2),
-            position_sigma_m: POSITION_SIGMA_M,
-            radius_m: self.config.envelope.hull_m,
-            mode: status.mode,
-            battery: status.battery,
-            armed: telemetry.armed,
-            task: status.task,
-            waiting_for: status.waiting_for,
-            mission: match &self.outcome {
-                None => MissionState::UnderWay,
-                Some(Outcome::Complete) => MissionState::Complete,
-                Some(Outcome::Failed(_)) => MissionState::Failed,
-            },
-            path: self.guidance.path_ahead().take(State::MAX_PATH).collect(),
-            scripts: self.scripts.running().map(|(name, _)| name.to_owned()).collect(),
-            ..State::new(self.name.clone())
-        })
     }
 
     /// Whether this agent has the vehicle in the air, or on its way there.
     #[must_use]
     pub fn is_committed(&self) -> bool {
-        self.flight.is_committed()
-    }
-
-    /// Whether the vehicle is in the air, as far as its autopilot has told.
-    fn is_airborne(&self) -> bool {
-        let telemetry = self.companion.telemetry();
-        telemetry.armed && telemetry.landed != Landed::OnGround
+        self.control.flight().is_committed()
     }
 
     /// One line about this vehicle.
     #[must_use]
     pub fn status(&self, now: Duration) -> Status {
-        let telemetry = self.companion.telemetry();
-        let nearest = telemetry.position.and_then(|position| self.neighbours.nearest(now, position.value));
         Status {
-            mode: telemetry.mode.to_string(),
-            task: self.task.clone(),
-            waiting_for: self.waiting_for(),
-            battery: telemetry.battery.map_or(0.0, |battery| battery.value.fraction),
-            nearest,
+            mode: self.control.mode(),
+            task: self.mission.task().to_owned(),
+            waiting_for: self.mission.waiting_for(self.control.complaint()),
+            battery: self.control.battery(),
+            nearest: self.control.nearest(now),
         }
-    }
-
-    /// Who keeps this vehicle from moving on or taking off.
-    fn waiting_for(&self) -> String {
-        if let Some(fault) = &self.fault {
-            return fault.clone();
-        }
-        if let Some(complaint) = self.failsafes.complaint() {
-            return complaint.to_owned();
-        }
-        let question = self.me.any_of(&[ADVANCE, ENTER, vocabulary::TAKEOFF]);
-        let explanation = self.node.node().explain(question).local;
-        if explanation.requested.is_empty() {
-            return String::new();
-        }
-        let blockers: std::collections::BTreeSet<&str> =
-            explanation.blocked.iter().map(|(bthread, _)| &**bthread).collect();
-        blockers.into_iter().collect::<Vec<_>>().join(", ")
     }
 
     /// Everything selected here or heard of since the last call, in order.
     pub fn take_selections(&mut self) -> Vec<Happened> {
-        std::mem::take(&mut self.selections)
+        self.mission.take_selections()
     }
 
     /// The scripts that run, by name.
     pub fn scripts(&self) -> impl Iterator<Item = (&str, &RunningScript)> {
-        self.scripts.running()
+        self.mission.scripts().running()
     }
 
     /// Why this agent's next life would not run the scripts that run now, if so: they could not be written down yet.
     #[must_use]
     pub fn unsaved_scripts(&self) -> Option<&str> {
-        self.scripts.unsaved()
+        self.mission.scripts().unsaved()
     }
 
     /// How the mission ended, once it has.
     #[must_use]
     pub fn outcome(&self) -> Option<&Outcome> {
-        self.outcome.as_ref()
+        self.mission.outcome()
     }
 
     /// What set-points were made from so far.
     #[must_use]
     pub fn set_points(&self) -> SetPointRecord {
-        self.set_points
+        self.control.set_points()
     }
 
     /// The path ahead, from the vehicle to its waypoint; empty without one.
     pub fn path_ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
-        self.guidance.path_ahead()
+        self.control.guidance().path_ahead()
     }
 
     /// The vehicle's node: its program, its peers, and what has come in that was not understood.
     #[must_use]
     pub fn node(&self) -> &NodeLink {
-        &self.node
+        self.mission.node()
     }
 
     /// Whether a path is being searched for that the last tick was not enough for.
     #[must_use]
     pub fn is_planning(&self) -> bool {
-        self.guidance.is_planning()
+        self.control.guidance().is_planning()
     }
 
     /// The vehicle's node name.
     #[must_use]
     pub fn name(&self) -> &NodeName {
-        &self.name
-    }
-}
-
-/// An empty map of where this mission may fly.
-fn perception(config: &AgentConfig) -> Result<Perception, MapError> {
-    let perception = Perception::new(&config.fence, Vector3::from(config.home), heights(config))?;
-    if config.airspace == Airspace::default() {
-        return Ok(perception);
-    }
-    Ok(perception.with_keep_out(KeepOut::new(config.airspace.clone(), ZONE_MARGIN_M, TERRAIN_CLEARANCE_M)))
-}
-
-/// The least and the greatest height in the world at which this mission may fly, metres.
-fn heights(config: &AgentConfig) -> [f64; 2] {
-    let [_, _, home_m] = config.home;
-    let waypoints = config.waypoints.iter().map(|[_, _, z]| *z);
-    let heights = || waypoints.clone().chain([config.return_altitude_m, home_m + config.takeoff_height_m]);
-    let lowest_m = heights().fold(f64::INFINITY, f64::min) - BELOW_WAYPOINTS_M;
-    [lowest_m.max(home_m + LEAST_HEIGHT_M), heights().fold(0.0, f64::max) + ABOVE_WAYPOINTS_M]
-}
-
-/// What no remote b-thread can block, and only the operator's gateway can request; the waypoint at home is part of it, for
-/// without it `return` would lead nowhere.
-pub(crate) fn safety_events(me: &Me) -> EventSet {
-    let home = me.any(GOTO).and(EventSet::field_is("leg", bthreads::HOME_LEG));
-    me.any_of(&vocabulary::OWN).or(home)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn from_afar_nobody_blocks_the_way_home_and_anybody_with_a_say_any_other() {
-        let me = Me::new("uav/1");
-        let goto = |leg: i64| me.event(GOTO).with("leg", leg);
-        let safety = safety_events(&me);
-        assert!(safety.contains(&goto(bthreads::HOME_LEG)) && safety.contains(&me.event(HOMEWARD)));
-        assert!(!safety.contains(&goto(bthreads::OPERATOR_LEG)) && !safety.contains(&goto(0)));
+        self.mission.name()
     }
 }

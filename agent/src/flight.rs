@@ -1,14 +1,12 @@
-//! Flight: carries out selected events on the autopilot, and reports what the vehicle then does.
+//! Flight: carries out instructions on the autopilot, and reports what the vehicle then does.
 
 use std::time::Duration;
 
-use skein_bp::Event;
+use nalgebra::Vector3;
 use skein_mav::{Command, CommandResult, Companion, FlightMode, Landed, MavEvent};
-use skein_wire::vocabulary::{
-    AIRBORNE, COMMAND_FAILED, FOUND_AIRBORNE, HAND_BACK, HOLD, LAND, LANDED, PILOT, SLEPT, TAKEOFF,
-};
 
-use crate::me::Me;
+use crate::instruction::Instruction;
+use crate::report::Report;
 
 /// The command to land is repeated this often while the autopilot does something else.
 const REPEAT_LAND: Duration = Duration::from_secs(2);
@@ -51,7 +49,6 @@ pub enum FlightPhase {
 /// The vehicle's flight as the agent conducts it.
 #[derive(Debug)]
 pub struct Flight {
-    me: Me,
     takeoff_height_m: f64,
     phase: FlightPhase,
     heard_of: bool,
@@ -64,9 +61,8 @@ pub struct Flight {
 impl Flight {
     /// A vehicle on the ground that will climb to `takeoff_height_m` above home.
     #[must_use]
-    pub fn new(me: Me, takeoff_height_m: f64) -> Self {
+    pub fn new(takeoff_height_m: f64) -> Self {
         Self {
-            me,
             takeoff_height_m,
             phase: FlightPhase::Grounded,
             heard_of: false,
@@ -108,23 +104,25 @@ impl Flight {
         !matches!(self.phase, FlightPhase::Grounded | FlightPhase::Taken)
     }
 
-    /// Carries out one selected event.
-    pub fn carry_out(&mut self, now: Duration, event: &Event, companion: &mut Companion) {
-        match (self.me.verb(event), self.phase) {
-            (Some(TAKEOFF), FlightPhase::Grounded) => {
+    /// Carries out one instruction, as far as it concerns the flight.
+    pub fn carry_out(&mut self, now: Duration, instruction: Instruction, companion: &mut Companion) {
+        match (instruction, self.phase) {
+            (Instruction::TakeOff, FlightPhase::Grounded) => {
                 self.phase = FlightPhase::Arming;
                 self.left_ground = false;
                 self.launch(now, None, companion);
             }
             // Where, is seen before the tick is over: see `touch_down`.
-            (Some(LAND), FlightPhase::Flying) => {
+            (Instruction::Land, FlightPhase::Flying) => {
                 self.phase = FlightPhase::Settling { until: now + SETTLES_FOR };
             }
             // Said again it changes nothing: to come down upon somebody is worse than some seconds more of an empty battery.
-            (Some(LAND), FlightPhase::Grounded | FlightPhase::Settling { .. }) => {}
-            (Some(LAND), _) => self.touch_down(now, companion),
-            (Some(HOLD), FlightPhase::Adopted) => companion.command(now, Command::Hold),
-            (Some(HAND_BACK), FlightPhase::Taken) => self.engage(now),
+            (Instruction::Land, FlightPhase::Grounded | FlightPhase::Settling { .. }) => {}
+            (Instruction::Land, _) => self.touch_down(now, companion),
+            (Instruction::Hold, FlightPhase::Adopted) => companion.command(now, Command::Hold),
+            (Instruction::TakeBack, FlightPhase::Taken) | (Instruction::Resume, FlightPhase::Adopted) => {
+                self.engage(now);
+            }
             _ => {}
         }
     }
@@ -151,16 +149,9 @@ impl Flight {
         companion.command(now, Command::Land);
     }
 
-    /// An operator lets an adopted vehicle fly its mission.
-    pub fn resume(&mut self, now: Duration) {
-        if self.phase == FlightPhase::Adopted {
-            self.engage(now);
-        }
-    }
-
     /// The agent has not run for `pause`: if it flew the vehicle, it does not any more. Returns what the b-threads
     /// should hear of it.
-    pub fn wake(&mut self, pause: Duration) -> Option<Event> {
+    pub fn wake(&mut self, pause: Duration) -> Option<Report> {
         let flew = matches!(
             self.phase,
             FlightPhase::Arming
@@ -171,7 +162,7 @@ impl Flight {
         );
         flew.then(|| {
             self.phase = FlightPhase::Taken;
-            self.me.event(SLEPT).with("seconds", pause.as_secs_f64())
+            Report::Slept(pause)
         })
     }
 
@@ -180,7 +171,7 @@ impl Flight {
     }
 
     /// Hears what the autopilot reports; returns what the b-threads should hear of it.
-    pub fn hear(&mut self, now: Duration, event: &MavEvent, companion: &mut Companion) -> Option<Event> {
+    pub fn hear(&mut self, now: Duration, event: &MavEvent, companion: &mut Companion) -> Option<Report> {
         match event {
             MavEvent::CommandAcked { command, result: CommandResult::Accepted } => {
                 if self.phase == FlightPhase::Arming {
@@ -195,7 +186,7 @@ impl Flight {
             MavEvent::ModeChanged { to, .. } if self.is_foreign(*to) => {
                 // Control ends with the mode change itself; the b-threads hear of it afterwards.
                 self.phase = FlightPhase::Taken;
-                Some(self.me.event(PILOT).with("mode", to.to_string()))
+                Some(Report::Pilot(*to))
             }
             _ => None,
         }
@@ -217,11 +208,11 @@ impl Flight {
     }
 
     /// On the ground a refused command ends the flight; in the air it is tried again.
-    fn command_failed(&mut self, now: Duration, command: Command, why: &str) -> Option<Event> {
+    fn command_failed(&mut self, now: Duration, command: Command, why: &str) -> Option<Report> {
         match self.phase {
             FlightPhase::Arming | FlightPhase::Climbing if !self.left_ground => {
                 self.phase = FlightPhase::Grounded;
-                Some(self.me.because(COMMAND_FAILED, &format!("{command:?}: {why}")))
+                Some(Report::CommandFailed(format!("{command:?}: {why}")))
             }
             FlightPhase::Engaging { .. } if command == Command::Offboard => {
                 self.engage(now);
@@ -232,29 +223,31 @@ impl Flight {
     }
 
     /// A vehicle that was in the air before its agent: held if nobody flies it, else left to who does.
-    fn adopt(&mut self, mode: FlightMode) -> Event {
+    fn adopt(&mut self, mode: FlightMode) -> Report {
         if matches!(mode, FlightMode::Offboard | FlightMode::Hold) {
             self.phase = FlightPhase::Adopted;
-            self.me.event(FOUND_AIRBORNE)
+            Report::FoundAirborne
         } else {
             self.leave_to_pilot(mode)
         }
     }
 
-    fn leave_to_pilot(&mut self, mode: FlightMode) -> Event {
+    fn leave_to_pilot(&mut self, mode: FlightMode) -> Report {
         self.phase = FlightPhase::Taken;
-        self.me.event(PILOT).with("mode", mode.to_string())
+        Report::Pilot(mode)
     }
 
     /// Moves on to the next phase when the telemetry says so; returns what the b-threads should hear of it.
-    pub fn follow(&mut self, now: Duration, companion: &mut Companion) -> Option<Event> {
+    /// `position` is the vehicle's, m ENU.
+    pub fn follow(
+        &mut self,
+        now: Duration,
+        position: Option<Vector3<f64>>,
+        companion: &mut Companion,
+    ) -> Option<Report> {
         let telemetry = companion.telemetry();
         let (landed, armed, mode) = (telemetry.landed, telemetry.armed, telemetry.mode);
-        let height_m = telemetry
-            .position
-            .as_ref()
-            .zip(telemetry.home)
-            .map_or(0.0, |(position, home)| position.value.z - home.z);
+        let height_m = position.zip(telemetry.home).map_or(0.0, |(position, home)| position.z - home.z);
         if self.phase == FlightPhase::Grounded && !matches!(landed, Landed::OnGround | Landed::Unknown) {
             // In the air before its agent, or by a pilot's hand.
             let found = !std::mem::replace(&mut self.heard_of, true);
@@ -274,7 +267,7 @@ impl Flight {
             }
             FlightPhase::Engaging { asked: true, .. } if mode == FlightMode::Offboard => {
                 self.phase = FlightPhase::Flying;
-                return Some(self.me.event(AIRBORNE));
+                return Some(Report::Airborne);
             }
             FlightPhase::Settling { .. }
             | FlightPhase::Landing
@@ -284,7 +277,7 @@ impl Flight {
                 if landed == Landed::OnGround && !armed =>
             {
                 self.phase = FlightPhase::Grounded;
-                return Some(self.me.event(LANDED));
+                return Some(Report::Landed);
             }
             FlightPhase::Landing if mode != FlightMode::Land && now >= self.land_again => {
                 self.land_again = now + REPEAT_LAND;

@@ -4,27 +4,41 @@
 //! [`Link`](skein_wire::Link) to the other nodes, and carries its MAVLink bytes to the autopilot. So the same agent flies
 //! on a vehicle, over Zenoh on one host, and in lockstep.
 
+mod agent_error;
 mod airspace_table;
 pub mod bthreads;
 mod config;
+mod control;
 mod core;
 mod failsafes;
 mod flight;
+mod instruction;
 mod me;
+mod mind;
+mod mission;
 mod neighbours;
+mod parts;
 pub mod pipeline;
+pub mod positioning;
 pub mod precedence;
+mod report;
+mod safety_events;
 pub mod scripts;
-pub mod sequential;
 pub mod verify;
 mod watches;
 
 pub use self::{
+    agent_error::AgentError,
     airspace_table::{AirspaceError, AirspaceTable},
-    config::{
-        AgentConfig, Controller, Envelope, Fence, GlobalPlanner, Layer, LocalPlanner, PassageRule, Planners,
-    },
-    core::{AgentCore, AgentError, Outcome, SetPointRecord, Status},
+    config::{AgentConfig, Envelope, Fence, GlobalPlanner, LocalPlanner, Planners},
+    control::SetPointRecord,
+    core::{AgentCore, Status},
     flight::FlightPhase,
+    instruction::Waypoint,
     me::Me,
+    mind::{Behaviour, Mind},
+    mission::Outcome,
+    neighbours::Neighbour,
+    parts::Parts,
+    report::Report,
 };

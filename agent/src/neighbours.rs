@@ -11,12 +11,23 @@ use skein_dbp::NodeName;
 use skein_planning::separation;
 use skein_wire::{Echo, State};
 
+use crate::config::Envelope;
+
 /// A neighbour silent for longer than this is not relied on to keep its distance: with three of ten messages lost, that is one in 170 000.
 const SILENT_AFTER: Duration = Duration::from_millis(1000);
 /// Clocks drift apart by no more than this, seconds in a second: a round trip that took this much longer by now tells as much.
 const DRIFT: f64 = 1e-3;
 /// What was heard longer ago is not told back.
 const ECHO_FOR: Duration = Duration::from_millis(500);
+
+/// Neighbours are heard this often at least, while they are, s.
+const PERIOD_S: f64 = 0.5;
+/// One that is silent may fly anywhere, from its last word until this vehicle is up, s.
+const CLIMB_S: f64 = 4.0;
+/// Beyond this it may be anywhere in the arena, s.
+const MOST_UNSEEN_S: f64 = 4.0;
+/// After so long a silence, s, its failsafe has landed it, or its mission is over.
+const SURELY_DOWN_S: f64 = 45.0;
 
 /// The last state heard of each other vehicle.
 #[derive(Debug)]
@@ -26,6 +37,8 @@ pub struct Neighbours {
     last: BTreeMap<NodeName, Heard>,
     /// Whom the newest echo was for.
     echoed: Option<NodeName>,
+    /// Everybody as of the last look around.
+    around: Vec<Neighbour>,
 }
 
 #[derive(Debug)]
@@ -63,13 +76,25 @@ impl Neighbour {
     pub fn position(&self) -> Vector3<f64> {
         self.track.predicted()
     }
+
+    /// Whether it may fly where a vehicle of this envelope would climb from `place`, as far as can be known: one that is silent
+    /// may have come closer meanwhile.
+    #[must_use]
+    pub fn may_be_over(&self, place: &Vector3<f64>, envelope: &Envelope) -> bool {
+        let unseen_s = match self.track.age_s {
+            age_s if !(PERIOD_S..=SURELY_DOWN_S).contains(&age_s) => 0.0,
+            age_s => age_s.min(MOST_UNSEEN_S) + CLIMB_S,
+        };
+        let offset = self.position().xy() - place.xy();
+        self.armed && offset.norm() <= envelope.separation_m + unseen_s * envelope.cruise_m_s
+    }
 }
 
 impl Neighbours {
     /// Nobody has been heard of yet by `me` in this incarnation.
     #[must_use]
     pub fn new(me: NodeName, incarnation: u64) -> Self {
-        Self { me, incarnation, last: BTreeMap::new(), echoed: None }
+        Self { me, incarnation, last: BTreeMap::new(), echoed: None, around: Vec::new() }
     }
 
     /// Takes in a state message that arrived at `now`; one older than the last is dropped.
@@ -104,6 +129,25 @@ impl Neighbours {
         let echo = Echo { node: node.clone(), incarnation: *incarnation, time: *time, held };
         self.echoed = Some(node.clone());
         Some(echo)
+    }
+
+    /// Takes stock of everybody as of `now`, for [`around`](Self::around).
+    pub fn look_around(&mut self, now: Duration) {
+        let mut around = std::mem::take(&mut self.around);
+        around.clear();
+        around.extend(self.at(now));
+        self.around = around;
+    }
+
+    /// Takes nobody into account until the next look around.
+    pub fn look_away(&mut self) {
+        self.around.clear();
+    }
+
+    /// Everybody as of the last look around, in the order of their names.
+    #[must_use]
+    pub fn around(&self) -> &[Neighbour] {
+        &self.around
     }
 
     /// Every neighbour as of `now`, in the order of their names.

@@ -1,18 +1,16 @@
-//! Watches: conditions of the vehicle that become events at the moment they change.
+//! Watches: conditions of the vehicle that are reported at the moment they change.
 
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_bp::Event;
 use skein_mav::{Battery, Landed, Telemetry};
-use skein_wire::vocabulary::{
-    BATTERY_CRITICAL, BATTERY_LOW, CLEAR, FENCE_BREACHED, READY, TOO_CLOSE, UNREADY,
-};
 
-use crate::{config::Fence, me::Me, neighbours::Neighbour};
+use crate::config::Fence;
+use crate::neighbours::Neighbour;
+use crate::report::Report;
 
-/// Telemetry older than this is no ground for take-off.
-const TELEMETRY_FRESH_FOR: Duration = Duration::from_millis(500);
+/// A vehicle that takes off knows where it is from no longer ago than this.
+pub const LOCATED_WITHIN: Duration = Duration::from_millis(500);
 /// Least energy to take off with.
 const BATTERY_TO_START: f64 = 0.3;
 /// Energy kept in reserve over what the way home needs.
@@ -46,10 +44,21 @@ impl Edge {
     }
 }
 
+/// The checks before take-off that the telemetry of the autopilot does not answer.
+#[derive(Clone, Copy, Debug)]
+pub struct Checks {
+    /// The vehicle's position and attitude are known, within [`LOCATED_WITHIN`].
+    pub is_located: bool,
+    pub has_sound_failsafes: bool,
+    /// Nobody flies where it would climb.
+    pub is_clear_overhead: bool,
+    /// This agent has armed it.
+    pub is_taking_off: bool,
+}
+
 /// Everything that is watched on one vehicle.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Watches {
-    me: Me,
     ready: Edge,
     low: Edge,
     critical: Edge,
@@ -60,71 +69,50 @@ pub struct Watches {
 }
 
 impl Watches {
-    /// Nothing seen yet.
-    #[must_use]
-    pub fn new(me: Me) -> Self {
-        Self {
-            me,
-            ready: Edge::default(),
-            low: Edge::default(),
-            critical: Edge::default(),
-            outside: Edge::default(),
-            close: Edge::default(),
-            flight_began: None,
-        }
-    }
-
-    /// Preflight: the autopilot is heard, ready to arm, charged, its failsafes are sound, and nobody is overhead. Armed by another than
-    /// this agent, which is `taking_off`, it is not ready.
-    pub fn preflight(
-        &mut self,
-        now: Duration,
-        telemetry: &Telemetry,
-        failsafes_sound: bool,
-        overhead_clear: bool,
-        taking_off: bool,
-    ) -> Option<Event> {
+    /// Preflight: the autopilot is heard, ready to arm and charged, and the other checks pass. A vehicle that somebody else
+    /// has armed is not ready.
+    pub fn preflight(&mut self, telemetry: &Telemetry, checks: Checks) -> Option<Report> {
         let charged = telemetry.battery.is_some_and(|battery| battery.value.fraction >= BATTERY_TO_START);
         let ready = telemetry.connected
             && telemetry.ready_to_arm
             && telemetry.home.is_some()
-            && (telemetry.landed == Landed::OnGround && !telemetry.armed && overhead_clear
-                || self.ready.0 && telemetry.armed && taking_off)
-            && telemetry.is_fresh(now, TELEMETRY_FRESH_FOR)
+            && (telemetry.landed == Landed::OnGround && !telemetry.armed && checks.is_clear_overhead
+                || self.ready.0 && telemetry.armed && checks.is_taking_off)
             && charged
-            && failsafes_sound;
-        self.ready.turns(ready).map(|ready| self.me.event(if ready { READY } else { UNREADY }))
+            && checks.is_located
+            && checks.has_sound_failsafes;
+        self.ready.turns(ready).map(|ready| if ready { Report::Ready } else { Report::Unready })
     }
 
     /// Battery: low when what is left is what the way home needs, with reserve.
-    pub fn battery(&mut self, now: Duration, battery: Battery, seconds_home: f64) -> Vec<Event> {
+    pub fn battery(&mut self, now: Duration, battery: Battery, seconds_home: f64) -> Vec<Report> {
         // Charge is told in whole per cents, so the drain is measured over a long stretch.
         let (since, full) = *self.flight_began.get_or_insert((now, battery.fraction));
         let flown_s = now.saturating_sub(since).as_secs_f64();
         let drain_per_s =
             if flown_s >= DRAIN_MEASURED_S { (full - battery.fraction).max(0.0) / flown_s } else { 0.0 };
         let needed = drain_per_s * seconds_home + BATTERY_RESERVE;
-        let mut events = Vec::new();
+        let mut reports = Vec::new();
         if self.low.rises(battery.fraction <= needed) {
-            events.push(self.me.event(BATTERY_LOW));
+            reports.push(Report::BatteryLow);
         }
         if self.critical.rises(battery.fraction <= BATTERY_EMERGENCY) {
-            events.push(self.me.event(BATTERY_CRITICAL));
+            reports.push(Report::BatteryCritical);
         }
-        events
+        reports
     }
 
     /// Geofence: the vehicle is outside.
-    pub fn fence(&mut self, position: Vector3<f64>, fence: &Fence) -> Option<Event> {
+    pub fn fence(&mut self, position: Vector3<f64>, fence: &Fence) -> Option<Report> {
         let outside = (0..3).any(|axis| {
             position[axis] < fence.min[axis] - FENCE_TOLERANCE_M
                 || position[axis] > fence.max[axis] + FENCE_TOLERANCE_M
         });
-        self.outside.rises(outside).then(|| self.me.event(FENCE_BREACHED))
+        self.outside.rises(outside).then(|| Report::FenceBreached)
     }
 
     /// Separation: a neighbour in the air is inside the emergency distance.
-    pub fn separation(&mut self, position: Vector3<f64>, neighbours: &[Neighbour]) -> Option<Event> {
+    pub fn separation(&mut self, position: Vector3<f64>, neighbours: &[Neighbour]) -> Option<Report> {
         let nearest = neighbours
             .iter()
             .filter(|neighbour| neighbour.armed)
@@ -133,8 +121,8 @@ impl Watches {
         let limit = if self.close.0 { CLEAR_DISTANCE_M } else { EMERGENCY_DISTANCE_M };
         let too_close = nearest.filter(|(distance, _)| *distance < limit);
         self.close.turns(too_close.is_some()).map(|_| match too_close {
-            Some((_, node)) => self.me.event(TOO_CLOSE).with("other", node.as_str()),
-            None => self.me.event(CLEAR),
+            Some((_, node)) => Report::TooClose(node.clone()),
+            None => Report::Clear,
         })
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use skein_agent::{
-    AgentConfig, Controller, Envelope, Fence, Me, PassageRule, Planners,
+    AgentConfig, Envelope, Fence, Me, Planners,
     bthreads::{self, LinkLossPolicy},
 };
 use skein_bp::{Bid, Event, EventSet, Program, ProgramConfig};
@@ -40,8 +40,6 @@ fn config() -> AgentConfig {
         envelope: Envelope::default(),
         planners: Planners::default(),
         link_loss: LinkLossPolicy::Continue,
-        controller: Controller::Bp,
-        passage_rule: PassageRule::Confirmed,
         scripts: Vec::new(),
         lease: SECOND,
         authority: skein_wire::standard_authority(),
@@ -644,47 +642,6 @@ mod right_of_way {
         assert!(keeps_out(&vehicle), "a vehicle that lands in a passage fills it");
         vehicle.reports(LANDED);
         assert!(!keeps_out(&vehicle));
-    }
-}
-
-mod naive_right_of_way {
-    use super::*;
-
-    const PLACE: [f64; 3] = [5.0, 0.0, 2.0];
-
-    fn on_its_way() -> Vehicle {
-        let mut vehicle = Vehicle::in_the_air(&AgentConfig { passage_rule: PassageRule::Heard, ..config() });
-        assert_eq!(vehicle.reports(PLANNED), ["planned", "advance"]);
-        vehicle
-    }
-
-    #[test]
-    fn enters_at_once_when_nobody_is_heard_inside_and_blocks_nobody() {
-        let mut vehicle = on_its_way();
-        assert_eq!(vehicle.hears(at(mine(PASSAGE), PLACE)), ["passage", "enter"]);
-        assert_eq!(*vehicle.last(ENTER), at(mine(ENTER), PLACE));
-        assert_eq!(vehicle.after(CYCLE), ["advance"]);
-        assert!(vehicle.allows(at(vocabulary::event(LOWER, ENTER), PLACE)), "two are inside");
-    }
-
-    #[test]
-    fn waits_until_all_who_were_heard_to_enter_the_same_passage_have_left_or_landed() {
-        let mut vehicle = on_its_way();
-        vehicle.learns(at(vocabulary::event(LOWER, ENTER), [6.0, 1.0, 2.0]));
-        vehicle.learns(at(vocabulary::event(HIGHER, ENTER), PLACE));
-        assert_eq!(vehicle.hears(at(mine(PASSAGE), PLACE)), ["passage"]);
-        assert_eq!(vehicle.after(SECOND), NOTHING);
-        vehicle.learns(vocabulary::event(LOWER, LEAVE));
-        assert!(!vehicle.may(ADVANCE));
-        vehicle.learns(vocabulary::event(HIGHER, LANDED));
-        assert_eq!(vehicle.last(ENTER).home(), ME);
-    }
-
-    #[test]
-    fn does_not_mind_another_passage() {
-        let mut vehicle = on_its_way();
-        vehicle.learns(at(vocabulary::event(LOWER, ENTER), [15.0, 1.0, 2.0]));
-        assert_eq!(vehicle.hears(at(mine(PASSAGE), PLACE)), ["passage", "enter"]);
     }
 }
 

@@ -3,8 +3,11 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_agent::pipeline::guidance::{Guidance, Motion, Surroundings};
+use skein_agent::pipeline::guidance::Guidance;
+use skein_agent::pipeline::layers::Layers;
 use skein_agent::pipeline::perception::Perception;
+use skein_agent::pipeline::surroundings::Surroundings;
+use skein_agent::positioning::Motion;
 use skein_agent::{Envelope, Fence, Planners};
 use skein_mav::SetPoint;
 use skein_planning::airspace::{Airspace, KeepOut, NoFlyPrism};
@@ -44,8 +47,9 @@ fn second_in(
     neighbours: &[Neighbour],
     rank: u32,
 ) -> Vec<SetPoint> {
-    let mut guidance = Guidance::new(Envelope::default(), FENCE, Planners::default());
-    let motion = Motion { position: place, velocity: Vector3::zeros() };
+    let envelope = Envelope::default();
+    let mut guidance = Guidance::new(envelope, Layers::of(&envelope, FENCE, Planners::default()));
+    let motion = Motion::new(place, Vector3::zeros(), [0.05, 0.1]);
     let surroundings = Surroundings { map: perception.map(), obstacles: &[], neighbours, rank };
     (0..50).map(|tick| guidance.steer(Duration::from_millis(20 * tick), &motion, &surroundings)).collect()
 }

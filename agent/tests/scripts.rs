@@ -10,7 +10,7 @@ use std::{
 
 use serde_json::{Value, json};
 use skein_agent::{
-    AgentConfig, AgentCore, Controller, Envelope, Fence, Me, PassageRule, Planners,
+    AgentConfig, AgentCore, Envelope, Fence, Me, Planners,
     bthreads::{self, LinkLossPolicy},
     scripts::{Begins, Runner, Scripts},
 };
@@ -49,8 +49,6 @@ fn config() -> AgentConfig {
         envelope: Envelope::default(),
         planners: Planners::default(),
         link_loss: LinkLossPolicy::Continue,
-        controller: Controller::Bp,
-        passage_rule: PassageRule::Confirmed,
         scripts: Vec::new(),
         lease: Duration::from_secs(1),
         authority: skein_wire::standard_authority(),

@@ -5,9 +5,7 @@ use std::time::Duration;
 use serde::Serialize;
 use serde_json::{Value, json};
 use skein_agent::verify::{Scene, SceneReport, VehicleVerifier, check_script};
-use skein_agent::{
-    AgentConfig, AgentError, Controller, Envelope, Fence, PassageRule, Planners, bthreads::LinkLossPolicy,
-};
+use skein_agent::{AgentConfig, AgentError, Envelope, Fence, Planners, bthreads::LinkLossPolicy};
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_bp::verify::ViolationKind;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
@@ -35,8 +33,6 @@ fn config() -> AgentConfig {
         envelope: Envelope::default(),
         planners: Planners::default(),
         link_loss: LinkLossPolicy::Return,
-        controller: Controller::Bp,
-        passage_rule: PassageRule::Confirmed,
         scripts: Vec::new(),
         lease: Duration::from_secs(1),
         authority: skein_wire::standard_authority(),

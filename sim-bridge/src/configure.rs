@@ -104,7 +104,7 @@ pub fn write(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result
         std::fs::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
         anyhow::Ok(path)
     };
-    let agents = agent_configs(scenario, cli::Controller::Bp);
+    let agents = agent_configs(scenario);
     let world = save("world.toml", setup.world())?;
     let muster = ground_config(scenario, skein_wire::Fleet::new(FLEET)?, cli::Controller::Bp).muster;
     let ground = save("ground.toml", setup.ground(&agents, muster))?;
@@ -250,7 +250,7 @@ mod tests {
     #[test]
     fn every_field_that_is_filled_in_is_one_of_the_example() {
         let scenario = Scenario::open("window", &crate::scenario::Overrides::default(), 3).unwrap();
-        let agents = agent_configs(&scenario, cli::Controller::Bp);
+        let agents = agent_configs(&scenario);
         for network in [Network::Peer, Network::Router, Network::Zenohd] {
             let setup = Setup { network, port_offset: 100, launch_on_order: false };
             let agent: toml::Table = setup.agent(1, &agents[1]).parse().unwrap();

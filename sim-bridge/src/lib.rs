@@ -15,6 +15,7 @@ pub mod mission;
 pub mod processes;
 pub mod scenario;
 mod scene_view;
+mod sequential;
 #[cfg(feature = "zenoh")]
 pub mod serve;
 pub mod summary;

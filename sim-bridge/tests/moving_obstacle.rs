@@ -79,7 +79,7 @@ fn meet(local: LocalPlanner, intruder_m_s: f64, seed: u64) -> (Option<Outcome>, 
     };
     let mut swarm = Swarm::new(
         Simulation::new(config),
-        fly::agent_configs(&scenario, Controller::Bp),
+        fly::agent_configs(&scenario),
         fly::ground_config(&scenario, Fleet::new(fly::FLEET).unwrap(), Controller::Bp),
         links,
     )

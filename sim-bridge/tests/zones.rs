@@ -1,8 +1,13 @@
 //! Vehicles keep out of what is known to be closed: on their way, around what they had not known of, and on the way home.
 
 use nalgebra::Vector3;
-use skein_agent::{AgentConfig, GlobalPlanner, Layer, LocalPlanner, Planners};
+use skein_agent::pipeline::global::{Found, PathFinder, Task};
+use skein_agent::pipeline::layers::Layers;
+use skein_agent::{AgentConfig, GlobalPlanner, LocalPlanner, Parts, Planners};
+use skein_planning::Path;
 use skein_planning::airspace::KeepOut;
+use skein_planning::global::astar::PlanError;
+use skein_planning::map::ClearanceMap;
 use skein_sim::cli::Controller;
 use skein_sim::fly::Trial;
 use skein_sim::scenario::Scenario;
@@ -91,9 +96,12 @@ fn unknowing(agent: &mut AgentConfig) {
 fn fly(world: &str, planners: Planners, change: fn(&mut AgentConfig)) -> Flight {
     let mut scenario = Scenario::from_toml(&format!("{BOUNDS}{world}"), "zones.toml", None, 1).unwrap();
     scenario.planners = planners;
+    watch(Trial::new(&scenario, Controller::Bp).with_agents(change), &scenario)
+}
+
+fn watch(trial: Trial<'_>, scenario: &Scenario) -> Flight {
     let zones = KeepOut::new(scenario.airspace.clone(), 0.0, 0.0);
     let mut track = Vec::new();
-    let trial = Trial::new(&scenario, Controller::Bp).with_agents(change);
     let flown = trial.fly(&mut |swarm, _| {
         let vehicle = swarm.simulation().vehicle(0).filter(|vehicle| vehicle.airborne);
         track.extend(vehicle.map(|vehicle| {
@@ -145,10 +153,34 @@ fn who_stands_in_a_zone_leaves_it_by_the_shortest_way_and_lands_beside_it() {
     assert!(*room_m < 3.0 && last.x < 0.0, "it lands next to it: {last}, {room_m} m away");
 }
 
+/// Goes straight to the waypoint, whatever the map knows of it.
+#[derive(Debug)]
+struct Straight;
+
+impl PathFinder for Straight {
+    fn begin(&mut self) {}
+
+    fn advance(
+        &mut self,
+        task: &Task,
+        _: &mut ClearanceMap,
+        _: &mut usize,
+    ) -> Option<Result<Found, PlanError>> {
+        let path = Path::new(vec![task.start, task.goal]);
+        path.map(|path| Ok(Found { path, clearance_m: None }))
+    }
+}
+
 #[test]
 fn who_follows_no_path_is_kept_out_by_the_filter() {
-    let straight = |agent: &mut AgentConfig| agent.planners.without = Some(Layer::GlobalPath);
-    let flight = fly(DETOUR, Planners::default(), straight);
+    let scenario = Scenario::from_toml(&format!("{BOUNDS}{DETOUR}"), "zones.toml", None, 1).unwrap();
+    let flight = watch(
+        Trial::new(&scenario, Controller::Bp).with_parts(|config| {
+            let Parts { layers, mind, positioning } = Parts::of(config);
+            Parts { layers: Layers { finder: Box::new(Straight), ..layers }, mind, positioning }
+        }),
+        &scenario,
+    );
     assert!(flight.least_room_m() > 0.25, "the hull stays out, {}", flight.least_room_m());
     assert!(flight.least_room_m() < 3.0, "it does come near: {}", flight.least_room_m());
 }

@@ -86,7 +86,7 @@ impl Lockstep {
         let fleet = Fleet::new(fly::FLEET).expect("a plain name");
         let swarm = Swarm::new(
             Simulation::new(fly::simulation_config(&scenario)),
-            fly::agent_configs(&scenario, Controller::Bp),
+            fly::agent_configs(&scenario),
             fly::ground_config(&scenario, fleet, Controller::Bp),
             links,
         )

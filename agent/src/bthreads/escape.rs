@@ -7,7 +7,7 @@ use skein_wire::vocabulary::{ARRIVED, GOTO, LAND, PLAN, STUCK};
 use crate::{me::Me, precedence};
 
 /// How many escapes one waypoint is worth before the vehicle lands.
-pub(crate) const ATTEMPTS: u8 = 12;
+pub const ATTEMPTS: u8 = 12;
 
 /// Requests `plan` when the vehicle is stuck; the planner then goes around its neighbours too and pulls less
 /// (Wang 2023: re-planning with A* while the attractive gain is reduced).

@@ -61,7 +61,7 @@ impl Mission {
 }
 
 /// The `goto` of each waypoint, in order; the vehicle lands at the last.
-pub(crate) fn gotos(me: &Me, waypoints: &[[f64; 3]]) -> Vec<Event> {
+pub fn gotos(me: &Me, waypoints: &[[f64; 3]]) -> Vec<Event> {
     let last = waypoints.len().saturating_sub(1);
     let goto = |(leg, &[x, y, z]): (usize, &[f64; 3])| {
         let number = i64::try_from(leg).unwrap_or(i64::MAX);

@@ -3,25 +3,25 @@
 //! Adding a b-thread: write its file, name it in [`load`]. No other b-thread changes.
 
 mod battery;
-pub(crate) mod escape;
+pub mod escape;
 mod found_airborne;
 mod geofence;
 mod link_loss;
-pub(crate) mod mission;
-pub(crate) mod navigation;
+pub mod mission;
+pub mod navigation;
 mod obstacle_avoidance;
 mod one_name;
 mod operator;
-pub(crate) mod path_planning;
+pub mod path_planning;
 mod pilot;
 mod preflight;
 mod reposition;
-pub(crate) mod return_home;
-mod right_of_way;
+pub mod return_home;
+pub mod right_of_way;
 mod separation;
 mod together;
 
-use skein_bp::Program;
+use skein_bp::{BThread, Program};
 
 pub use battery::Battery;
 pub use escape::Escape;
@@ -38,28 +38,29 @@ pub use pilot::Pilot;
 pub use preflight::Preflight;
 pub use reposition::{OPERATOR_LEG, Reposition};
 pub use return_home::{HOME_LEG, ReturnHome};
-pub use right_of_way::{NAME as RIGHT_OF_WAY, NaiveRightOfWay, RightOfWay};
+pub use right_of_way::{NAME as RIGHT_OF_WAY, RightOfWay};
 pub use separation::Separation;
 pub use together::Together;
 
-use crate::config::{AgentConfig, PassageRule};
+use crate::config::AgentConfig;
 use crate::me::Me;
 
 /// Loads a vehicle's b-threads into its program.
 pub fn load(program: &mut Program, config: &AgentConfig) {
+    let with_say = |node: &&String| node.starts_with("uav/") || **node == config.ground;
+    let others = config.roster.iter().filter(with_say).filter(|node| **node != config.node);
+    let others = others.map(String::as_str);
+    load_with(program, config, RightOfWay::new(Me::new(&config.node), others, config.lease));
+}
+
+/// The same with another b-thread in place of [`RightOfWay`].
+pub fn load_with(program: &mut Program, config: &AgentConfig, right_of_way: impl BThread) {
     let me = Me::new(&config.node);
     let [x, y, _] = config.home;
     program.add("pilot", Pilot::new(me.clone()));
     program.add("separation", Separation::new(me.clone()));
     program.add("obstacle_avoidance", ObstacleAvoidance::new(me.clone()));
-    match config.passage_rule {
-        PassageRule::Confirmed => {
-            let with_say = |node: &&String| node.starts_with("uav/") || **node == config.ground;
-            let others = config.roster.iter().filter(with_say).filter(|node| **node != config.node);
-            program.add(RIGHT_OF_WAY, RightOfWay::new(me.clone(), others.map(String::as_str), config.lease))
-        }
-        PassageRule::Heard => program.add(RIGHT_OF_WAY, NaiveRightOfWay::new(me.clone())),
-    };
+    program.add(RIGHT_OF_WAY, right_of_way);
     program.add("preflight", Preflight::new(me.clone()));
     program.add("found_airborne", FoundAirborne::new(me.clone()));
     program.add("one_name", OneName::new(me.clone()));

@@ -12,7 +12,7 @@ use crate::bthreads::HOME_LEG;
 use crate::{me::Me, precedence};
 
 /// How long a leave to move is asked for: one navigation cycle.
-pub(crate) const CYCLE: Duration = Duration::from_millis(100);
+pub const CYCLE: Duration = Duration::from_millis(100);
 
 /// Requests `advance`, or on the way home `homeward`, once in each navigation cycle while there is a path to follow.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]

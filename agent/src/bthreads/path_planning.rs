@@ -10,9 +10,9 @@ use crate::bthreads::OPERATOR_LEG;
 use crate::{me::Me, precedence};
 
 /// How often a waypoint without a path is tried again: the map may have held a ghost.
-pub(crate) const ATTEMPTS: u8 = 3;
+pub const ATTEMPTS: u8 = 3;
 /// The pause before the next attempt.
-pub(crate) const PAUSE: Duration = Duration::from_secs(1);
+pub const PAUSE: Duration = Duration::from_secs(1);
 
 /// Requests `plan` for each new waypoint, tries again while there is no path, and at last requests `land`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]

@@ -46,7 +46,7 @@ impl ReturnHome {
 }
 
 /// The `goto` to the point above the take-off place.
-pub(crate) fn goto(me: &Me, [x, y, z]: [f64; 3]) -> Event {
+pub fn goto(me: &Me, [x, y, z]: [f64; 3]) -> Event {
     me.event(GOTO).with("leg", HOME_LEG).with("lands", true).with("x", x).with("y", y).with("z", z)
 }
 

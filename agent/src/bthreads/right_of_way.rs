@@ -10,8 +10,6 @@
 //! confirmation of those who have lost it. So on a cut network one side at most goes on, and whoever was inside is
 //! waited for. Whoever has just heard another again first lets claims cross, for as long as it takes to repeat them.
 
-mod naive;
-
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -20,7 +18,6 @@ use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, PEER_JOINED, PEER_LOST, STALLED};
 use skein_wire::vocabulary::{ADVANCE, ENTER, HOMEWARD, LANDED, LEAVE, PASSAGE, of, of_every_vehicle};
 
-pub use self::naive::NaiveRightOfWay;
 use crate::{me::Me, precedence};
 
 /// The name under which this b-thread runs, as confirmations name it.
@@ -127,14 +124,14 @@ impl RightOfWay {
 }
 
 /// What is about the same passage.
-fn around(passage: &Event) -> EventSet {
+pub fn around(passage: &Event) -> EventSet {
     let [min, max] =
         [-SAME_PASSAGE_M, SAME_PASSAGE_M].map(|margin| centre(passage).map(|coordinate| coordinate + margin));
     EventSet::region(min, max)
 }
 
 /// `enter` into a passage.
-fn entering(me: &Me, passage: &Event) -> Event {
+pub fn entering(me: &Me, passage: &Event) -> Event {
     let [x, y, z] = centre(passage);
     me.event(ENTER).with("x", x).with("y", y).with("z", z)
 }

@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use nalgebra::{UnitQuaternion, Vector3};
-use skein_planning::airspace::KeepOut;
+use skein_planning::airspace::{Airspace, KeepOut};
 use skein_planning::map::{ClearanceMap, MapError, RayEnd, Sectors, VoxelMapConfig};
 use skein_wire::Scan;
 
-use crate::config::Fence;
+use crate::config::{AgentConfig, Fence};
 
 /// Edge of a voxel, m.
 const RESOLUTION_M: f64 = 0.2;
@@ -31,6 +31,17 @@ const NEAR_M: f64 = 6.0;
 const NEIGHBOUR_M: f64 = 0.8;
 /// Returns nearer than this are the vehicle's own frame, m.
 const OWN_FRAME_M: f64 = 0.15;
+
+/// The map reaches this far above the highest waypoint, m: as far as a path may climb over something, and more.
+const ABOVE_WAYPOINTS_M: f64 = 4.0;
+/// A path may pass under something, this far below the lowest waypoint, m.
+const BELOW_WAYPOINTS_M: f64 = 1.0;
+/// No path is lower than this above the take-off place, m.
+const LEAST_HEIGHT_M: f64 = 0.6;
+/// Paths keep this far out of zones, m: what a vehicle strays from its path, the error of its position, and its hull.
+const ZONE_MARGIN_M: f64 = 1.0;
+/// Paths keep this high above terrain that is known, m.
+const TERRAIN_CLEARANCE_M: f64 = 1.0;
 
 /// Where the vehicle was, and how it lay, when a scan was taken. World ENU, body FLU.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +67,19 @@ pub struct Perception {
 }
 
 impl Perception {
+    /// An empty map of where the mission of this configuration may fly.
+    ///
+    /// # Errors
+    /// [`MapError`] when the fence is no box in space.
+    pub fn of_mission(config: &AgentConfig) -> Result<Self, MapError> {
+        let perception = Self::new(&config.fence, Vector3::from(config.home), heights(config))?;
+        if config.airspace == Airspace::default() {
+            return Ok(perception);
+        }
+        let keep_out = KeepOut::new(config.airspace.clone(), ZONE_MARGIN_M, TERRAIN_CLEARANCE_M);
+        Ok(perception.with_keep_out(keep_out))
+    }
+
     /// An empty map of the space between the heights `floor_m` and `ceiling_m` inside the fence, metres ENU: no path leaves
     /// these heights. A fence too wide for one map is covered by a window that rolls along with the vehicle.
     ///
@@ -182,6 +206,15 @@ impl Perception {
         self.map.fade(scan.stamp);
         self.map.integrate(pose.position, &self.ends);
     }
+}
+
+/// The least and the greatest height in the world at which a mission may fly, metres.
+fn heights(config: &AgentConfig) -> [f64; 2] {
+    let [_, _, home_m] = config.home;
+    let waypoints = config.waypoints.iter().map(|[_, _, z]| *z);
+    let heights = || waypoints.clone().chain([config.return_altitude_m, home_m + config.takeoff_height_m]);
+    let lowest_m = heights().fold(f64::INFINITY, f64::min) - BELOW_WAYPOINTS_M;
+    [lowest_m.max(home_m + LEAST_HEIGHT_M), heights().fold(0.0, f64::max) + ABOVE_WAYPOINTS_M]
 }
 
 #[cfg(test)]

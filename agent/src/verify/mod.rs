@@ -28,7 +28,7 @@ pub use self::scene::Scene;
 use self::scene::{WORLD, World};
 use crate::bthreads::{self, HOME_LEG, RIGHT_OF_WAY};
 use crate::scripts::{Runner, Scripts};
-use crate::{AgentConfig, AgentError, me::Me};
+use crate::{agent_error::AgentError, config::AgentConfig, me::Me};
 
 /// How many waypoints of a mission are flown: the first and the last, between which all others are alike.
 const MOST_WAYPOINTS: usize = 2;

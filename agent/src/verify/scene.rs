@@ -6,7 +6,7 @@ use skein_bp::Event;
 
 use super::part::Part;
 use super::world::{self, Disturbed};
-use crate::{AgentConfig, me::Me};
+use crate::{config::AgentConfig, me::Me};
 
 /// A selection of what may happen around a vehicle. The program is always whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

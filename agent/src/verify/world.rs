@@ -15,7 +15,7 @@ use skein_wire::vocabulary::{
 
 use super::part::{Part, Place};
 use crate::bthreads::{HOME_LEG, OPERATOR_LEG, RIGHT_OF_WAY};
-use crate::{AgentConfig, core::safety_events, me::Me, precedence};
+use crate::{config::AgentConfig, me::Me, precedence, safety_events::safety_events};
 
 /// The place of the part `flight` in which the vehicle stands on the ground.
 pub(super) const ON_THE_GROUND: &str = "on the ground";

@@ -18,14 +18,14 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use skein_agent::AgentConfig;
+use skein_agent::{AgentConfig, Parts};
 use skein_ground::{Order, Who};
 use skein_wire::{Fleet, Network, NetworkConfig};
 
 use self::call_off::{CalledOff, interruptions};
 pub use self::{
     recording::Recording,
-    setup::{FLEET, GROUND, agent_configs, ground_config, simulation_config, vehicle_name},
+    setup::{FLEET, GROUND, agent_configs, agent_parts, ground_config, simulation_config, vehicle_name},
     swarm::{Happenings, Links, Swarm},
     trial::{Flown, Trial},
 };
@@ -89,8 +89,8 @@ fn in_lockstep(
 ) -> anyhow::Result<Summary> {
     let network = memory_network(scenario);
     let links = memory_links(&network, scenario);
-    let agents = agent_configs(scenario, controller);
-    Flight::new(scenario, controller, agents, links, recording, table)?.fly(&mut Lockstep(network))
+    let agents = Agents::of(scenario, controller);
+    Flight::new(scenario, agents, links, recording, table)?.fly(&mut Lockstep(network))
 }
 
 /// `out/<scenario>-<seed>`, under the current folder.
@@ -146,6 +146,21 @@ impl Host for Lockstep {
     }
 }
 
+/// The agents of a flight.
+struct Agents {
+    configs: Vec<AgentConfig>,
+    parts: Box<dyn Fn(&AgentConfig) -> Parts>,
+    /// What decides on board; the ground station has b-threads where they do.
+    controller: cli::Controller,
+}
+
+impl Agents {
+    fn of(scenario: &Scenario, controller: cli::Controller) -> Self {
+        let parts = Box::new(move |config: &AgentConfig| agent_parts(config, controller));
+        Self { configs: agent_configs(scenario), parts, controller }
+    }
+}
+
 /// A mission under way.
 struct Flight<'a> {
     scenario: &'a Scenario,
@@ -160,8 +175,7 @@ struct Flight<'a> {
 impl<'a> Flight<'a> {
     fn new(
         scenario: &'a Scenario,
-        controller: cli::Controller,
-        agents: Vec<AgentConfig>,
+        agents: Agents,
         links: Links,
         recording: Option<Recording>,
         table: Option<LiveTable<std::io::Stderr>>,
@@ -169,8 +183,9 @@ impl<'a> Flight<'a> {
         // From now on Ctrl-C calls off.
         interruptions();
         let simulation = skein_world::Simulation::new(simulation_config(scenario));
+        let Agents { configs, parts, controller } = agents;
         let ground = ground_config(scenario, Fleet::new(setup::FLEET)?, controller);
-        let swarm = Swarm::new(simulation, agents, ground, links)?;
+        let swarm = Swarm::with_parts(simulation, configs, &*parts, ground, links)?;
         Ok(Self { scenario, swarm, recording, table, began: Instant::now(), called_off: None })
     }
 

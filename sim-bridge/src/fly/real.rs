@@ -14,7 +14,7 @@ use skein_world::STEP;
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohSession};
 
 use super::{
-    Flight, Happenings, Host, Links, Recording, Swarm, agent_configs,
+    Agents, Flight, Happenings, Host, Links, Recording, Swarm,
     setup::{FLEET, GROUND, vehicle_name},
 };
 use crate::{
@@ -69,8 +69,8 @@ pub fn fly(
         Err(error) => table.note(&format!("no MAVLink for other programs: {error:#}"))?,
     }
     let table = (!args.headless).then_some(table);
-    let agents = agent_configs(scenario, args.controller);
-    let flight = Flight::new(scenario, args.controller, agents, links, Some(recording), table)?;
+    let agents = Agents::of(scenario, args.controller);
+    let flight = Flight::new(scenario, agents, links, Some(recording), table)?;
     flight.fly(&mut RealTime {
         began: Instant::now(),
         speed: args.speed,

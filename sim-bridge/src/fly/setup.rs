@@ -4,8 +4,8 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AgentConfig, Controller, Envelope, Fence, PassageRule};
-use skein_bp::script::Assignment;
+use skein_agent::{AgentConfig, Envelope, Fence, Mind, Parts};
+use skein_bp::{Program, script::Assignment};
 use skein_dbp::{Kept, NodeName};
 use skein_ground::{GroundConfig, Order, Who};
 use skein_wire::{Fleet, standard_authority};
@@ -13,6 +13,7 @@ use skein_world::{SimulationConfig, VehicleSetup};
 
 use crate::cli;
 use crate::scenario::{self, OrderKind, Scenario, VehiclePlan};
+use crate::sequential::Sequential;
 
 /// The fleet's name on one host.
 pub const FLEET: &str = "sim";
@@ -63,7 +64,7 @@ pub fn simulation_config(scenario: &Scenario) -> SimulationConfig {
 
 /// The agents of a scenario, in the order of its vehicles.
 #[must_use]
-pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<AgentConfig> {
+pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
     let vehicles = || (0..scenario.vehicles.len()).map(vehicle_name);
     let others = [GROUND.to_string(), SCRIPT.to_owned()];
     let roster: Vec<String> = vehicles().map(|name| name.to_string()).chain(others).collect();
@@ -100,12 +101,6 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
             },
             planners: scenario.planners,
             link_loss: LinkLossPolicy::default(),
-            passage_rule: PassageRule::Confirmed,
-            controller: match controller {
-                cli::Controller::Bp => Controller::Bp,
-                cli::Controller::Sequential => Controller::Sequential,
-                cli::Controller::None => Controller::None,
-            },
             scripts: scripts_of(scenario, index + 1),
             lease: lease(scenario),
             authority: standard_authority(),
@@ -113,6 +108,25 @@ pub fn agent_configs(scenario: &Scenario, controller: cli::Controller) -> Vec<Ag
             seed: scenario.seed.wrapping_mul(1000).wrapping_add(index as u64),
         })
         .collect()
+}
+
+/// The parts of an agent with this in control.
+#[must_use]
+pub fn agent_parts(config: &AgentConfig, controller: cli::Controller) -> Parts {
+    let parts = Parts::of(config);
+    match controller {
+        cli::Controller::Bp => parts,
+        cli::Controller::Sequential => Parts { mind: Box::new(Sequential::new(config)), ..parts },
+        cli::Controller::None => Parts { mind: Box::new(Nobody), ..parts },
+    }
+}
+
+/// No b-thread at all: everything else runs, and nothing flies (Wang 2023, feasibility).
+#[derive(Debug)]
+struct Nobody;
+
+impl Mind for Nobody {
+    fn load(&self, _: &mut Program, _: &AgentConfig) {}
 }
 
 /// The scripts of the vehicle with this number, from 1.

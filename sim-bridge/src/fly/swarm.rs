@@ -4,7 +4,7 @@
 
 use std::time::{Duration, Instant};
 
-use skein_agent::{AgentConfig, AgentCore, AgentError, Outcome};
+use skein_agent::{AgentConfig, AgentCore, AgentError, Outcome, Parts};
 use skein_dbp::{Happened, NodeName};
 use skein_ground::{GroundConfig, GroundCore, Order, UnknownVehicle};
 use skein_wire::{Link, MemoryStore, Scan};
@@ -65,11 +65,27 @@ impl Swarm {
         ground: GroundConfig,
         links: Links,
     ) -> Result<Self, AgentError> {
+        Self::with_parts(simulation, agents, &Parts::of, ground, links)
+    }
+
+    /// The same with agents of these parts.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_parts(
+        simulation: Simulation,
+        agents: Vec<AgentConfig>,
+        parts: &dyn Fn(&AgentConfig) -> Parts,
+        ground: GroundConfig,
+        links: Links,
+    ) -> Result<Self, AgentError> {
         let vehicles = agents
             .into_iter()
             .zip(links.vehicles)
             .map(|(config, link)| {
-                Ok(Vehicle { agent: AgentCore::durable(config, Box::new(MemoryStore::default()))?, link })
+                let parts = parts(&config);
+                let store = Box::new(MemoryStore::default());
+                Ok(Vehicle { agent: AgentCore::with_parts(config, parts, Some(store))?, link })
             })
             .collect::<Result<_, AgentError>>()?;
         Ok(Self {

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use skein_agent::AgentConfig;
+use skein_agent::{AgentConfig, Parts};
 use skein_dbp::Happened;
 
 use super::call_off::interruptions;
-use super::{Flight, Happenings, Host, Lockstep, Swarm, agent_configs, memory_links, memory_network};
+use super::{Agents, Flight, Happenings, Host, Lockstep, Swarm, memory_links, memory_network};
 use crate::cli::Controller;
 use crate::scenario::Scenario;
 use crate::summary::{Summary, Traffic};
@@ -17,8 +17,7 @@ type Watch<'a> = dyn FnMut(&Swarm, &[Happened]) + 'a;
 /// A flight to be made.
 pub struct Trial<'a> {
     scenario: &'a Scenario,
-    controller: Controller,
-    agents: Vec<AgentConfig>,
+    agents: Agents,
     clock: Option<fn() -> Duration>,
 }
 
@@ -33,13 +32,20 @@ pub struct Flown {
 impl<'a> Trial<'a> {
     #[must_use]
     pub fn new(scenario: &'a Scenario, controller: Controller) -> Self {
-        Self { scenario, controller, agents: agent_configs(scenario, controller), clock: None }
+        Self { scenario, agents: Agents::of(scenario, controller), clock: None }
     }
 
     /// Changes every agent's configuration.
     #[must_use]
     pub fn with_agents(mut self, change: impl FnMut(&mut AgentConfig)) -> Self {
-        self.agents.iter_mut().for_each(change);
+        self.agents.configs.iter_mut().for_each(change);
+        self
+    }
+
+    /// Makes every agent of these parts.
+    #[must_use]
+    pub fn with_parts(mut self, parts: impl Fn(&AgentConfig) -> Parts + 'static) -> Self {
+        self.agents.parts = Box::new(parts);
         self
     }
 
@@ -57,7 +63,7 @@ impl<'a> Trial<'a> {
     pub fn fly(self, watch: &mut Watch<'_>) -> anyhow::Result<Flown> {
         let network = memory_network(self.scenario);
         let links = memory_links(&network, self.scenario);
-        let mut flight = Flight::new(self.scenario, self.controller, self.agents, links, None, None)?;
+        let mut flight = Flight::new(self.scenario, self.agents, links, None, None)?;
         if let Some(clock) = self.clock {
             flight.swarm.time_agents(clock);
         }

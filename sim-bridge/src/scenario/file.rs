@@ -251,7 +251,7 @@ impl ScenarioFile {
             vehicles: plans,
             muster: table.formation.is_some() || table.targets.is_some(),
             cruise_speed_m_s,
-            planners: Planners { global: table.global, local: table.local, without: None },
+            planners: Planners { global: table.global, local: table.local },
             takeoff_height_m,
             time_limit_s,
             wind: table.wind.map(WindConfig::from).unwrap_or_default(),

@@ -7,10 +7,7 @@ use std::time::Duration;
 use anyhow::{Context as _, ensure};
 use serde::Deserialize;
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{
-    AgentConfig, AirspaceTable, Controller, Envelope, Fence, GlobalPlanner, LocalPlanner, PassageRule,
-    Planners,
-};
+use skein_agent::{AgentConfig, AirspaceTable, Envelope, Fence, GlobalPlanner, LocalPlanner, Planners};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
@@ -228,14 +225,12 @@ impl File {
             fence,
             airspace,
             envelope: self.envelope.check()?,
-            planners: Planners { global: self.planners.global, local: self.planners.local, without: None },
+            planners: Planners { global: self.planners.global, local: self.planners.local },
             link_loss: match self.mission.without_ground {
                 WithoutGround::Continue => LinkLossPolicy::Continue,
                 WithoutGround::Return => LinkLossPolicy::Return,
                 WithoutGround::Land => LinkLossPolicy::Land,
             },
-            controller: Controller::Bp,
-            passage_rule: PassageRule::Confirmed,
             scripts: self.script.iter().map(|script| script.read(folder)).collect::<anyhow::Result<_>>()?,
             lease: Duration::from_millis(self.lease_ms),
             authority: self.authority.unwrap_or_else(standard_authority),

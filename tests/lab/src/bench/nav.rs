@@ -10,16 +10,18 @@ use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use serde_json::json;
-use skein_agent::pipeline::guidance::{Guidance, Motion, Report, Surroundings};
+use skein_agent::pipeline::guidance::Guidance;
+use skein_agent::pipeline::layers::Layers;
 use skein_agent::pipeline::perception::{Perception, Pose};
-use skein_agent::{AgentConfig, Me};
+use skein_agent::pipeline::surroundings::Surroundings;
+use skein_agent::positioning::Motion;
+use skein_agent::{AgentConfig, Report, Waypoint};
 use skein_mav::SetPoint;
 use skein_planning::separation::{self, FilterConfig, Neighbour, filter};
-use skein_sim::cli::{Controller, Exit};
+use skein_sim::cli::Exit;
 use skein_sim::fly::agent_configs;
 use skein_sim::scenario::Scenario;
 use skein_sim::summary::PlanTimes;
-use skein_wire::vocabulary::GOTO;
 use skein_world::{Lidar, Scene};
 
 use crate::cpu_time;
@@ -31,6 +33,8 @@ const NEIGHBOURS: usize = 20;
 const AROUND_M: [f64; 2] = [3.0, 9.0];
 /// Navigation cycles begin this often.
 const CYCLE: Duration = Duration::from_millis(100);
+/// Standard deviations of position, metres, and velocity, m/s.
+const SIGMA: [f64; 2] = [0.05, 0.1];
 /// Height of the flight, metres.
 const HEIGHT_M: f64 = 3.0;
 
@@ -112,7 +116,7 @@ impl Task for Nav {
 /// Flies one vehicle through the forest, to and fro, among others that keep around it.
 fn measure(ticks: usize, seed: u64) -> anyhow::Result<Times> {
     let scenario = Scenario::built_in("forest", Some(1), seed)?;
-    let config = agent_configs(&scenario, Controller::Bp).into_iter().next().context("nobody flies")?;
+    let config = agent_configs(&scenario).into_iter().next().context("nobody flies")?;
     let plan = scenario.vehicles.first().context("nobody flies")?;
     let mut flight = Flight::new(&scenario.scene, &config, seed)?;
     let mut lidar = Lidar::new(plan.model.lidar, seed, 1);
@@ -131,7 +135,6 @@ fn measure(ticks: usize, seed: u64) -> anyhow::Result<Times> {
 /// A vehicle that flies what its pipeline says.
 struct Flight<'a> {
     scene: &'a Scene,
-    me: Me,
     perception: Perception,
     guidance: Guidance,
     filter: FilterConfig,
@@ -147,11 +150,13 @@ impl<'a> Flight<'a> {
         let position = Vector3::new(home.x, home.y, HEIGHT_M);
         Ok(Self {
             scene,
-            me: Me::new(&config.node),
             perception: Perception::new(&config.fence, home, [0.6, 2.0 * HEIGHT_M])?,
-            guidance: Guidance::new(config.envelope, config.fence, config.planners),
+            guidance: Guidance::new(
+                config.envelope,
+                Layers::of(&config.envelope, config.fence, config.planners),
+            ),
             filter: FilterConfig { max_speed_m_s: config.envelope.cruise_m_s, ..FilterConfig::default() },
-            motion: Motion { position, velocity: Vector3::zeros() },
+            motion: Motion::new(position, Vector3::zeros(), SIGMA),
             rng: ChaCha8Rng::seed_from_u64(seed),
             legs: 0,
             has_arrived: false,
@@ -161,15 +166,15 @@ impl<'a> Flight<'a> {
     fn head_for(&mut self, goal: Vector3<f64>, times: &mut Times) -> anyhow::Result<()> {
         self.legs += 1;
         self.has_arrived = false;
-        let goto = self.me.event(GOTO).with("leg", self.legs as i64);
-        self.guidance.head_for(&goto.with("x", goal.x).with("y", goal.y).with("z", HEIGHT_M));
+        let target = Vector3::new(goal.x, goal.y, HEIGHT_M);
+        self.guidance.head_for(Waypoint { leg: self.legs as i64, target, lands: true, is_home: false });
         self.plan(times)
     }
 
     fn plan(&mut self, times: &mut Times) -> anyhow::Result<()> {
         let since = cpu_time::this_thread()?;
         let map = self.perception.map_mut();
-        let mut report = self.guidance.plan("waypoint", &self.motion, map, &[]);
+        let mut report = self.guidance.plan(false, &self.motion, map, &[]);
         while report.is_none() {
             report = self.guidance.go_on_planning(map);
         }
@@ -203,7 +208,7 @@ impl<'a> Flight<'a> {
         let request = separation::Motion {
             position: self.motion.position,
             velocity: self.motion.velocity,
-            sigma_m: 0.05,
+            sigma_m: self.motion.position_sigma_m(),
             desired: velocity(&set_point),
             planar: true,
         };

@@ -1,8 +1,21 @@
 //! Ablation: each layer of the pipeline is left out in turn, to see what it contributes.
 
+use std::time::Duration;
+
 use clap::Args;
 use serde_json::json;
-use skein_agent::{GlobalPlanner, Layer, LocalPlanner, Planners};
+use skein_agent::pipeline::global::{self, AstarFinder, PathFinder, Task, path_finder};
+use skein_agent::pipeline::layers::Layers;
+use skein_agent::pipeline::local::Apf;
+use skein_agent::pipeline::safety_filter::{Kept, VelocityFilter};
+use skein_agent::pipeline::surroundings::Surroundings;
+use skein_agent::{AgentConfig, GlobalPlanner, Parts, Planners};
+use skein_planning::Path;
+use skein_planning::global::astar::PlanError;
+use skein_planning::local::{apf::ApfConfig, escape::EscapeConfig};
+use skein_planning::map::ClearanceMap;
+use skein_planning::passage::PassageConfig;
+use skein_planning::separation::{Motion, Neighbour, RepulsionConfig};
 use skein_sim::cli::Controller;
 use skein_sim::fly::Trial;
 use skein_sim::scenario::Scenario;
@@ -22,21 +35,72 @@ const SCENARIOS: [(&str, usize); 3] = [("forest", 1), ("antipodal", 5), ("window
 /// A vehicle that has not arrived by then has failed, s: three times what one needs.
 const TIME_LIMIT_S: f64 = 120.0;
 
-const VARIANTS: [(&str, Planners); 8] = [
-    ("all layers", ALL),
-    ("D* Lite in place of A*", Planners { global: GlobalPlanner::DstarLite, ..ALL }),
-    ("without global path", without(Layer::GlobalPath)),
-    ("without local avoidance", without(Layer::LocalAvoidance)),
-    ("without repulsion", without(Layer::Repulsion)),
-    ("without safety filter", without(Layer::SafetyFilter)),
-    ("without escape", without(Layer::Escape)),
-    ("without right of way", without(Layer::RightOfWay)),
+/// Builds an agent's pipeline.
+type Build = fn(&AgentConfig) -> Layers;
+
+const VARIANTS: [(&str, Build); 8] = [
+    (ALL, all),
+    ("D* Lite in place of A*", |config| Layers {
+        finder: path_finder(GlobalPlanner::DstarLite),
+        ..all(config)
+    }),
+    ("without global path", |config| Layers { finder: Box::new(Straight::default()), ..all(config) }),
+    ("without local avoidance", |config| {
+        let field = ApfConfig { repulsive_gain: 0.0, ..ApfConfig::default() };
+        Layers { follower: Box::new(Apf::with_field(&config.envelope, field)), ..all(config) }
+    }),
+    ("without repulsion", |config| {
+        let repulsion = RepulsionConfig { influence_m: 0.0, ..RepulsionConfig::default() };
+        Layers { repulsion, ..all(config) }
+    }),
+    ("without safety filter", |config| Layers { filter: Box::new(Unfiltered), ..all(config) }),
+    ("without escape", |config| {
+        let escape = EscapeConfig { window: NEVER, ..EscapeConfig::default() };
+        Layers { escape, ..all(config) }
+    }),
+    ("without right of way", |config| {
+        let passages = PassageConfig { width_m: 0.0, ..PassageConfig::default() };
+        Layers { passages, ..all(config) }
+    }),
 ];
+const ALL: &str = "all layers";
+/// Longer than any flight.
+const NEVER: Duration = Duration::from_secs(1 << 30);
 
-const ALL: Planners = Planners { global: GlobalPlanner::Astar, local: LocalPlanner::Apf, without: None };
+fn all(config: &AgentConfig) -> Layers {
+    Layers::of(&config.envelope, config.fence, Planners::default())
+}
 
-const fn without(layer: Layer) -> Planners {
-    Planners { without: Some(layer), ..ALL }
+/// Goes straight to the waypoint, whatever the map knows of it.
+#[derive(Debug, Default)]
+struct Straight(AstarFinder);
+
+impl PathFinder for Straight {
+    fn begin(&mut self) {
+        self.0.begin();
+    }
+
+    fn advance(
+        &mut self,
+        task: &Task,
+        map: &mut ClearanceMap,
+        allowance: &mut usize,
+    ) -> Option<Result<global::Found, PlanError>> {
+        match Path::new(vec![task.start, task.goal]) {
+            Some(path) => Some(Ok(global::Found { path, clearance_m: None })),
+            None => self.0.advance(task, map, allowance),
+        }
+    }
+}
+
+/// Flies every velocity as it is desired.
+#[derive(Debug)]
+struct Unfiltered;
+
+impl VelocityFilter for Unfiltered {
+    fn keep_apart(&mut self, _: Duration, request: Motion, _: &[Neighbour], _: &Surroundings<'_>) -> Kept {
+        Kept { velocity: request.desired, evades: false }
+    }
 }
 
 #[derive(Args)]
@@ -57,16 +121,18 @@ impl Experiment for Ablation {
     fn run(&self) -> anyhow::Result<Report> {
         let mut flights = Vec::new();
         for (scenario, fewer) in SCENARIOS {
-            for (_, planners) in VARIANTS {
-                flights.extend((1..=self.runs.div_ceil(fewer) as u64).map(|seed| (scenario, planners, seed)));
+            for (_, layers) in VARIANTS {
+                flights.extend((1..=self.runs.div_ceil(fewer) as u64).map(|seed| (scenario, layers, seed)));
             }
         }
-        let summaries = runs::in_turn("flights", &flights, |(scenario, planners, seed)| {
+        let summaries = runs::in_turn("flights", &flights, |(scenario, layers, seed)| {
             let mut scenario = Scenario::built_in(scenario, self.vehicles, *seed)?;
             scenario.orders.clear();
             scenario.time_limit_s = TIME_LIMIT_S;
             let trial = Trial::new(&scenario, Controller::Bp);
-            Ok(trial.with_agents(|agent| agent.planners = *planners).fly(&mut |_, _| {})?.summary)
+            let layers = *layers;
+            let trial = trial.with_parts(move |config| Parts { layers: layers(config), ..Parts::of(config) });
+            Ok(trial.fly(&mut |_, _| {})?.summary)
         })?;
         let mut report = Report::default();
         let mut rest = summaries.as_slice();
@@ -74,11 +140,11 @@ impl Experiment for Ablation {
         for (scenario, fewer) in SCENARIOS {
             let worlds = self.runs.div_ceil(fewer);
             let mut rows = Vec::new();
-            for (name, planners) in VARIANTS {
+            for (name, _) in VARIANTS {
                 let (summaries, others) = rest.split_at(worlds);
                 rest = others;
                 let found = Found::of(summaries);
-                if planners == ALL {
+                if name == ALL {
                     let what =
                         format!("worlds of `{scenario}` that all layers together bring everyone through");
                     report.goal(&what, found.succeeded as f64, Bound::Exactly(worlds as f64));

@@ -5,6 +5,7 @@ mod circle;
 mod dstar_grid;
 mod feasibility;
 mod lsc;
+mod naive_right_of_way;
 mod performance;
 mod right_of_way;
 mod sphere;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use clap::Args;
 use serde_json::json;
-use skein_agent::PassageRule;
+use skein_agent::{Behaviour, Mind, Parts};
 use skein_bp::Event;
 use skein_dbp::{Happened, NodeName};
 use skein_sim::cli::Controller;
@@ -13,6 +13,7 @@ use skein_sim::fly::Trial;
 use skein_sim::scenario::Scenario;
 use skein_wire::vocabulary::{ENTER, LANDED, LEAVE};
 
+use super::naive_right_of_way::Naive;
 use crate::figure::{Figure, Line, Style};
 use crate::numbers::one_or_more;
 use crate::report::{Bound, Report};
@@ -21,8 +22,9 @@ use crate::runs;
 use crate::statistics::mean;
 
 const RUNS: usize = 20;
-const RULES: [(PassageRule, &str); 2] =
-    [(PassageRule::Confirmed, "confirmed"), (PassageRule::Heard, "naive")];
+/// Makes the mind that follows a rule.
+type Rule = fn() -> Box<dyn Mind>;
+const RULES: [(Rule, &str); 2] = [(|| Box::new(Behaviour), "confirmed"), (|| Box::new(Naive), "naive")];
 /// A network that is slow and loses messages: mean latency, milliseconds, and the share lost.
 const SLOW: (f64, f64) = (100.0, 0.2);
 /// Two places nearer than this, per axis, are in one passage, metres.
@@ -147,9 +149,10 @@ impl Experiment for RightOfWay {
     }
 }
 
-fn fly(scenario: &Scenario, rule: PassageRule) -> anyhow::Result<Flight> {
+fn fly(scenario: &Scenario, rule: Rule) -> anyhow::Result<Flight> {
     let mut passage = Passage::default();
-    let trial = Trial::new(scenario, Controller::Bp).with_agents(|agent| agent.passage_rule = rule);
+    let trial = Trial::new(scenario, Controller::Bp)
+        .with_parts(move |config| Parts { mind: rule(), ..Parts::of(config) });
     let summary = trial
         .fly(&mut |swarm, selections| {
             selections.iter().for_each(|happened| passage.watch(swarm.now().as_secs_f64(), happened));
@@ -165,7 +168,7 @@ fn fly(scenario: &Scenario, rule: PassageRule) -> anyhow::Result<Flight> {
 
 /// The number inside over the time of one flight, by rule.
 fn inside(both: &[Flight; 2]) -> Figure {
-    let line = |((_, rule), flight): (&(PassageRule, &str), &Flight)| Line {
+    let line = |((_, rule), flight): (&(Rule, &str), &Flight)| Line {
         name: (*rule).to_owned(),
         style: Style::Solid,
         points: flight.passage.over_time.clone(),

@@ -7,15 +7,18 @@
 
 use std::time::Duration;
 
-use skein_bp::Event;
+use skein_agent::bthreads::{escape, mission, navigation, path_planning, return_home};
+use skein_agent::{AgentConfig, Me, Mind};
+use skein_bp::{Event, Origin, Program};
+use skein_dbp::{Happened, Node};
 use skein_wire::vocabulary::{
     ADVANCE, AIRBORNE, ARRIVED, BATTERY_CRITICAL, BATTERY_LOW, CLEAR, COMMAND_FAILED, COMPLETE, FAILED,
     FENCE_BREACHED, FOUND_AIRBORNE, HOLD, HOMEWARD, LAND, LANDED, PATH_BLOCKED, PILOT, PLAN, PLANNED, READY,
     SLEPT, STUCK, TAKEOFF, TOO_CLOSE, UNPLANNABLE, UNREADY,
 };
 
-use crate::bthreads::{escape, mission, navigation, path_planning, return_home};
-use crate::me::Me;
+/// Who requested what the navigator does, in the trace.
+const NAME: &str = "sequential";
 
 /// The state machine.
 #[derive(Clone, Debug)]
@@ -65,13 +68,13 @@ enum Way {
 }
 
 impl Sequential {
-    /// The navigator of vehicle `me`, which stands on the ground: over `waypoints`, the last being where it lands, and
-    /// over `home`, from where it lands after a return; metres ENU.
+    /// The navigator of a vehicle that stands on the ground: over its waypoints, landing at the last, and home where it must.
     #[must_use]
-    pub fn new(me: Me, waypoints: &[[f64; 3]], home: [f64; 3]) -> Self {
+    pub fn new(config: &AgentConfig) -> Self {
+        let (me, [x, y, _]) = (Me::new(&config.node), config.home);
         Self {
-            waypoints: mission::gotos(&me, waypoints),
-            home: return_home::goto(&me, home),
+            waypoints: mission::gotos(&me, &config.waypoints),
+            home: return_home::goto(&me, [x, y, config.return_altitude_m]),
             me,
             stage: Stage::Grounded,
             way: Way::None,
@@ -83,7 +86,7 @@ impl Sequential {
     }
 
     /// Takes in a report of the vehicle's body.
-    pub fn hear(&mut self, now: Duration, report: &Event) {
+    fn take_in(&mut self, now: Duration, report: &Event) {
         let why = || report.text("why").unwrap_or("no reason given").to_owned();
         let is_under_way = matches!(self.stage, Stage::Flying { .. } | Stage::Returning { .. });
         match (self.me.verb(report).unwrap_or_default(), &self.stage) {
@@ -128,7 +131,7 @@ impl Sequential {
     }
 
     /// What is to be done now, in this order; nothing until something is heard or due.
-    pub fn step(&mut self, now: Duration) -> Vec<Event> {
+    fn step(&mut self, now: Duration) -> Vec<Event> {
         if self.stage == Stage::Grounded && self.ready {
             self.stage = Stage::Climbing;
             self.acts.push(self.me.event(TAKEOFF));
@@ -196,9 +199,36 @@ impl Sequential {
     }
 }
 
+impl Mind for Sequential {
+    fn load(&self, _: &mut Program, _: &AgentConfig) {}
+
+    fn hear(&mut self, now: Duration, report: Event, _: &mut Node) {
+        self.take_in(now, &report);
+    }
+
+    fn decide(&mut self, now: Duration, node: &mut Node) -> Vec<Happened> {
+        // What the others do is nothing to it.
+        node.take_selections();
+        let home = node.name().clone();
+        let happened = |event| Happened {
+            event,
+            home: home.clone(),
+            seq: 0,
+            term: 0,
+            origin: Origin::Internal,
+            requested_by: vec![NAME.into()],
+            choice: None,
+            at: now,
+        };
+        self.step(now).into_iter().map(happened).collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fly::agent_configs;
+    use crate::scenario::Scenario;
 
     /// The navigator and a clock; every report is answered with the verbs of what is then done.
     struct Loop {
@@ -209,10 +239,11 @@ mod tests {
 
     impl Loop {
         fn new() -> Self {
-            let me = Me::new("uav/1");
-            let waypoints = [[10.0, 0.0, 2.0], [10.0, 10.0, 2.0]];
-            let navigator = Sequential::new(me.clone(), &waypoints, [0.0, 0.0, 4.0]);
-            Self { navigator, me, now: Duration::ZERO }
+            let scenario = Scenario::built_in("open", Some(1), 1).expect("it is built in");
+            let [config] = agent_configs(&scenario).try_into().expect("one vehicle");
+            let waypoints = vec![[10.0, 0.0, 2.0], [10.0, 10.0, 2.0]];
+            let navigator = Sequential::new(&AgentConfig { waypoints, ..config });
+            Self { navigator, me: Me::new("uav/1"), now: Duration::ZERO }
         }
 
         /// On its way to the first waypoint, with a path.
@@ -225,7 +256,7 @@ mod tests {
         }
 
         fn after(&mut self, report: Event) -> Vec<String> {
-            self.navigator.hear(self.now, &report);
+            self.navigator.take_in(self.now, &report);
             self.wait(0)
         }
 

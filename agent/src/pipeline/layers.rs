@@ -1,0 +1,45 @@
+//! The layers of the pipeline that can be exchanged.
+
+use skein_planning::{local::escape::EscapeConfig, passage::PassageConfig, separation::RepulsionConfig};
+
+use super::{
+    global::{PathFinder, path_finder},
+    local::{PathFollower, path_follower},
+    safety_filter::{SafetyFilter, VelocityFilter},
+};
+use crate::config::{Envelope, Fence, Planners};
+
+/// A passage is announced this far ahead, m: far enough to stop well clear of it.
+const PASSAGE_AHEAD_M: f64 = 5.0;
+
+/// What guidance is made of. Every layer is there for a reason: [`Layers::of`] has them all.
+#[derive(Debug)]
+pub struct Layers {
+    /// Finds a path through the map.
+    pub finder: Box<dyn PathFinder>,
+    /// Turns a path into a velocity.
+    pub follower: Box<dyn PathFollower>,
+    /// Bends the velocity around other vehicles.
+    pub repulsion: RepulsionConfig,
+    /// Makes the velocity safe.
+    pub filter: Box<dyn VelocityFilter>,
+    /// When the vehicle is stuck.
+    pub escape: EscapeConfig,
+    /// Which passages need right of way.
+    pub passages: PassageConfig,
+}
+
+impl Layers {
+    /// The layers that fly: those of a vehicle of this envelope inside this fence, with these planners.
+    #[must_use]
+    pub fn of(envelope: &Envelope, fence: Fence, planners: Planners) -> Self {
+        Self {
+            finder: path_finder(planners.global),
+            follower: path_follower(planners.local, envelope),
+            repulsion: RepulsionConfig::default(),
+            filter: Box::new(SafetyFilter::new(envelope, fence)),
+            escape: EscapeConfig::default(),
+            passages: PassageConfig { look_m: PASSAGE_AHEAD_M, ..PassageConfig::default() },
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Progress: whether the vehicle arrives, makes way, and can go on as planned.
+
+use std::time::Duration;
+
+use skein_planning::{
+    local::escape::{EscapeConfig, EscapeDetector, Verdict},
+    map::ClearanceMap,
+    passage::{Passage, PassageConfig, first_passage},
+};
+
+use super::course::Course;
+use crate::{neighbours::Neighbour, positioning::Motion, report::Report};
+
+/// The last waypoint is reached within this distance, m.
+const ARRIVAL_M: f64 = 0.35;
+/// Other waypoints are reached within this distance, m.
+const PASSING_M: f64 = 0.7;
+/// Waypoints are reached within this difference of height, m.
+const ARRIVAL_HEIGHT_M: f64 = 0.5;
+/// A passage lies behind once the vehicle is this far past it, m.
+const PASSAGE_BEHIND_M: f64 = 2.5;
+
+/// Watches the vehicle on its course.
+#[derive(Debug)]
+pub struct Progress {
+    /// Centre-to-centre distance that is kept between vehicles, m.
+    separation_m: f64,
+    passages: PassageConfig,
+    /// The narrow passage that was announced last.
+    passage: Option<Passage>,
+    escape: EscapeDetector,
+}
+
+impl Progress {
+    /// Watches a vehicle that keeps so far from others, m. Passages and local minima are found as configured.
+    #[must_use]
+    pub fn new(separation_m: f64, passages: PassageConfig, escape: EscapeConfig) -> Self {
+        Self { separation_m, passages, passage: None, escape: EscapeDetector::new(escape) }
+    }
+
+    /// There is a new path.
+    pub fn begin_path(&mut self) {
+        self.escape.reset();
+    }
+
+    /// The flight is over.
+    pub fn forget(&mut self) {
+        self.passage = None;
+    }
+
+    /// The share of the attraction that is left: 1, and less while a local minimum is escaped from.
+    #[must_use]
+    pub fn attraction(&self) -> f64 {
+        self.escape.attraction()
+    }
+
+    /// Looks along the path; once in each navigation cycle.
+    pub fn look_ahead(
+        &mut self,
+        now: Duration,
+        has_leave: bool,
+        course: &mut Course,
+        motion: &Motion,
+        map: &ClearanceMap,
+        neighbours: &[Neighbour],
+    ) -> Vec<Report> {
+        let mut reports = Vec::new();
+        reports.extend(self.check_arrival(course, motion, neighbours));
+        reports.extend(check_path(course, motion, map));
+        reports.extend(self.check_passage(course, motion, map));
+        reports.extend(self.check_progress(now, has_leave, course));
+        reports
+    }
+
+    fn check_arrival(
+        &self,
+        course: &mut Course,
+        motion: &Motion,
+        neighbours: &[Neighbour],
+    ) -> Option<Report> {
+        let waypoint = course.waypoint?;
+        let offset = waypoint.target - motion.position;
+        let is_taken = neighbours.iter().any(|neighbour| {
+            neighbour.armed && (neighbour.position() - waypoint.target).norm() < self.separation_m
+        });
+        let within_m = match (waypoint.lands, is_taken) {
+            (true, _) => ARRIVAL_M,
+            (false, false) => PASSING_M,
+            // A place in the air that another vehicle has is passed at a distance, not fought over.
+            (false, true) => 2.0 * self.separation_m,
+        };
+        let arrives = offset.xy().norm() < within_m && offset.z.abs() < ARRIVAL_HEIGHT_M;
+        (arrives && !std::mem::replace(&mut course.has_arrived, true))
+            .then_some(Report::Arrived { leg: waypoint.leg })
+    }
+
+    fn check_passage(&mut self, course: &Course, motion: &Motion, map: &ClearanceMap) -> Option<Report> {
+        if let Some(passage) = self.passage {
+            let offset = motion.position - passage.centre;
+            let is_past = offset.dot(&passage.direction) > PASSAGE_BEHIND_M;
+            let turned_away = offset.norm() > PASSAGE_BEHIND_M && !course.leads_through(&passage);
+            if is_past || turned_away || offset.norm() > self.passages.look_m + PASSAGE_BEHIND_M {
+                self.passage = None;
+                return Some(Report::PassageLeft);
+            }
+            return None;
+        }
+        let following = course.following.as_ref()?;
+        let passage = first_passage(map, &following.path, following.station_m, &self.passages)?;
+        self.passage = Some(passage);
+        Some(Report::Passage(passage.centre))
+    }
+
+    fn check_progress(&mut self, now: Duration, has_leave: bool, course: &Course) -> Option<Report> {
+        let is_bound = course.waypoint.is_some() && !course.has_arrived;
+        let Some(following) = course.following.as_ref().filter(|_| has_leave && is_bound) else {
+            self.escape.reset();
+            return None;
+        };
+        (self.escape.update(now, following.station_m) == Verdict::Stuck).then_some(Report::Stuck)
+    }
+}
+
+fn check_path(course: &mut Course, motion: &Motion, map: &ClearanceMap) -> Option<Report> {
+    let following = course.following.as_mut().filter(|following| !following.is_blocked)?;
+    following.is_blocked = !following.can_be_flown(&motion.position, map);
+    following.is_blocked.then_some(Report::PathBlocked)
+}

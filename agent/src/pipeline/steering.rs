@@ -1,0 +1,186 @@
+//! Steering: the set-point of now, along the path with leave to move, else at a place; kept apart from everything either way.
+
+use std::time::Duration;
+
+use nalgebra::Vector3;
+use skein_mav::SetPoint;
+use skein_planning::{
+    local::{
+        apf, braking,
+        moving::{MovingConfig, Tracker},
+    },
+    map::ClearanceMap,
+    separation::{self, RepulsionConfig, repulsion},
+};
+
+use super::{
+    course::Following,
+    local::{PathFollower, Place},
+    safety_filter::{Kept, VelocityFilter},
+    surroundings::Surroundings,
+};
+use crate::{config::Envelope, positioning::Motion};
+
+/// How far ahead the way is looked at for the speed cap, m.
+const SENSED_AHEAD_M: f64 = 9.0;
+/// Height differences below this are flown in planar mode, m.
+const PLANAR_BAND_M: f64 = 0.4;
+/// A hovering vehicle that others have pushed this far does not come back, m.
+const GIVES_WAY_M: f64 = 1.0;
+/// Speed at which a hovering vehicle goes back to its place, at most, m/s.
+const STATION_KEEPING_M_S: f64 = 0.5;
+/// Speed at which a vehicle that is to land goes to where it can, at most, m/s.
+const SETTLING_M_S: f64 = 1.0;
+
+/// Makes set-points.
+#[derive(Debug)]
+pub struct Steering {
+    envelope: Envelope,
+    follower: Box<dyn PathFollower>,
+    /// What moves and tells nobody where it is.
+    moving: Tracker,
+    repulsion: RepulsionConfig,
+    filter: Box<dyn VelocityFilter>,
+    /// Where to hover while there is no leave to move.
+    hover_at: Option<Vector3<f64>>,
+    /// Where to go before landing, without leave.
+    pub settles_at: Option<Vector3<f64>>,
+}
+
+/// A path that may be followed now, and the share of its attraction that is left.
+#[derive(Debug)]
+pub struct Lead<'a> {
+    pub following: &'a mut Following,
+    pub attraction: f64,
+}
+
+/// The velocity wanted before others are considered (ENU, m/s), and the height it leads to (m).
+#[derive(Clone, Copy, Debug)]
+struct Wish {
+    velocity: Vector3<f64>,
+    height_m: f64,
+}
+
+impl Steering {
+    /// Steers a vehicle of this envelope.
+    #[must_use]
+    pub fn new(
+        envelope: Envelope,
+        follower: Box<dyn PathFollower>,
+        repulsion: RepulsionConfig,
+        filter: Box<dyn VelocityFilter>,
+    ) -> Self {
+        let moving = Tracker::new(MovingConfig::default());
+        Self { envelope, follower, moving, repulsion, filter, hover_at: None, settles_at: None }
+    }
+
+    /// Somebody else moves the vehicle, or nobody: whatever place it hovered at is not its place any more.
+    pub fn rest(&mut self) {
+        self.hover_at = None;
+        self.settles_at = None;
+        self.follower.rest();
+    }
+
+    /// Takes in the obstacle points of a scan of `rays` rays that was taken at `stamp` and `origin`; metres ENU.
+    pub fn look(
+        &mut self,
+        stamp: Duration,
+        origin: &Vector3<f64>,
+        returns: &[Vector3<f64>],
+        rays: usize,
+        map: &ClearanceMap,
+    ) {
+        self.moving.look(stamp, returns);
+        self.follower.look(origin, returns, rays, map.keep_out());
+    }
+
+    /// Where a vehicle that brakes here and now comes to a stop, metres ENU.
+    #[must_use]
+    pub fn stop(&self, position: &Vector3<f64>, velocity: &Vector3<f64>) -> Vector3<f64> {
+        position + velocity * (velocity.norm() / (2.0 * self.follower.braking().decel_m_s2))
+    }
+
+    /// The set-point for now: to where the vehicle settles, or along the path with a lead, else at a place.
+    pub fn steer(
+        &mut self,
+        now: Duration,
+        motion: &Motion,
+        lead: Option<Lead<'_>>,
+        surroundings: &Surroundings<'_>,
+    ) -> SetPoint {
+        let wish = match (self.settles_at, lead) {
+            (Some(place), _) => self.aside(place, motion),
+            (None, Some(lead)) => self.along_path(lead, motion, surroundings.map),
+            (None, None) => self.keep_station(motion, surroundings.map),
+        };
+        let unheard = self.moving.moving(now, surroundings.map);
+        let others: Vec<_> = surroundings.neighbours.iter().copied().chain(unheard).collect();
+        let push = repulsion(&motion.position, &wish.velocity, &others, &self.repulsion);
+        let is_level = (wish.height_m - motion.position.z).abs() < PLANAR_BAND_M;
+        let Envelope { cruise_m_s, climb_m_s, .. } = self.envelope;
+        let mut desired = apf::limited(wish.velocity + push, cruise_m_s);
+        desired.z = if is_level { 0.0 } else { desired.z.clamp(-climb_m_s, climb_m_s) };
+        let request = separation::Motion {
+            position: motion.position,
+            velocity: motion.velocity,
+            sigma_m: motion.position_sigma_m(),
+            desired: self.follower.ease(desired),
+            planar: is_level,
+        };
+        let Kept { velocity, evades } = self.filter.keep_apart(now, request, &others, surroundings);
+        self.follower.flew(&velocity);
+        if is_level && !evades {
+            SetPoint::Planar { vx: velocity.x, vy: velocity.y, z: wish.height_m, yaw: None }
+        } else {
+            SetPoint::Velocity { velocity, yaw: None }
+        }
+    }
+
+    /// To where it will land.
+    fn aside(&mut self, place: Vector3<f64>, motion: &Motion) -> Wish {
+        self.follower.pause();
+        self.hover_at = None;
+        let velocity = apf::limited(place - motion.position, SETTLING_M_S);
+        Wish { velocity, height_m: place.z }
+    }
+
+    fn along_path(&mut self, lead: Lead<'_>, motion: &Motion, map: &ClearanceMap) -> Wish {
+        let Lead { following: Following { path, station_m, .. }, attraction } = lead;
+        self.hover_at = None;
+        let ahead = path.direction_at(*station_m);
+        let sensed_free_m = map.voxels().sensed_free_m(&motion.position, &ahead, SENSED_AHEAD_M);
+        let (cap_m_s, _) = braking::speed_cap(path, *station_m, sensed_free_m, self.follower.braking());
+        let place = Place { path, station_m: *station_m, position: &motion.position };
+        let step = self.follower.follow(&place, cap_m_s, attraction, map);
+        *station_m = step.station_m;
+        Wish { velocity: step.velocity, height_m: step.carrot.z }
+    }
+
+    /// At the place where the vehicle came to a stop, or to where others have pushed it.
+    fn keep_station(&mut self, motion: &Motion, map: &ClearanceMap) -> Wish {
+        self.follower.pause();
+        let place = self
+            .hover_at
+            .filter(|place| {
+                (place - motion.position).norm() < GIVES_WAY_M || leads_out(&motion.position, place, map)
+            })
+            .unwrap_or_else(|| {
+                open_place(&self.stop(&motion.position, &motion.velocity), &motion.position, map)
+            });
+        self.hover_at = Some(place);
+        let back = apf::limited(place - motion.position, STATION_KEEPING_M_S);
+        Wish { velocity: back, height_m: place.z }
+    }
+}
+
+/// Where to hover instead of at `place`, if that is closed: the nearest place that is open and to which the way is free.
+fn open_place(place: &Vector3<f64>, from: &Vector3<f64>, map: &ClearanceMap) -> Vector3<f64> {
+    let Some(keep_out) = map.keep_out() else { return *place };
+    let is_reached = |there: &Vector3<f64>| map.is_segment_clear(from, there, 0.0);
+    keep_out.nearest_open(place, is_reached).unwrap_or(*place)
+}
+
+/// Whether one place is closed and another is not.
+fn leads_out(from: &Vector3<f64>, to: &Vector3<f64>, map: &ClearanceMap) -> bool {
+    map.keep_out().is_some_and(|keep_out| keep_out.room_m(from) < 0.0 && keep_out.room_m(to) >= 0.0)
+}

@@ -1,0 +1,16 @@
+//! The surroundings of a vehicle, as a set-point is made from them.
+
+use nalgebra::Vector3;
+use skein_planning::{map::ClearanceMap, separation};
+
+/// What is around the vehicle now.
+#[derive(Clone, Copy, Debug)]
+pub struct Surroundings<'a> {
+    pub map: &'a ClearanceMap,
+    /// Obstacle points of the newest scan, metres ENU: more exact than the map.
+    pub obstacles: &'a [Vector3<f64>],
+    /// The other vehicles in the air.
+    pub neighbours: &'a [separation::Neighbour],
+    /// How many of them, and of those on the ground, have names that come before this vehicle's.
+    pub rank: u32,
+}

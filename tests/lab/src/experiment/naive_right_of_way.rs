@@ -1,0 +1,157 @@
+//! The rule that reads well and is wrong: enter a passage in which nobody has been heard to be.
+//!
+//! Between another's `enter` and the news of it, two that arrive together both find the passage empty. It is flown beside
+//! [`RightOfWay`](skein_agent::bthreads::RightOfWay).
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use skein_agent::bthreads::right_of_way::{around, entering};
+use skein_agent::{AgentConfig, Me, Mind, bthreads, precedence};
+use skein_bp::{BThread, Bid, Context, Event, Program};
+use skein_wire::vocabulary::{ADVANCE, ENTER, HOMEWARD, LANDED, LEAVE, PASSAGE, of_every_vehicle};
+
+/// The behaviour of a vehicle that shares passages by this rule.
+#[derive(Debug)]
+pub struct Naive;
+
+impl Mind for Naive {
+    fn load(&self, program: &mut Program, config: &AgentConfig) {
+        bthreads::load_with(program, config, NaiveRightOfWay::new(Me::new(&config.node)));
+    }
+}
+
+/// Enters a passage as soon as nobody is heard to be in it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct NaiveRightOfWay {
+    me: Me,
+    /// Who was heard to enter and not yet to leave: the `enter` of each vehicle.
+    inside: BTreeMap<String, Event>,
+    /// The passage that lies ahead, as it was announced.
+    ahead: Option<Event>,
+}
+
+impl NaiveRightOfWay {
+    /// The b-thread of vehicle `me`.
+    #[must_use]
+    pub fn new(me: Me) -> Self {
+        Self { me, inside: BTreeMap::new(), ahead: None }
+    }
+}
+
+impl BThread for NaiveRightOfWay {
+    fn bid(&self) -> Option<Bid> {
+        let me = &self.me;
+        let bid = Bid::new()
+            .priority(precedence::COLLISION)
+            .wait_for([ENTER, LEAVE, LANDED].map(of_every_vehicle))
+            .wait_for(me.any(PASSAGE));
+        let Some(passage) = &self.ahead else { return Some(bid) };
+        let taken = self.inside.values().any(|enter| around(passage).contains(enter));
+        let bid = bid.block(me.any_of(&[ADVANCE, HOMEWARD]));
+        Some(if taken { bid } else { bid.request(entering(me, passage)) })
+    }
+
+    fn resume(&mut self, event: &Event, _: &mut Context) {
+        let mine = event.home() == self.me.name();
+        match event.kind() {
+            PASSAGE => self.ahead = Some(event.clone()),
+            ENTER if !mine => drop(self.inside.insert(event.home().to_owned(), event.clone())),
+            _ if !mine => drop(self.inside.remove(event.home())),
+            _ => self.ahead = None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use skein_bp::ProgramConfig;
+    use skein_sim::fly::agent_configs;
+    use skein_sim::scenario::Scenario;
+    use skein_wire::vocabulary::{AIRBORNE, PLANNED, READY, TAKEOFF, event};
+
+    use super::*;
+
+    const ME: &str = "uav/2";
+    const LOWER: &str = "uav/1";
+    const HIGHER: &str = "uav/3";
+    const PLACE: [f64; 3] = [5.0, 0.0, 2.0];
+
+    fn at(event: Event, [x, y, z]: [f64; 3]) -> Event {
+        event.with("x", x).with("y", y).with("z", z)
+    }
+
+    /// The second of three vehicles, on its way to its first waypoint.
+    struct Vehicle {
+        program: Program,
+        now: Duration,
+    }
+
+    impl Vehicle {
+        fn on_its_way() -> Self {
+            let scenario = Scenario::built_in("open", Some(3), 1).expect("it is built in");
+            let mut program = Program::new(ProgramConfig::vehicle(1));
+            Naive.load(&mut program, &agent_configs(&scenario)[1]);
+            let mut vehicle = Self { program, now: Duration::ZERO };
+            for verb in [READY, TAKEOFF, AIRBORNE] {
+                vehicle.hears(event(ME, verb));
+            }
+            assert_eq!(vehicle.hears(event(ME, PLANNED)), [event(ME, PLANNED), event(ME, ADVANCE)]);
+            vehicle
+        }
+
+        fn happened(&mut self) -> Vec<Event> {
+            let selections = self.program.superstep(self.now).expect("it comes to rest");
+            selections.into_iter().map(|selection| selection.event).collect()
+        }
+
+        fn hears(&mut self, event: Event) -> Vec<Event> {
+            self.program.enqueue(event);
+            self.happened()
+        }
+
+        fn learns(&mut self, event: Event) -> Vec<Event> {
+            self.program.occurred(event);
+            self.happened()
+        }
+
+        fn after(&mut self, wait: Duration) -> Vec<Event> {
+            self.now += wait;
+            self.happened()
+        }
+    }
+
+    #[test]
+    fn enters_at_once_when_nobody_is_heard_inside_and_blocks_nobody() {
+        let mut vehicle = Vehicle::on_its_way();
+        let passage = at(event(ME, PASSAGE), PLACE);
+        assert_eq!(vehicle.hears(passage.clone()), [passage, at(event(ME, ENTER), PLACE)]);
+        assert_eq!(vehicle.after(Duration::from_millis(100)), [event(ME, ADVANCE)]);
+        let other = at(event(LOWER, ENTER), PLACE);
+        assert!(vehicle.hears(other.clone()).contains(&other), "two are inside");
+    }
+
+    #[test]
+    fn waits_until_all_who_were_heard_to_enter_the_same_passage_have_left_or_landed() {
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.learns(at(event(LOWER, ENTER), [6.0, 1.0, 2.0]));
+        vehicle.learns(at(event(HIGHER, ENTER), PLACE));
+        let passage = at(event(ME, PASSAGE), PLACE);
+        assert_eq!(vehicle.hears(passage.clone()), [passage]);
+        assert!(vehicle.after(Duration::from_secs(1)).is_empty());
+        vehicle.learns(event(LOWER, LEAVE));
+        assert!(vehicle.hears(event(ME, ADVANCE)).is_empty(), "it has no leave to move");
+        let happened = vehicle.learns(event(HIGHER, LANDED));
+        assert!(happened.contains(&at(event(ME, ENTER), PLACE)), "{happened:?}");
+    }
+
+    #[test]
+    fn does_not_mind_another_passage() {
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.learns(at(event(LOWER, ENTER), [15.0, 1.0, 2.0]));
+        let passage = at(event(ME, PASSAGE), PLACE);
+        assert_eq!(vehicle.hears(passage.clone()), [passage, at(event(ME, ENTER), PLACE)]);
+    }
+}
