@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::{UnitQuaternion, Vector3};
+use skein_bp::catalogue::Whose;
 use skein_bp::script::Assignment;
 use skein_bp::{Event, EventSet, Origin, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
@@ -191,10 +192,10 @@ impl AgentCore {
             NodeName::new(value).map_err(|source| AgentError::Name { field, value: value.to_owned(), source })
         };
         let me = Me::new(&config.node);
-        let mut program = Program::new(ProgramConfig {
-            protected: safety_events(&me),
-            ..ProgramConfig::vehicle(config.seed)
-        });
+        let brought = |whose| config.behaviours.events(&config.node, whose);
+        let safety = safety_events(&me).or(brought(Whose::Own));
+        let mut program =
+            Program::new(ProgramConfig { protected: safety.clone(), ..ProgramConfig::vehicle(config.seed) });
         if config.controller == Controller::Bp {
             bthreads::load(&mut program, &config);
         }
@@ -211,8 +212,8 @@ impl AgentCore {
         let neighbours = Neighbours::new(own_name.clone(), config.incarnation);
         let node_config = NodeConfig {
             lease: config.lease,
-            safety: safety_events(&me),
-            gateway: me.any_of(&[ORDER, LOAD, UNLOAD]),
+            safety,
+            gateway: me.any_of(&[ORDER, LOAD, UNLOAD]).or(brought(Whose::Operator)),
             // What comes from afar never outranks a vehicle's own b-threads for its safety.
             remote_priority: precedence::MISSION..=precedence::LINK,
             authority: config.authority.clone(),

@@ -5,10 +5,17 @@
 //! on a vehicle, over Zenoh on one host, and in lockstep. Only [`scripts::FileScriptStore`], which is for drivers, touches files.
 
 mod airspace_table;
+#[cfg(feature = "zenoh")]
+pub mod autopilot_link;
 pub mod bthreads;
+#[cfg(feature = "zenoh")]
+mod cli;
 mod config;
+#[cfg(feature = "zenoh")]
+pub mod config_file;
 mod core;
 mod failsafes;
+pub mod field;
 mod flight;
 mod me;
 mod neighbours;
@@ -19,6 +26,8 @@ pub mod sequential;
 pub mod verify;
 mod watches;
 
+#[cfg(feature = "zenoh")]
+pub use self::cli::main;
 pub use self::{
     airspace_table::{AirspaceError, AirspaceTable},
     config::{

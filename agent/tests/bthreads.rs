@@ -43,6 +43,7 @@ fn config() -> AgentConfig {
         controller: Controller::Bp,
         passage_rule: PassageRule::Confirmed,
         scripts: Vec::new(),
+        behaviours: Default::default(),
         lease: SECOND,
         authority: skein_wire::standard_authority(),
         kept: skein_dbp::Kept::default(),

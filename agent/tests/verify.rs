@@ -38,6 +38,7 @@ fn config() -> AgentConfig {
         controller: Controller::Bp,
         passage_rule: PassageRule::Confirmed,
         scripts: Vec::new(),
+        behaviours: Default::default(),
         lease: Duration::from_secs(1),
         authority: skein_wire::standard_authority(),
         kept: skein_dbp::Kept::default(),

@@ -29,6 +29,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -36,6 +37,7 @@ use super::op::{Op, Times};
 use super::parameter::{Argument, Parameter};
 use super::{Script, ScriptError};
 use crate::bid::Bid;
+use crate::configuration::{self, Malformed};
 use crate::event_set::EventSet;
 
 /// How long the text of a script may be, in bytes.
@@ -243,19 +245,14 @@ fn too_long(length: usize) -> String {
     format!("the script is {length} bytes long: expected at most {MAX_TEXT}")
 }
 
-fn from_toml<T: for<'de> Deserialize<'de>>(file: &str, text: &str) -> Result<T, ScriptFileError> {
-    let fault = |error: &toml::de::Error, field: String| ScriptFileError {
-        file: file.to_owned(),
-        line: error
-            .span()
-            .and_then(|span| text.get(..span.start))
-            .map(|before| before.matches('\n').count() + 1),
-        field,
-        problem: error.message().to_owned(),
-    };
+fn from_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, ScriptFileError> {
     check_length(file, text)?;
-    let parser = toml::Deserializer::parse(text).map_err(|error| fault(&error, String::new()))?;
-    serde_path_to_error::deserialize(parser).map_err(|error| fault(error.inner(), path(&error)))
+    configuration::read(text).map_err(|Malformed { line, field, problem, .. }| ScriptFileError {
+        file: file.to_owned(),
+        line: Some(line),
+        field,
+        problem,
+    })
 }
 
 fn from_json<T: for<'de> Deserialize<'de>>(file: &str, text: &str) -> Result<T, ScriptFileError> {

@@ -1,7 +1,5 @@
-//! `skein-agent`: see `skein-agent --help`.
+//! The program of one vehicle: see `skein-agent --help`.
 
-mod autopilot_link;
-mod config;
 mod run;
 mod verify;
 
@@ -9,6 +7,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use skein_bp::behaviour::Behaviours;
+
+use crate::config_file::Config;
 
 /// Skein's agent: one vehicle's behavioural program, its navigation, and its autopilot's link.
 #[derive(Parser)]
@@ -34,7 +35,10 @@ enum Command {
     Verify(verify::Verify),
 }
 
-fn main() -> ExitCode {
+/// Runs the program, with the behaviours that `add` adds to it.
+pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
+    let mut known = Behaviours::default();
+    add(&mut known);
     skein_zenoh::share_threads();
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
@@ -47,9 +51,9 @@ fn main() -> ExitCode {
         .init();
     let done = match Cli::parse().command {
         Command::Run { config } => {
-            config::Config::read(&config).and_then(run::run).map(|()| ExitCode::SUCCESS)
+            Config::read(&config, &known).and_then(run::run).map(|()| ExitCode::SUCCESS)
         }
-        Command::Verify(verify) => verify.run(),
+        Command::Verify(verify) => verify.run(&known),
     };
     match done {
         Ok(code) => code,

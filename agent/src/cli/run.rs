@@ -5,13 +5,15 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::Context as _;
-use skein_agent::{AgentCore, Scan, scripts::FileScriptStore};
 use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
 use skein_wire::{Fleet, Key, Link as _, Payload, Topic};
 use skein_zenoh::{Bell, Complaints, FileStore, ZenohConfig, ZenohLink, ZenohSession, next_incarnation};
 
 use crate::autopilot_link::AutopilotLink;
-use crate::config::{Config, LidarSource};
+use crate::config_file::Config;
+use crate::core::AgentCore;
+use crate::pipeline::perception::Scan;
+use crate::scripts::FileScriptStore;
 
 /// The control loop's period.
 const TICK: Duration = Duration::from_millis(20);
@@ -77,7 +79,7 @@ impl Driver {
         let fleet = Fleet::new(&config.agent.fleet).context("`fleet`")?;
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
         let link = session.link(&config.name)?;
-        let scans = config.lidar.map(|LidarSource { sensor, network }| {
+        let scans = config.lidar.map(|(sensor, network)| {
             let topic = Topic::Scan { sensor, vehicle: config.name.clone() };
             let own = network.map(|network| ZenohSession::open(ZenohConfig::new(fleet.clone(), network)));
             let session = own.transpose()?.unwrap_or_else(|| session.clone());
