@@ -1,6 +1,5 @@
-//! `skein-ground`: see `skein-ground --help`.
+//! The program of a ground station: see `skein-ground --help`.
 
-mod config;
 mod explain;
 mod recording;
 mod serve;
@@ -10,6 +9,9 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use serde_json::json;
+use skein_bp::behaviour::Behaviours;
+
+use crate::config_file::Config;
 
 /// Skein's ground station: launches the swarm, shows it in a browser, carries orders to it, records what happens.
 #[derive(Parser)]
@@ -53,7 +55,10 @@ enum Command {
     },
 }
 
-fn main() -> ExitCode {
+/// Runs the program, with the behaviours that `add` adds to it.
+pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
+    let mut known = Behaviours::default();
+    add(&mut known);
     skein_zenoh::share_threads();
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
@@ -66,7 +71,7 @@ fn main() -> ExitCode {
         .init();
     let cli = Cli::parse();
     let outcome = match &cli.command {
-        Command::Serve { config, until_over } => serve(config, *until_over, cli.json),
+        Command::Serve { config, until_over } => serve(config, &known, *until_over, cli.json),
         Command::Explain { file, at, vehicle } => explain::run(file, *at, vehicle.as_deref(), cli.json),
     };
     match outcome {
@@ -82,8 +87,8 @@ fn main() -> ExitCode {
     }
 }
 
-fn serve(config: &Path, until_over: bool, json: bool) -> anyhow::Result<ExitCode> {
-    let outcome = serve::run(config::Config::read(config)?, until_over)?;
+fn serve(config: &Path, known: &Behaviours, until_over: bool, json: bool) -> anyhow::Result<ExitCode> {
+    let outcome = serve::run(Config::read(config, known)?, until_over)?;
     let failed = outcome.as_ref().map(|outcome| outcome.failed.clone()).unwrap_or_default();
     if json {
         println!(
