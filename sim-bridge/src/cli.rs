@@ -9,6 +9,7 @@ use std::process::ExitCode;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use skein_bp::behaviour::Behaviours;
 
 use crate::experiment::EXPERIMENTS;
 use crate::scenario::{Overrides, Scenario, ScenarioError};
@@ -211,6 +212,12 @@ pub struct Fly {
     /// How the processes are joined.
     #[arg(long, value_enum, default_value_t = Network::Peer, requires = "processes")]
     pub network: Network,
+    /// Run this agent, which has behaviours of its own, in place of `skein-agent`.
+    #[arg(long, value_name = "PATH", requires = "processes")]
+    pub agent: Option<PathBuf>,
+    /// Run this ground station, which has behaviours of its own, in place of `skein-ground`.
+    #[arg(long, value_name = "PATH", requires = "processes")]
+    pub ground: Option<PathBuf>,
     /// Where the console is served, on this computer only; `--clock real` only. Port 0 is any that is free.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8700")]
     pub console: SocketAddr,
@@ -431,17 +438,23 @@ pub struct WorldArgs {
 }
 
 impl WorldArgs {
-    /// Reads the scenario with its files.
+    /// Reads the scenario with its files, for a program with these behaviours.
     ///
     /// # Errors
     /// What is wrong with them.
-    pub fn open(&self) -> Result<Scenario, ScenarioError> {
-        Scenario::open(&self.scenario, &self.overrides(), self.seed)
+    pub fn open(&self, known: &Behaviours) -> Result<Scenario, ScenarioError> {
+        let overrides = Overrides { behaviours: known.clone(), ..self.overrides() };
+        Scenario::open(&self.scenario, &overrides, self.seed)
     }
 
     /// What the options set over the scenario.
     pub fn overrides(&self) -> Overrides {
-        Overrides { vehicles: self.vehicles, world: self.world_file.clone(), missions: self.missions.clone() }
+        Overrides {
+            vehicles: self.vehicles,
+            world: self.world_file.clone(),
+            missions: self.missions.clone(),
+            behaviours: Behaviours::default(),
+        }
     }
 }
 

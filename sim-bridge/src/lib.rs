@@ -19,6 +19,7 @@ pub mod mission;
 pub mod operator;
 #[cfg(feature = "zenoh")]
 pub mod processes;
+mod program;
 pub mod scenario;
 mod scene_view;
 #[cfg(feature = "zenoh")]
@@ -27,3 +28,5 @@ pub mod summary;
 pub mod table;
 #[cfg(feature = "zenoh")]
 pub mod world_host;
+
+pub use self::program::main;

@@ -24,6 +24,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use skein_agent::Planners;
+use skein_bp::behaviour::{Behaviours, Chosen};
 use skein_bp::script::Assignment;
 use skein_mav::Datum;
 use skein_planning::airspace::{Airspace, KeepOut};
@@ -90,6 +91,8 @@ pub struct Scenario {
     pub orders: Vec<Order>,
     /// Scripts that run on vehicles from the start.
     pub scripts: Vec<VehicleScript>,
+    /// The behaviours that are switched on, each on the nodes that it is for.
+    pub behaviours: Chosen,
     /// What the in-memory network does to messages.
     pub network: Network,
     /// What the user should be told: parameters that gave way, parts of files that were not understood.
@@ -183,7 +186,7 @@ pub enum Who {
     Vehicle(usize),
 }
 
-/// What a command line sets over a scenario.
+/// What a program and its command line set over a scenario.
 #[derive(Debug, Clone, Default)]
 pub struct Overrides {
     /// Size of the swarm.
@@ -192,6 +195,8 @@ pub struct Overrides {
     pub world: Option<PathBuf>,
     /// Mission files: one that all fly in trail, or one for each vehicle.
     pub missions: Vec<PathBuf>,
+    /// The behaviours that the program was built with.
+    pub behaviours: Behaviours,
 }
 
 impl Scenario {
@@ -227,7 +232,18 @@ impl Scenario {
         vehicles: Option<usize>,
         seed: u64,
     ) -> Result<Self, ScenarioError> {
-        let scenario = file::ScenarioFile::parse(text, file)?.build(vehicles, seed)?;
+        Self::of_program(text, file, vehicles, seed, &Behaviours::default())
+    }
+
+    /// The same for a program with these behaviours.
+    fn of_program(
+        text: &str,
+        file: &str,
+        vehicles: Option<usize>,
+        seed: u64,
+        known: &Behaviours,
+    ) -> Result<Self, ScenarioError> {
+        let scenario = file::ScenarioFile::parse(text, file)?.build(vehicles, seed, known)?;
         scenario.validate()?;
         Ok(scenario)
     }
@@ -243,7 +259,7 @@ impl Scenario {
         let own_number = || (set.missions.len() > 1).then_some(set.missions.len());
         let vehicles = overrides.vehicles.or_else(own_number);
         let mut scenario = match text_of(name)? {
-            Some(text) => Self::from_toml(&text, name, vehicles, seed)?,
+            Some(text) => Self::of_program(&text, name, vehicles, seed, &overrides.behaviours)?,
             None => Self::built_in(name, vehicles, seed)?,
         };
         if let Some((scene, warnings)) = world {
