@@ -60,7 +60,7 @@ pub struct AgentFile {
 pub struct Autopilot {
     pub link: Address,
     pub system_id: u8,
-    #[serde(default)]
+    #[serde(default, skip_serializing)]
     pub cable_is_private: bool,
 }
 

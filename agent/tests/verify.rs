@@ -16,7 +16,7 @@ use skein_mav::Datum;
 /// States of a scene that are looked at here; the command looks at many more.
 const MOST: usize = 2_000;
 
-fn config() -> AgentConfig {
+pub fn config() -> AgentConfig {
     AgentConfig {
         fleet: "test".to_owned(),
         node: "uav/1".to_owned(),

@@ -35,11 +35,12 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Skein: a swarm of vehicles, each a behavioural program, in a simulated world.
+/// Flies a swarm of vehicles, each a behavioural program, in a simulated world.
 #[derive(Debug, Clone, PartialEq, Parser)]
 #[command(
     name = "skein-sim",
     version,
+    max_term_width = 80,
     after_help = "Exit codes: 0 done, 1 mission or check failed, 2 wrong usage or input."
 )]
 pub struct Cli {
@@ -54,11 +55,11 @@ pub struct Cli {
 /// What `skein-sim` does.
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum Command {
-    /// Fly a whole mission on this host: world, vehicles, agents and ground.
+    /// Fly a whole mission on this host: world, vehicles, agents and ground station.
     Fly(Fly),
     /// Host the world and its autopilots alone, for agents in other processes.
     Serve(Serve),
-    /// Write the configuration files of a scenario's swarm, for one process each.
+    /// Write the configuration files of a scenario's swarm, one for each process.
     Configure(Configure),
     /// Run something many times with faults, and judge it: exit 1 if anything was violated.
     Campaign {
@@ -76,7 +77,7 @@ pub enum Command {
     },
     /// List the built-in scenarios.
     List,
-    /// Say whether a scenario, world or mission file is sound.
+    /// Check a scenario, world or mission file.
     Check {
         /// A scenario (.toml), world (.sdf, .world, .csv) or mission (.plan, .json), or a built-in scenario's name.
         file: PathBuf,
@@ -190,38 +191,38 @@ pub struct Fly {
     /// What is flown.
     #[command(flatten)]
     pub world: WorldArgs,
-    /// Real time over Zenoh, or in memory as fast as the processor allows.
+    /// Time of the run: real, with events over Zenoh, or lockstep, in memory and as fast as the processor allows.
     #[arg(long, value_enum, default_value_t = Clock::Real)]
     pub clock: Clock,
-    /// How many times faster than the clock on the wall; `--clock real` only.
+    /// Factor over real time; `--clock real` only.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
     pub speed: f64,
-    /// What decides on board: behavioural programs, one sequential loop that hears no orders, or nothing (the vehicles stay
-    /// where they are).
+    /// Controller on board: behavioural programs, one sequential loop that hears no orders, or none, with which the vehicles
+    /// stay where they are.
     #[arg(long, value_enum, default_value_t = Controller::Bp)]
     pub controller: Controller,
     /// Folder for summary.json and mission.mcap; made if missing.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// No live table.
+    /// Show no live table.
     #[arg(long)]
     pub headless: bool,
-    /// World, ground station and each agent in a process of its own; `--clock real` only.
+    /// Run world, ground station and each agent in a process of its own; `--clock real` only.
     #[arg(long)]
     pub processes: bool,
-    /// How the processes are joined.
+    /// Topology of the processes' network.
     #[arg(long, value_enum, default_value_t = Network::Peer, requires = "processes")]
     pub network: Network,
-    /// Run this agent, which has behaviours of its own, in place of `skein-agent`.
+    /// Agent to run in place of `skein-agent`: one with your behaviours.
     #[arg(long, value_name = "PATH", requires = "processes")]
     pub agent: Option<PathBuf>,
-    /// Run this ground station, which has behaviours of its own, in place of `skein-ground`.
+    /// Ground station to run in place of `skein-ground`: one with your behaviours.
     #[arg(long, value_name = "PATH", requires = "processes")]
     pub ground: Option<PathBuf>,
-    /// Where the console is served, on this computer only; `--clock real` only. Port 0 is any that is free.
+    /// Address of the console on this computer, `--clock real` only; port 0 takes any that is free.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8700")]
     pub console: SocketAddr,
-    /// Use network ports so much further up, beside another swarm on this computer.
+    /// Offset of all network ports, to run beside another swarm on this computer.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port_offset: u16,
 }
@@ -235,13 +236,13 @@ pub struct Configure {
     /// Folder for the files; made if missing.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// How the processes are joined.
+    /// Topology of the processes' network.
     #[arg(long, value_enum, default_value_t = Network::Peer)]
     pub network: Network,
-    /// The swarm takes off when an operator says so, and not as soon as it is there.
+    /// Let the swarm take off when an operator orders it, not as soon as it is ready.
     #[arg(long)]
     pub launch_on_order: bool,
-    /// Use network ports so much further up, beside another swarm on this computer.
+    /// Offset of all network ports, to run beside another swarm on this computer.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port_offset: u16,
 }
@@ -404,16 +405,16 @@ pub struct Serve {
     /// What is hosted.
     #[command(flatten)]
     pub world: WorldArgs,
-    /// How many times faster than the clock on the wall.
+    /// Factor over real time.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
     pub speed: f64,
-    /// How the world is joined to the other nodes (see sim-bridge/world.toml).
+    /// Configuration of the world's network; sim-bridge/world.toml explains it.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// Folder for summary.json; made if missing.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Use MAVLink ports so much further up, beside another swarm on this computer.
+    /// Offset of all MAVLink ports, to run beside another swarm on this computer.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port_offset: u16,
 }
@@ -421,18 +422,18 @@ pub struct Serve {
 /// What world and swarm are simulated.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct WorldArgs {
-    /// A built-in scenario (see `list`), or a scenario file (.toml).
+    /// Built-in scenario (see `list`), or scenario file (.toml).
     pub scenario: String,
-    /// Size of the swarm; the scenario's own if not given.
+    /// Size of the swarm [default: the scenario's].
     #[arg(long, value_name = "N")]
     pub vehicles: Option<usize>,
-    /// What every random number comes from.
+    /// Seed of every random number.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
-    /// A Gazebo world (SDF) or a list of boxes (.csv) in place of the scenario's world.
+    /// Gazebo world (SDF) or list of boxes (.csv) in place of the scenario's world.
     #[arg(long = "world", value_name = "FILE")]
     pub world_file: Option<PathBuf>,
-    /// A QGroundControl plan or LSC mission; one that all fly in trail, or one for each vehicle.
+    /// QGroundControl plan or LSC mission: one that all fly in trail, or one for each vehicle.
     #[arg(long = "mission", value_name = "FILE")]
     pub missions: Vec<PathBuf>,
 }

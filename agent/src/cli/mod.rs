@@ -11,12 +11,13 @@ use skein_bp::behaviour::Behaviours;
 
 use crate::config_file::Config;
 
-/// Skein's agent: one vehicle's behavioural program, its navigation, and its autopilot's link.
+/// Flies one vehicle: runs its b-threads, navigates, and talks to its autopilot.
 #[derive(Parser)]
 #[command(
     name = "skein-agent",
     version,
-    after_help = "Exit codes: 0 done, 1 `verify` has found a violation, 2 wrong usage or input."
+    max_term_width = 80,
+    after_help = "Exit codes: 0 done, 1 `verify` found a violation, 2 wrong usage or input."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -25,13 +26,13 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Fly one vehicle until Ctrl-C, which lands it first. A second Ctrl-C ends at once, in the air too.
+    /// Fly the vehicle until Ctrl-C, which lands it first. A second Ctrl-C ends at once, even in the air.
     Run {
-        /// The agent's configuration; agent/agent.toml explains every field.
+        /// Configuration of the agent; agent/agent.toml explains every field.
         #[arg(long, value_name = "FILE")]
         config: PathBuf,
     },
-    /// Look at every run of a vehicle's b-threads, with the world around them abstracted, or of a small network.
+    /// Model-check a vehicle's b-threads against an abstract world, or programs on a small network.
     Verify(verify::Verify),
 }
 

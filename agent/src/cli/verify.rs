@@ -38,25 +38,25 @@ const LOOKED_FOR: [&str; 4] = [
 /// The arguments of `skein-agent verify`.
 #[derive(clap::Args)]
 pub struct Verify {
-    /// The vehicle's configuration; the one in agent/agent.toml, with a return when the ground is lost, unless given.
+    /// Configuration of the vehicle [default: agent/agent.toml, returning home when the ground station is lost].
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// A script that runs besides. Parameters without a default are given values that fit.
+    /// Run this script too; parameters without a default get values that fit.
     #[arg(long, value_name = "FILE")]
     script: Vec<PathBuf>,
-    /// Only this scene; may be given more than once.
+    /// Check this scene only; may be repeated.
     #[arg(long, value_name = "NAME")]
     scene: Vec<String>,
-    /// Instead of a vehicle: programs on up to three nodes, all or the one of this name.
+    /// Check programs on networks of up to three nodes instead: all, or the one of this name.
     #[arg(long, value_name = "NAME", num_args = 0..=1, conflicts_with_all = ["config", "script", "scene", "dot"])]
     network: Option<Option<String>>,
-    /// Look at no more states of each scene or network; 0: at all, whatever it takes.
+    /// Explore at most N states of each scene or network; 0 explores all.
     #[arg(long, value_name = "N")]
     states: Option<usize>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
-    /// Draw the states of one scene, for Graphviz, instead of judging them.
+    /// Write the state graph of one scene for Graphviz instead of checking it.
     #[arg(long, value_name = "FILE", requires = "scene")]
     dot: Option<PathBuf>,
 }

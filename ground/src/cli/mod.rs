@@ -13,11 +13,12 @@ use skein_bp::behaviour::Behaviours;
 
 use crate::config_file::Config;
 
-/// Skein's ground station: launches the swarm, shows it in a browser, carries orders to it, records what happens.
+/// The ground station: launches the swarm, shows it in a browser, sends it orders, and records the mission.
 #[derive(Parser)]
 #[command(
     name = "skein-ground",
     version,
+    max_term_width = 80,
     after_help = "Exit codes: 0 done, 1 the mission failed or nothing can be explained, 2 wrong usage or input."
 )]
 struct Cli {
@@ -30,26 +31,24 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Be the ground station, with its console, until Ctrl-C.
+    /// Run the ground station with its console until Ctrl-C.
     Serve {
-        /// The station's configuration; ground/ground.toml explains every field.
+        /// Configuration of the station; ground/ground.toml explains every field.
         #[arg(long, value_name = "FILE")]
         config: PathBuf,
-        /// End when every vehicle's mission is over: exit 0 if all went well, 1 if not.
+        /// End when every vehicle's mission is over: exit 0 if all succeeded, 1 if not.
         #[arg(long)]
         until_over: bool,
     },
-    /// Say why vehicles did what they did, or stood still, in a recorded mission: who requests, who blocks, and what would
+    /// Explain why vehicles of a recorded mission moved or stood still: who requested what, who blocked it, and what would
     /// have to change.
     Explain {
         /// The recording, such as mission.mcap.
         file: PathBuf,
-        /// The moment, in seconds of the mission's time; counted back from the recording's end if negative. The end unless
-        /// given.
+        /// Moment of the mission, in seconds; negative counts back from the end [default: the end].
         #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
         at: Option<f64>,
-        /// The vehicle: its number or its name, such as 3 or uav/3. Unless given, all: a line each, and more of those that
-        /// stand still.
+        /// Number or name of one vehicle, such as 3 or uav/3 [default: all, with details of those that stand still].
         #[arg(long, value_name = "VEHICLE")]
         vehicle: Option<String>,
     },

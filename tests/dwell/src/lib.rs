@@ -47,23 +47,21 @@ impl Behaviour for Dwell {
 
     fn model(&self, host: &Host<'_>, model: &mut Model<'_>) {
         let me = Me::new(host.node);
-        let (here, onward) = (of_mission(&me, ARRIVED), of_mission(&me, GOTO));
-        let left = Dwelt::any_at(host.node).or(elsewhere(&me).and(onward.clone().not()));
         let rule = "between arriving and having dwelt, the mission does not go on";
-        model.require(rule, Requirement::absence(rule, onward, here.clone(), left.clone()));
-        let rule = "whoever arrives at a waypoint has dwelt in the end, or is led elsewhere";
-        model.require(rule, Requirement::response(rule, &me, here, left));
+        let (onward, here) = (of_mission(&me, GOTO), of_mission(&me, ARRIVED));
+        let left = Dwelt::any_at(host.node).or(elsewhere(&me));
+        model.require(rule, Requirement::absence(rule, onward, here, left));
     }
 }
 
-/// The events of this name about waypoints of the mission: other legs have numbers below 0.
+/// The events of this name about waypoints of the mission, whose numbers begin at 0.
 fn of_mission(me: &Me, verb: &str) -> EventSet {
     me.any(verb).and(EventSet::field_range("leg", 0.0, f64::MAX))
 }
 
-/// What leads a vehicle away from its waypoint.
+/// What leads a vehicle elsewhere: home, to an operator's point, or down.
 fn elsewhere(me: &Me) -> EventSet {
-    me.any_of(&[GOTO, RETURN, LAND, LANDED])
+    me.any(GOTO).and(of_mission(me, GOTO).not()).or(me.any_of(&[RETURN, LAND, LANDED]))
 }
 
 /// Blocks the mission's next `goto` for a while after each `arrived`, then tells that it has.
