@@ -1,38 +1,50 @@
-//! What one vehicle's agent must know.
+//! What one vehicle's agent must know. The parts that a user writes are read and written as they stand here, by `agent.toml`
+//! and by whatever else configures a vehicle.
 
 use std::time::Duration;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
+use skein_bp::behaviour::{Chosen, Host};
 use skein_bp::script::Assignment;
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
 use skein_planning::airspace::Airspace;
 
 use crate::bthreads::LinkLossPolicy;
+use crate::field::positive;
 
 /// An axis-aligned box, metres ENU.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Fence {
     pub min: [f64; 3],
     pub max: [f64; 3],
 }
 
 /// What the vehicle can do, and the distances it keeps.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Envelope {
     /// Horizontal speed flown when nothing is near, m/s.
+    #[serde(deserialize_with = "positive")]
     pub cruise_m_s: f64,
     /// Greatest vertical speed, m/s.
+    #[serde(deserialize_with = "positive")]
     pub climb_m_s: f64,
     /// Acceleration the vehicle can brake with, m/s².
+    #[serde(deserialize_with = "positive")]
     pub brake_m_s2: f64,
     /// Time from a set-point to the velocity it asks for, s.
+    #[serde(deserialize_with = "positive")]
     pub latency_s: f64,
     /// Radius of the sphere around the vehicle, m.
+    #[serde(deserialize_with = "positive")]
     pub hull_m: f64,
     /// Clearance kept between hull and obstacles when a path is planned, m.
+    #[serde(deserialize_with = "positive")]
     pub margin_m: f64,
     /// Centre-to-centre distance the safety filter keeps between vehicles, m.
+    #[serde(deserialize_with = "positive")]
     pub separation_m: f64,
 }
 
@@ -51,7 +63,7 @@ impl Default for Envelope {
 }
 
 /// What finds a path through the map.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum GlobalPlanner {
     /// Searches anew for every path: [`astar`](skein_planning::global::astar).
@@ -61,19 +73,8 @@ pub enum GlobalPlanner {
     DstarLite,
 }
 
-impl GlobalPlanner {
-    /// Its name in configuration files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Astar => "astar",
-            Self::DstarLite => "dstar-lite",
-        }
-    }
-}
-
 /// What turns a path into the velocity to fly now.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LocalPlanner {
     /// Pulled along the path, pushed away by what is near: [`apf`](skein_planning::local::apf).
@@ -83,19 +84,9 @@ pub enum LocalPlanner {
     Vfh,
 }
 
-impl LocalPlanner {
-    /// Its name in configuration files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Apf => "apf",
-            Self::Vfh => "vfh",
-        }
-    }
-}
-
 /// Which planners the pipeline is made of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Planners {
     pub global: GlobalPlanner,
     pub local: LocalPlanner,
@@ -139,6 +130,8 @@ pub struct AgentConfig {
     pub link_loss: LinkLossPolicy,
     /// The scripts that run from the start.
     pub scripts: Vec<Assignment>,
+    /// The behaviours that are switched on; those for other nodes count for nothing.
+    pub behaviours: Chosen,
     /// Lease of the bids this node sends.
     pub lease: Duration,
     /// Who of the others may request and block what here.
@@ -147,4 +140,12 @@ pub struct AgentConfig {
     pub kept: Kept,
     /// Seed of the program's tie-breaks.
     pub seed: u64,
+}
+
+impl AgentConfig {
+    /// The vehicle as its behaviours see it.
+    #[must_use]
+    pub fn host(&self) -> Host<'_> {
+        Host { node: &self.node, roster: self.roster.iter().map(String::as_str).collect() }
+    }
 }

@@ -6,11 +6,18 @@
 
 mod agent_error;
 mod airspace_table;
+#[cfg(feature = "zenoh")]
+pub mod autopilot_link;
 pub mod bthreads;
+#[cfg(feature = "zenoh")]
+mod cli;
 mod config;
+#[cfg(feature = "zenoh")]
+pub mod config_file;
 mod control;
 mod core;
 mod failsafes;
+pub mod field;
 mod flight;
 mod instruction;
 mod me;
@@ -27,6 +34,8 @@ pub mod scripts;
 pub mod verify;
 mod watches;
 
+#[cfg(feature = "zenoh")]
+pub use self::cli::main;
 pub use self::{
     agent_error::AgentError,
     airspace_table::{AirspaceError, AirspaceTable},
@@ -36,7 +45,7 @@ pub use self::{
     flight::FlightPhase,
     instruction::Waypoint,
     me::Me,
-    mind::{Behaviour, Mind},
+    mind::{BThreads, Mind},
     mission::Outcome,
     neighbours::Neighbour,
     parts::Parts,

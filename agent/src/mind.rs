@@ -29,9 +29,9 @@ pub trait Mind: std::fmt::Debug + Send {
 
 /// A vehicle's behavioural program.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Behaviour;
+pub struct BThreads;
 
-impl Mind for Behaviour {
+impl Mind for BThreads {
     fn load(&self, program: &mut Program, config: &AgentConfig) {
         bthreads::load(program, config);
     }

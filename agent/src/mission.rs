@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
+use skein_bp::catalogue::Whose;
 use skein_bp::script::Assignment;
 use skein_bp::{Event, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
@@ -66,10 +67,9 @@ impl Mission {
         store: Option<Box<dyn Store>>,
     ) -> Result<Self, AgentError> {
         let me = Me::new(&config.node);
-        let mut program = Program::new(ProgramConfig {
-            protected: safety_events(&me),
-            ..ProgramConfig::vehicle(config.seed)
-        });
+        let node_config = node_config(&config, &me, store.is_some())?;
+        let protected = node_config.safety.clone();
+        let mut program = Program::new(ProgramConfig { protected, ..ProgramConfig::vehicle(config.seed) });
         mind.load(&mut program, &config);
         let mut scripts = Scripts::new(me.clone(), &config.roster);
         for assignment in &config.scripts {
@@ -78,7 +78,6 @@ impl Mission {
                 .and_then(|()| check_script(&config, assignment, STATES_TRIED))
                 .map_err(|why| AgentError::Script { name: assignment.name().to_owned(), why })?;
         }
-        let node_config = node_config(&config, &me, store.is_some())?;
         let fleet = Fleet::new(&config.fleet)
             .map_err(|source| AgentError::Fleet { value: config.fleet.clone(), source })?;
         let name = node_config.name.clone();
@@ -335,8 +334,8 @@ fn node_config(config: &AgentConfig, me: &Me, durable: bool) -> Result<NodeConfi
     let own_name = name("node", &config.node)?;
     Ok(NodeConfig {
         lease: config.lease,
-        safety: safety_events(me),
-        gateway: me.any_of(&[ORDER, LOAD, UNLOAD]),
+        safety: safety_events(me).or(config.behaviours.events(me.name(), Whose::Own)),
+        gateway: me.any_of(&[ORDER, LOAD, UNLOAD]).or(config.behaviours.events(me.name(), Whose::Operator)),
         // What comes from afar never outranks a vehicle's own b-threads for its safety.
         remote_priority: precedence::MISSION..=precedence::LINK,
         authority: config.authority.clone(),

@@ -1,7 +1,7 @@
 //! The parts of an agent that can be exchanged.
 
 use crate::config::AgentConfig;
-use crate::mind::{Behaviour, Mind};
+use crate::mind::{BThreads, Mind};
 use crate::pipeline::layers::Layers;
 use crate::positioning::{Autopilot, Positioning};
 
@@ -18,7 +18,7 @@ impl Parts {
     #[must_use]
     pub fn of(config: &AgentConfig) -> Self {
         Self {
-            mind: Box::new(Behaviour),
+            mind: Box::new(BThreads),
             positioning: Box::new(Autopilot),
             layers: Layers::of(&config.envelope, config.fence, config.planners),
         }

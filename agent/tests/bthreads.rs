@@ -41,6 +41,7 @@ fn config() -> AgentConfig {
         planners: Planners::default(),
         link_loss: LinkLossPolicy::Continue,
         scripts: Vec::new(),
+        behaviours: Default::default(),
         lease: SECOND,
         authority: skein_wire::standard_authority(),
         kept: skein_dbp::Kept::default(),

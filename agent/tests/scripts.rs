@@ -50,6 +50,7 @@ fn config() -> AgentConfig {
         planners: Planners::default(),
         link_loss: LinkLossPolicy::Continue,
         scripts: Vec::new(),
+        behaviours: Default::default(),
         lease: Duration::from_secs(1),
         authority: skein_wire::standard_authority(),
         kept: skein_dbp::Kept::default(),

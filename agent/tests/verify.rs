@@ -14,7 +14,7 @@ use skein_mav::Datum;
 /// States of a scene that are looked at here; the command looks at many more.
 const MOST: usize = 2_000;
 
-fn config() -> AgentConfig {
+pub fn config() -> AgentConfig {
     AgentConfig {
         fleet: "test".to_owned(),
         node: "uav/1".to_owned(),
@@ -34,6 +34,7 @@ fn config() -> AgentConfig {
         planners: Planners::default(),
         link_loss: LinkLossPolicy::Return,
         scripts: Vec::new(),
+        behaviours: Default::default(),
         lease: Duration::from_secs(1),
         authority: skein_wire::standard_authority(),
         kept: skein_dbp::Kept::default(),

@@ -3,67 +3,16 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use skein_bp::{Program, ProgramConfig};
-use skein_dbp::{Authority, Board, Happened, Kept, Node, NodeConfig, NodeError, NodeName};
-use skein_wire::{Fleet, Link, NodeLink, State, Store, joint_roster, standard_authority};
+use skein_bp::catalogue::Whose;
+use skein_bp::{EventSet, Program, ProgramConfig};
+use skein_dbp::{Board, Happened, Node, NodeConfig, NodeError, NodeName};
+use skein_wire::{Link, NodeLink, State, Store, joint_roster};
 
 use crate::bthreads::{self, MissionOutcome, Watch, heard};
+use crate::config::GroundConfig;
 use crate::explain::{Evidence, Explanation, explain};
-use crate::order_log::OrderLog;
-use crate::{Order, OrderRecord, Who};
-
-/// What a ground station must know.
-#[derive(Clone, Debug)]
-pub struct GroundConfig {
-    pub fleet: Fleet,
-    /// The station's node name, such as `ground/main`.
-    pub name: NodeName,
-    /// The vehicles, in the order in which they take off.
-    pub vehicles: Vec<NodeName>,
-    /// Operators' scripts that may speak to the station too; nobody misses one that is not there.
-    pub operators: Vec<NodeName>,
-    /// A number that grows with every start of this node.
-    pub incarnation: u64,
-    /// Orders known in advance, each with its time.
-    pub orders: Vec<(Duration, Order)>,
-    /// Whether the b-threads are loaded; without them the station listens and asks for nothing.
-    pub loaded: bool,
-    /// Whether the swarm takes off when an operator orders it, and not as soon as it is there.
-    pub launch_on_order: bool,
-    /// Whether nobody sets out before everybody is in the air.
-    pub muster: bool,
-    /// Lease of the station's bids.
-    pub lease: Duration,
-    /// Who of the others may request and block what here.
-    pub authority: Authority,
-    /// What a former life of this station has kept: joint decisions, and a roster that an operator has given.
-    pub kept: Kept,
-    /// Seed of the program's tie-breaks.
-    pub seed: u64,
-}
-
-impl GroundConfig {
-    /// The station `name`, in its first incarnation, with the usual lease and nothing ordered yet.
-    #[must_use]
-    pub fn new(fleet: Fleet, name: NodeName, vehicles: Vec<NodeName>) -> Self {
-        let lease = Duration::from_secs(1);
-        Self {
-            fleet,
-            name,
-            vehicles,
-            operators: Vec::new(),
-            incarnation: 1,
-            orders: Vec::new(),
-            loaded: true,
-            launch_on_order: false,
-            muster: false,
-            lease,
-            authority: standard_authority(),
-            kept: Kept::default(),
-            seed: 0,
-        }
-    }
-}
+use crate::order::{Order, Who};
+use crate::order_log::{OrderLog, OrderRecord};
 
 /// An order names a vehicle that the station does not have.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -105,7 +54,11 @@ impl GroundCore {
         }
         let roster: Vec<_> =
             config.vehicles.iter().chain([&config.name]).chain(&config.operators).cloned().collect();
+        let brought = |whose| config.behaviours.events(config.name.as_str(), whose);
+        let gateway = EventSet::named(config.name.event_name("order"));
         let node_config = NodeConfig {
+            safety: brought(Whose::Own),
+            gateway: gateway.or(brought(Whose::Operator)),
             lease: config.lease,
             authority: config.authority,
             joint: Some(joint_roster(config.name.clone(), &roster)),

@@ -23,6 +23,11 @@
 //! ```
 
 pub mod bthreads;
+#[cfg(feature = "zenoh")]
+mod cli;
+mod config;
+#[cfg(feature = "zenoh")]
+pub mod config_file;
 #[cfg(feature = "console")]
 pub mod console;
 mod core;
@@ -31,7 +36,10 @@ mod order;
 mod order_log;
 pub mod recorder;
 
-pub use crate::core::{GroundConfig, GroundCore, UnknownVehicle};
+pub use crate::core::{GroundCore, UnknownVehicle};
 pub use bthreads::MissionOutcome;
+#[cfg(feature = "zenoh")]
+pub use cli::main;
+pub use config::GroundConfig;
 pub use order::{Destination, Order, SentScript, UnfitScript, Who};
 pub use order_log::{Answer, OrderRecord};

@@ -206,7 +206,7 @@ fn one_vehicle_can_be_held_and_let_go_out_of_all() {
         let advanced = fleet.saw(&format!("{vehicle}/advance"));
         advanced
             .iter()
-            .filter(|at| (Duration::from_millis(5200)..Duration::from_secs(9)).contains(at))
+            .filter(|at| (Duration::from_millis(5200)..Duration::from_secs(9)).contains(*at))
             .count()
     };
     assert!(between("uav/1") > 5);

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use serde::Serialize;
+use skein_bp::behaviour::Behaviours;
 use skein_world::Scene;
 
 use crate::mission::{self, MissionSet};
@@ -34,7 +35,7 @@ impl fmt::Display for Findings {
 ///
 /// # Errors
 /// The first fault: with file, line and what was expected.
-pub fn check(file: &Path) -> Result<Findings, ScenarioError> {
+pub fn check(file: &Path, known: &Behaviours) -> Result<Findings, ScenarioError> {
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase());
     let (kind, holds, warnings) = match extension.as_deref() {
         Some("sdf" | "world" | "csv") => {
@@ -46,7 +47,8 @@ pub fn check(file: &Path) -> Result<Findings, ScenarioError> {
             ("mission", missions(&set), set.warnings.iter().map(ToString::to_string).collect())
         }
         _ => {
-            let scenario = Scenario::open(&file.to_string_lossy(), &Overrides::default(), 1)?;
+            let scenario =
+                Scenario::open_with(&file.to_string_lossy(), &Overrides::default(), 1, known)?;
             let holds = format!("{} vehicles, {}", scenario.vehicles.len(), world(&scenario.scene));
             ("scenario", holds, scenario.notes)
         }
@@ -70,6 +72,10 @@ fn missions(set: &MissionSet) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn check(file: &Path) -> Result<Findings, ScenarioError> {
+        super::check(file, &Behaviours::default())
+    }
 
     #[test]
     fn each_kind_of_file_is_known_by_its_extension() -> Result<(), Box<dyn std::error::Error>> {

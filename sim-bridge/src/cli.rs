@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use skein_bp::behaviour::Behaviours;
 
 use crate::scenario::{Overrides, Scenario, ScenarioError};
 
@@ -38,11 +39,12 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Skein: a swarm of vehicles, each a behavioural program, in a simulated world.
+/// Flies a swarm of vehicles, each a behavioural program, in a simulated world.
 #[derive(Debug, Clone, PartialEq, Parser)]
 #[command(
     name = "skein-sim",
     version,
+    max_term_width = 80,
     after_help = "Exit codes: 0 done, 1 mission or check failed, 2 wrong usage or input."
 )]
 pub struct Cli {
@@ -55,15 +57,15 @@ pub struct Cli {
 
 #[derive(Debug, Clone, PartialEq, Subcommand)]
 pub enum Command {
-    /// Fly a whole mission on this host: world, vehicles, agents and ground.
+    /// Fly a whole mission on this host: world, vehicles, agents and ground station.
     Fly(Fly),
     /// Host the world and its autopilots alone, for agents in other processes.
     Serve(Serve),
-    /// Write the configuration files of a scenario's swarm, for one process each.
+    /// Write the configuration files of a scenario's swarm, one for each process.
     Configure(Configure),
     /// List the built-in scenarios.
     List,
-    /// Say whether a scenario, world or mission file is sound.
+    /// Check a scenario, world or mission file.
     Check {
         /// A scenario (.toml), world (.sdf, .world, .csv) or mission (.plan, .json), or a built-in scenario's name.
         file: PathBuf,
@@ -75,32 +77,38 @@ pub enum Command {
 pub struct Fly {
     #[command(flatten)]
     pub world: WorldArgs,
-    /// Real time over Zenoh, or in memory as fast as the processor allows.
+    /// Time of the run: real, with events over Zenoh, or lockstep, in memory and as fast as the processor allows.
     #[arg(long, value_enum, default_value_t = Clock::Real)]
     pub clock: Clock,
-    /// Speed-up over the clock on the wall; `--clock real` only.
+    /// Factor over real time; `--clock real` only.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
     pub speed: f64,
-    /// What decides on board: behavioural programs, one sequential loop that hears no orders, or nothing (the vehicles stay
-    /// where they are).
+    /// Controller on board: behavioural programs, one sequential loop that hears no orders, or none, with which the vehicles
+    /// stay where they are.
     #[arg(long, value_enum, default_value_t = Controller::Bp)]
     pub controller: Controller,
     /// Folder for summary.json and mission.mcap; made if missing.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// No live table.
+    /// Show no live table.
     #[arg(long)]
     pub headless: bool,
-    /// World, ground station and each agent in a process of its own; `--clock real` only.
+    /// Run world, ground station and each agent in a process of its own; `--clock real` only.
     #[arg(long)]
     pub processes: bool,
-    /// The way in which the processes are joined.
+    /// Topology of the processes' network.
     #[arg(long, value_enum, default_value_t = Network::Peer, requires = "processes")]
     pub network: Network,
-    /// Address of the console, on this computer only; `--clock real` only. Port 0 is any that is free.
+    /// Agent to run in place of `skein-agent`: one with your behaviours.
+    #[arg(long, value_name = "PATH", requires = "processes")]
+    pub agent: Option<PathBuf>,
+    /// Ground station to run in place of `skein-ground`: one with your behaviours.
+    #[arg(long, value_name = "PATH", requires = "processes")]
+    pub ground: Option<PathBuf>,
+    /// Address of the console on this computer, `--clock real` only; port 0 takes any that is free.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8700")]
     pub console: SocketAddr,
-    /// Use network ports so much further up, beside another swarm on this computer.
+    /// Offset of all network ports, to run beside another swarm on this computer.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port_offset: u16,
 }
@@ -120,13 +128,13 @@ pub struct Configure {
 /// The way in which the processes of a swarm are set up.
 #[derive(Debug, Clone, Copy, PartialEq, Args)]
 pub struct Setup {
-    /// The way in which they are joined.
+    /// Topology of the processes' network.
     #[arg(long, value_enum, default_value_t = Network::Peer)]
     pub network: Network,
-    /// The swarm takes off when an operator says so, and not as soon as it is there.
+    /// Let the swarm take off when an operator orders it, not as soon as it is ready.
     #[arg(long)]
     pub launch_on_order: bool,
-    /// Use network ports so much further up, beside another swarm on this computer.
+    /// Offset of all network ports, to run beside another swarm on this computer.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port_offset: u16,
 }
@@ -147,16 +155,16 @@ pub enum Network {
 pub struct Serve {
     #[command(flatten)]
     pub world: WorldArgs,
-    /// Speed-up over the clock on the wall.
+    /// Factor over real time.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
     pub speed: f64,
-    /// The world's link to the other nodes (see sim-bridge/world.toml).
+    /// Configuration of the world's network; sim-bridge/world.toml explains it.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// Folder for summary.json; made if missing.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Use MAVLink ports so much further up, beside another swarm on this computer.
+    /// Offset of all MAVLink ports, to run beside another swarm on this computer.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port_offset: u16,
 }
@@ -164,22 +172,22 @@ pub struct Serve {
 /// The world and the swarm in it.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct WorldArgs {
-    /// A built-in scenario (see `list`), or a scenario file (.toml).
+    /// Built-in scenario (see `list`), or scenario file (.toml).
     pub scenario: String,
     #[command(flatten)]
     pub overrides: Overrides,
-    /// The seed of every random number.
+    /// Seed of every random number.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
 }
 
 impl WorldArgs {
-    /// Reads the scenario with its files.
+    /// Reads the scenario with its files, for a program with these behaviours.
     ///
     /// # Errors
-    /// The first thing that is wrong with them.
-    pub fn open(&self) -> Result<Scenario, ScenarioError> {
-        Scenario::open(&self.scenario, &self.overrides, self.seed)
+    /// The first fault in them.
+    pub fn open(&self, known: &Behaviours) -> Result<Scenario, ScenarioError> {
+        Scenario::open_with(&self.scenario, &self.overrides, self.seed, known)
     }
 }
 

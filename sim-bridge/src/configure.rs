@@ -2,19 +2,26 @@
 //!
 //! They are the examples `agent/agent.toml` and `ground/ground.toml`, with their explanations, filled in.
 
-use std::fmt::{Debug, Write as _};
+use std::fmt::Write as _;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use serde::Serialize;
 use serde_json::json;
-use skein_agent::{AgentConfig, AirspaceTable};
-use skein_bp::script::Assignment;
+use skein_agent::AgentConfig;
+use skein_agent::autopilot_link::Address;
+use skein_agent::config_file::{AgentFile, EXAMPLE as AGENT_EXAMPLE, ScriptEntry};
+use skein_bp::behaviour::Behaviours;
+use skein_ground::GroundConfig;
+use skein_ground::config_file::{EXAMPLE as GROUND_EXAMPLE, GroundFile};
+use skein_wire::Fleet;
+use skein_zenoh::{Mode, NetworkSettings};
 
 use crate::cli::{self, Network, Setup};
-use crate::fly::{FLEET, GROUND, agent_configs, ground_config};
+use crate::fly::{FLEET, agent_configs, ground_config};
 use crate::scenario::Scenario;
-use crate::world_host::WORLD;
+use crate::world_host::{WORLD, WorldConfig};
 
 /// The ports of nodes for one another: the world, the ground station or a router, and from there on the vehicles.
 const WORLD_PORT: u16 = 7446;
@@ -24,8 +31,6 @@ const CONSOLE_PORT: u16 = 8700;
 /// The port of vehicle 0's agent for its autopilot.
 const COMPANION_PORT: u16 = 14540;
 
-const AGENT: &str = include_str!("../../agent/agent.toml");
-const GROUND_STATION: &str = include_str!("../../ground/ground.toml");
 const WORLD_EXAMPLE: &str = include_str!("../world.toml");
 
 /// The port of the router, or of the ground station in its place.
@@ -54,8 +59,8 @@ pub struct Files {
 ///
 /// # Errors
 /// A fault in the scenario; a file that cannot be written.
-pub fn run(args: &cli::Configure, as_json: bool) -> anyhow::Result<()> {
-    let scenario = args.world.open()?;
+pub fn run(args: &cli::Configure, known: &Behaviours, as_json: bool) -> anyhow::Result<()> {
+    let scenario = args.world.open(known)?;
     let files = write(&scenario, &args.out, args.setup)?;
     if as_json {
         println!("{}", json!({ "world": files.world, "ground": files.ground, "agents": files.agents }));
@@ -104,38 +109,26 @@ pub fn write(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result
         std::fs::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
         anyhow::Ok(path)
     };
+    let ground = GroundConfig {
+        launch_on_order: setup.launch_on_order,
+        ..ground_config(scenario, Fleet::new(FLEET)?, cli::Controller::Bp)
+    };
+    let world = save("world.toml", filled_in(WORLD_EXAMPLE, &setup.world())?)?;
+    let ground = save("ground.toml", filled_in(GROUND_EXAMPLE, &setup.ground(&ground))?)?;
     let agents = agent_configs(scenario);
-    let world = save("world.toml", setup.world())?;
-    let muster = ground_config(scenario, skein_wire::Fleet::new(FLEET)?, cli::Controller::Bp).muster;
-    let ground = save("ground.toml", setup.ground(&agents, muster))?;
     let agents = (0..).zip(&agents).map(|(index, agent)| {
         let stem = agent.node.replace('/', "-");
-        let mut text = setup.agent(index, agent) + &airspace_tables(agent)?;
+        let mut config = setup.agent(index, agent);
         for assignment in &agent.scripts {
-            let file = format!("{stem}-{}.json", assignment.name());
+            let name = assignment.name();
+            let file = format!("{stem}-{name}.json");
             save(&file, serde_json::to_string_pretty(&assignment.script)?)?;
-            text += &script_table(&file, assignment);
+            let with = assignment.with.clone();
+            config.script.push(ScriptEntry { file: file.into(), with, called: Some(name.to_owned()) });
         }
-        save(&format!("{stem}.toml"), text)
+        save(&format!("{stem}.toml"), filled_in(AGENT_EXAMPLE, &config)?)
     });
     Ok(Files { world, ground, agents: agents.collect::<anyhow::Result<_>>()? })
-}
-
-/// The airspace in an agent's configuration.
-fn airspace_tables(agent: &AgentConfig) -> anyhow::Result<String> {
-    let airspace = AirspaceTable::of(&agent.airspace);
-    if airspace == AirspaceTable::default() {
-        return Ok(String::new());
-    }
-    let tables = toml::Table::from_iter([("airspace".to_owned(), toml::Value::try_from(airspace)?)]);
-    Ok(format!("\n{}", toml::to_string(&tables)?))
-}
-
-/// A script in an agent's configuration. Names, texts, numbers and lists are written in JSON as in TOML.
-fn script_table(file: &str, assignment: &Assignment) -> String {
-    let with: Vec<String> = assignment.with.iter().map(|(name, value)| format!("{name} = {value}")).collect();
-    let name = assignment.name();
-    format!("\n[[script]]\nfile = {file:?}\nwith = {{ {} }}\nas = {name:?}\n", with.join(", "))
 }
 
 impl Setup {
@@ -143,97 +136,65 @@ impl Setup {
         format!("tcp/127.0.0.1:{}", port + self.port_offset)
     }
 
-    /// Fills in `[network]` of a node that listens on `port`, and connects to those before it.
-    fn join(&self, template: Template, port: u16, before: Vec<u16>) -> Template {
-        let router = self.endpoint(GROUND_PORT);
+    /// How a node is joined that listens on `port`, and connects to those before it.
+    fn join(&self, port: u16, before: impl IntoIterator<Item = u16>) -> NetworkSettings {
+        let router = vec![self.endpoint(GROUND_PORT)];
         let (mode, listen, connect) = match self.network {
-            Network::Peer => (
-                "peer",
-                vec![self.endpoint(port)],
-                before.into_iter().map(|port| self.endpoint(port)).collect(),
-            ),
-            Network::Router if port == GROUND_PORT => ("router", vec![router], vec![]),
-            Network::Router | Network::Zenohd => ("client", vec![], vec![router]),
+            Network::Peer => {
+                let connect = before.into_iter().map(|port| self.endpoint(port)).collect();
+                (Mode::Peer, vec![self.endpoint(port)], connect)
+            }
+            Network::Router if port == GROUND_PORT => (Mode::Router, router, vec![]),
+            Network::Router | Network::Zenohd => (Mode::Client, vec![], router),
         };
-        template
-            .set("network", "mode", &mode)
-            .set("network", "listen", &listen)
-            .set("network", "connect", &connect)
+        NetworkSettings { mode, listen, connect, security: None }
     }
 
-    fn world(&self) -> String {
-        let template = Template(WORLD_EXAMPLE.to_owned()).set("", "fleet", &FLEET).set("", "node", &WORLD);
-        self.join(template, WORLD_PORT, vec![]).0
+    fn world(&self) -> WorldConfig {
+        WorldConfig { network: self.join(WORLD_PORT, []), ..WorldConfig::default() }
     }
 
-    fn ground(&self, agents: &[AgentConfig], muster: bool) -> String {
-        let vehicles: Vec<&str> = agents.iter().map(|agent| agent.node.as_str()).collect();
-        let template = Template(GROUND_STATION.to_owned())
-            .set("", "fleet", &FLEET)
-            .set("", "node", &GROUND.as_str())
-            .set("", "vehicles", &vehicles)
-            .set("", "launch", &if self.launch_on_order { "on_order" } else { "at_start" })
-            .set("", "muster", &muster)
-            .set("", "console", &console(self.port_offset).to_string())
-            .set("", "record", &".");
-        self.join(template, GROUND_PORT, vec![WORLD_PORT]).0
+    fn ground(&self, station: &GroundConfig) -> GroundFile {
+        let network = self.join(GROUND_PORT, [WORLD_PORT]);
+        let mut file = GroundFile::of(station, console(self.port_offset), network);
+        file.record = ".".into();
+        file
     }
 
-    fn agent(&self, index: u16, agent: &AgentConfig) -> String {
-        let datum = &agent.datum;
-        let envelope = &agent.envelope;
-        let template = Template(AGENT.to_owned())
-            .set("", "fleet", &agent.fleet)
-            .set("", "node", &agent.node)
-            .set("", "ground", &agent.ground)
-            .set("", "roster", &agent.roster)
-            .set("", "seed", &i64::try_from(agent.seed).unwrap_or(i64::MAX))
-            .set("autopilot", "link", &format!("udp:127.0.0.1:{}", COMPANION_PORT + index + self.port_offset))
-            .set("autopilot", "system_id", &agent.system_id)
-            .set("lidar", "sensor", &WORLD)
-            .set("datum", "latitude_deg", &datum.latitude_rad.to_degrees())
-            .set("datum", "longitude_deg", &datum.longitude_rad.to_degrees())
-            .set("datum", "height_m", &datum.height_m)
-            .set("mission", "home", &agent.home)
-            .set("mission", "waypoints", &agent.waypoints)
-            .set("mission", "takeoff_height_m", &agent.takeoff_height_m)
-            .set("mission", "return_altitude_m", &agent.return_altitude_m)
-            .set("fence", "min", &agent.fence.min)
-            .set("fence", "max", &agent.fence.max)
-            .set("envelope", "cruise_m_s", &envelope.cruise_m_s)
-            .set("envelope", "climb_m_s", &envelope.climb_m_s)
-            .set("envelope", "brake_m_s2", &envelope.brake_m_s2)
-            .set("envelope", "latency_s", &envelope.latency_s)
-            .set("envelope", "hull_m", &envelope.hull_m)
-            .set("envelope", "margin_m", &envelope.margin_m)
-            .set("envelope", "separation_m", &envelope.separation_m)
-            .set("planners", "global", &agent.planners.global.name())
-            .set("planners", "local", &agent.planners.local.name());
-        let before =
-            [WORLD_PORT, GROUND_PORT].into_iter().chain((0..index).map(|index| FIRST_VEHICLE_PORT + index));
-        self.join(template, FIRST_VEHICLE_PORT + index, before.collect()).0
+    fn agent(&self, index: u16, agent: &AgentConfig) -> AgentFile {
+        let vehicles = (0..index).map(|index| FIRST_VEHICLE_PORT + index);
+        let network =
+            self.join(FIRST_VEHICLE_PORT + index, [WORLD_PORT, GROUND_PORT].into_iter().chain(vehicles));
+        let companion = (Ipv4Addr::LOCALHOST, COMPANION_PORT + index + self.port_offset).into();
+        AgentFile::of(agent, Address::UdpIn(companion), WORLD, network)
     }
 }
 
-/// A configuration file with explanations, in which fields are filled in where they stand, commented out or not.
-struct Template(String);
-
-impl Template {
-    /// Sets a field of a table; `""` is what stands before the first. Rust writes texts, numbers and lists as TOML does.
-    fn set(self, table: &str, field: &str, value: &impl Debug) -> Self {
-        let mut inside = "";
-        let mut lines = Vec::new();
-        for line in self.0.lines() {
-            if let Some(name) = line.strip_prefix('[').and_then(|line| line.strip_suffix(']')) {
-                inside = name;
-            }
-            let bare = line.strip_prefix('#').unwrap_or(line);
-            let is_field =
-                inside == table && bare.strip_prefix(field).is_some_and(|rest| rest.starts_with(" ="));
-            lines.push(if is_field { format!("{field} = {value:?}") } else { line.to_owned() });
+/// A file that explains its fields, with those of `config` filled in where they stand, commented out or not; what has no
+/// place there follows at the end.
+fn filled_in(example: &str, config: &impl Serialize) -> anyhow::Result<String> {
+    let mut config = toml::Table::try_from(config)?;
+    let (mut text, mut table) = (String::new(), None);
+    for line in example.lines() {
+        if let Some(name) = line.strip_prefix('[').and_then(|line| line.strip_suffix(']')) {
+            table = Some(name);
         }
-        Self(lines.join("\n") + "\n")
+        let field = line.strip_prefix('#').unwrap_or(line).split_once(" = ").map(|(field, _)| field);
+        let place = match table {
+            None => Some(&mut config),
+            Some(table) => config.get_mut(table).and_then(toml::Value::as_table_mut),
+        };
+        let filled = field.zip(place).and_then(|(field, place)| place.remove_entry(field));
+        match filled {
+            Some((field, value)) => writeln!(text, "{field} = {value}")?,
+            None => writeln!(text, "{line}")?,
+        }
     }
+    config.retain(|_, value| value.as_table().is_none_or(|table| !table.is_empty()));
+    if !config.is_empty() {
+        write!(text, "\n{}", toml::to_string(&config)?)?;
+    }
+    Ok(text)
 }
 
 #[cfg(test)]
@@ -243,29 +204,34 @@ mod tests {
     #[test]
     fn a_field_is_filled_in_where_it_stands_and_in_its_table_only() {
         let example = "# Why.\n#a = 1\nab = 2\n[one]\na = 3\n[two]\n#a = 4\n";
-        let filled = Template(example.to_owned()).set("", "a", &"x").set("two", "a", &[1.5, 2.0]).0;
-        assert_eq!(filled, "# Why.\na = \"x\"\nab = 2\n[one]\na = 3\n[two]\na = [1.5, 2.0]\n");
+        let config = json!({ "a": "x", "two": { "a": [1.5, 2.0] }, "three": { "b": 5 } });
+        let expected = "# Why.\na = \"x\"\nab = 2\n[one]\na = 3\n[two]\na = [1.5, 2.0]\n\n[three]\nb = 5\n";
+        assert_eq!(filled_in(example, &config).unwrap(), expected);
     }
 
     #[test]
     fn every_field_that_is_filled_in_is_one_of_the_example() {
         let scenario = Scenario::open("window", &crate::scenario::Overrides::default(), 3).unwrap();
         let agents = agent_configs(&scenario);
+        let station = ground_config(&scenario, Fleet::new(FLEET).unwrap(), cli::Controller::Bp);
+        let station = GroundConfig { muster: true, ..station };
         for network in [Network::Peer, Network::Router, Network::Zenohd] {
             let setup = Setup { network, port_offset: 100, launch_on_order: false };
-            let agent: toml::Table = setup.agent(1, &agents[1]).parse().unwrap();
+            let agent: toml::Table =
+                filled_in(AGENT_EXAMPLE, &setup.agent(1, &agents[1])).unwrap().parse().unwrap();
             assert_eq!(agent["mission"]["waypoints"].as_array().unwrap().len(), agents[1].waypoints.len());
             assert_eq!(agent["autopilot"]["link"].as_str(), Some("udp:127.0.0.1:14641"));
             assert_eq!(agent["envelope"].as_table().unwrap().len(), 7);
             assert_eq!(agent["planners"]["global"].as_str(), Some("astar"));
             assert_eq!(agent["planners"]["local"].as_str(), Some("apf"));
-            let ground: toml::Table = setup.ground(&agents, true).parse().unwrap();
+            let ground: toml::Table =
+                filled_in(GROUND_EXAMPLE, &setup.ground(&station)).unwrap().parse().unwrap();
             assert_eq!(ground["vehicles"].as_array().unwrap().len(), agents.len());
             assert_eq!(
                 (ground["muster"].as_bool(), ground["launch"].as_str()),
                 (Some(true), Some("at_start"))
             );
-            let world: toml::Table = setup.world().parse().unwrap();
+            let world: toml::Table = filled_in(WORLD_EXAMPLE, &setup.world()).unwrap().parse().unwrap();
             let mode = |table: &toml::Table| table["network"]["mode"].as_str().unwrap().to_owned();
             let modes = [mode(&world), mode(&ground), mode(&agent)];
             match network {

@@ -13,6 +13,7 @@ mod mavlink_ports;
 pub mod mission;
 #[cfg(feature = "zenoh")]
 pub mod processes;
+mod program;
 pub mod scenario;
 mod scene_view;
 mod sequential;
@@ -22,3 +23,5 @@ pub mod summary;
 pub mod table;
 #[cfg(feature = "zenoh")]
 pub mod world_host;
+
+pub use self::program::main;

@@ -32,6 +32,14 @@ pub struct Processes {
     nodes: BTreeMap<NodeName, Running>,
     router: Option<Child>,
     port_offset: u16,
+    programs: Programs,
+}
+
+/// The programs that are run in place of `skein-agent` and `skein-ground`: those with behaviours of one's own.
+#[derive(Clone, Debug, Default)]
+pub struct Programs {
+    pub agent: Option<PathBuf>,
+    pub ground: Option<PathBuf>,
 }
 
 /// A node's process.
@@ -81,7 +89,14 @@ impl Processes {
         let world = WorldHost::open(scenario, WorldConfig::read(&files.world)?, 1.0, port_offset)?;
         let nodes = BTreeMap::new();
         let folder = folder.to_owned();
-        Ok(Self { world, files, folder, logs, nodes, router, port_offset })
+        Ok(Self { world, files, folder, logs, nodes, router, port_offset, programs: Programs::default() })
+    }
+
+    /// The same, of other programs.
+    #[must_use]
+    pub fn running(mut self, programs: Programs) -> Self {
+        self.programs = programs;
+        self
     }
 
     /// Starts the ground station and all agents.
@@ -124,8 +139,8 @@ impl Processes {
             text.lines().map(|line| if listens(&line) { "listen = [\"tcp/127.0.0.1:0\"]" } else { line });
         let double = config.with_extension("double.toml");
         std::fs::write(&double, own.collect::<Vec<_>>().join("\n"))?;
-        let mut command = Command::new(beside("skein-agent")?);
-        command.arg("run").arg("--config").arg(double);
+        let mut command = self.program_of(node)?;
+        command.arg("--config").arg(double);
         Ok(Double { child: spawn(command, &log)?, log })
     }
 
@@ -154,16 +169,25 @@ impl Processes {
         }
     }
 
+    /// The program that a node runs, but for its configuration.
+    fn program_of(&self, node: &NodeName) -> anyhow::Result<Command> {
+        let (own, skeins, verb) = if *node == *GROUND {
+            (&self.programs.ground, "skein-ground", "serve")
+        } else {
+            (&self.programs.agent, "skein-agent", "run")
+        };
+        let mut command = Command::new(own.clone().map_or_else(|| beside(skeins), Ok)?);
+        command.arg(verb);
+        Ok(command)
+    }
+
     /// Starts a node, for the first time or again.
     ///
     /// # Errors
     /// Its program is missing.
     pub fn start_node(&mut self, node: &NodeName) -> anyhow::Result<()> {
-        let config = self.config_of(node)?;
-        let (program, verb) =
-            if *node == *GROUND { ("skein-ground", "serve") } else { ("skein-agent", "run") };
-        let mut command = Command::new(beside(program)?);
-        command.arg(verb).arg("--config").arg(config);
+        let mut command = self.program_of(node)?;
+        command.arg("--config").arg(self.config_of(node)?);
         let child = spawn(command, &self.log_of(node))?;
         self.nodes.insert(node.clone(), Running { child, since: Instant::now() });
         Ok(())

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use serde_json::json;
+use skein_bp::behaviour::Behaviours;
 
 use crate::cli;
 use crate::fly::account;
@@ -15,8 +16,8 @@ use crate::world_host::{WorldConfig, WorldHost};
 ///
 /// # Errors
 /// A fault in the scenario or the configuration; a port that is taken.
-pub fn run(args: &cli::Serve, as_json: bool) -> anyhow::Result<Summary> {
-    let scenario = args.world.open()?;
+pub fn run(args: &cli::Serve, known: &Behaviours, as_json: bool) -> anyhow::Result<Summary> {
+    let scenario = args.world.open(known)?;
     let config = args.config.as_deref().map_or_else(|| Ok(WorldConfig::default()), WorldConfig::read)?;
     let mut world = WorldHost::open(&scenario, config, args.speed, args.port_offset)?;
     let began = Instant::now();

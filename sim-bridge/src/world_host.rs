@@ -5,8 +5,9 @@ use std::path::Path;
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::Context as _;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use skein_agent::Outcome;
+use skein_bp::configuration;
 use skein_dbp::{Message, NodeName, Occurrence};
 use skein_wire::{Fleet, Key, Link as _, MissionState, Payload, Scan, Scene, State};
 use skein_world::{STEP, Simulation};
@@ -30,12 +31,12 @@ const SCENE_PERIOD: Duration = Duration::from_secs(1);
 const MOST_BEHIND: Duration = Duration::from_millis(40);
 
 /// The configuration file of a world; `sim-bridge/world.toml` explains it.
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct WorldConfig {
-    fleet: String,
-    node: String,
-    network: NetworkSettings,
+    pub fleet: String,
+    pub node: String,
+    pub network: NetworkSettings,
 }
 
 impl Default for WorldConfig {
@@ -52,7 +53,7 @@ impl WorldConfig {
     /// The file and the field at fault.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-        let mut config: Self = toml::from_str(&text).with_context(|| path.display().to_string())?;
+        let mut config: Self = configuration::read(&text).with_context(|| path.display().to_string())?;
         config.network = config.network.relative_to(path.parent().unwrap_or(Path::new("")));
         Ok(config)
     }

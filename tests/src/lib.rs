@@ -4,6 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use skein_bp::behaviour::Behaviours;
 use skein_dbp::NodeName;
 use skein_sim::cli::{self, Clock, Controller, Fly, WorldArgs};
 use skein_sim::fly::{self, Happenings, Links, Swarm};
@@ -24,6 +25,8 @@ pub fn flight(scenario: &str, seed: u64) -> Fly {
         headless: true,
         processes: false,
         network: cli::Network::Peer,
+        agent: None,
+        ground: None,
         console: ([127, 0, 0, 1], 0).into(),
         port_offset: 0,
     }
@@ -38,7 +41,7 @@ pub fn flight(scenario: &str, seed: u64) -> Fly {
 pub fn fly(mut flight: Fly) -> Summary {
     let folder = tempfile::tempdir().expect("a folder for the run's files");
     flight.out = Some(folder.path().to_owned());
-    fly::run(&flight).expect("a flight that can be flown")
+    fly::run(&flight, &Behaviours::default()).expect("a flight that can be flown")
 }
 
 /// A swarm in lockstep that a test steps, and the network between its nodes.

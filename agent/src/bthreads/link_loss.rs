@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_dbp::facts::{PEER_JOINED, PEER_LOST};
 use skein_wire::vocabulary::{AIRBORNE, LAND, LANDED, RETURN};
@@ -13,7 +13,8 @@ use crate::{me::Me, precedence};
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// What a vehicle does without its ground station.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum LinkLossPolicy {
     /// Flies its mission to the end.
     #[default]

@@ -1,6 +1,7 @@
 //! The b-threads of a vehicle, one file each. They decide *what* may be done; the pipeline decides *how*.
 //!
-//! Adding a b-thread: write its file, name it in [`load`]. No other b-thread changes.
+//! Adding a b-thread: write its file, name it in [`load`]. No other b-thread changes. One in a crate of one's own is a
+//! [`Behaviour`](skein_bp::behaviour::Behaviour).
 
 mod battery;
 pub mod escape;
@@ -75,4 +76,5 @@ pub fn load_with(program: &mut Program, config: &AgentConfig, right_of_way: impl
     program.add("mission", Mission::new(me.clone(), &config.waypoints));
     program.add("path_planning", PathPlanning::new(me.clone()));
     program.add("navigation", Navigation::new(me));
+    config.behaviours.load(&config.host(), program);
 }

@@ -14,6 +14,7 @@ mod world;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use skein_bp::behaviour::{Model, WORLD};
 use skein_bp::script::{Assignment, Script};
 use skein_bp::verify::{Coverage, Inspection, Progress, Report, Timers, Verifier, View};
 use skein_bp::{BThread, Bid, Event, EventSet, Program, ProgramConfig};
@@ -25,7 +26,7 @@ use skein_wire::vocabulary::{
 pub use self::part::{Part, Place};
 pub use self::requirement::{Requirement, requirements};
 pub use self::scene::Scene;
-use self::scene::{WORLD, World};
+use self::scene::World;
 use crate::bthreads::{self, HOME_LEG, RIGHT_OF_WAY};
 use crate::scripts::{Runner, Scripts};
 use crate::{agent_error::AgentError, config::AgentConfig, me::Me};
@@ -163,7 +164,12 @@ impl VehicleVerifier {
         ];
         let requirements = requirements(&self.me, &self.config.fence).into_iter();
         let held = self.held_by_scripts().map(|(name, event)| goal_of_script(&name, &event));
-        general.into_iter().map(str::to_owned).chain(requirements.map(|r| r.name().to_owned())).chain(held)
+        let mut program = self.program.clone();
+        let mut brought = Model::new(&mut program);
+        self.config.behaviours.model(&self.config.host(), &mut brought);
+        let brought: Vec<String> = brought.rules().iter().map(|rule| rule.to_string()).collect();
+        let requirements = requirements.map(|requirement| requirement.name().to_owned()).chain(brought);
+        general.into_iter().map(str::to_owned).chain(requirements).chain(held)
     }
 
     /// The scenes that are of interest for this program.
@@ -185,6 +191,9 @@ impl VehicleVerifier {
         for requirement in requirements(&self.me, &self.config.fence) {
             program.add(requirement.name(), requirement.clone());
         }
+        let mut model = Model::new(&mut program);
+        self.config.behaviours.model(&self.config.host(), &mut model);
+        let mut outside = model.world().to_vec();
         let facts = self.script_facts();
         let me = self.me.name();
         let other = self.config.roster.iter().find(|node| node.starts_with("uav/") && *node != me);
@@ -194,7 +203,6 @@ impl VehicleVerifier {
             other: other.map(String::as_str),
             script_facts: &facts,
         };
-        let mut outside = Vec::new();
         for (name, part) in scene.parts(&world) {
             let name = program.add(name, part);
             if name.starts_with(WORLD) {
@@ -226,7 +234,8 @@ impl VehicleVerifier {
         let own = |name: &&Arc<str>| !name.starts_with(WORLD) && !name.contains('#');
         let threads: Vec<_> = coverage.bthreads.iter().filter(|(name, _)| own(name)).collect();
         let verbs = vocabulary::verbs().chain(facts::names());
-        let names = verbs.map(|verb| self.me.event(verb).name().to_owned());
+        let brought = self.config.behaviours.event_names(self.me.name());
+        let names = verbs.map(|verb| self.me.event(verb).name().to_owned()).chain(brought);
         let untold = names.filter(|name| !coverage.happened.iter().any(|event| event.name() == name));
         let never_told = untold.filter_map(|name| {
             let waits =

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use skein_bp::Event;
+use skein_bp::behaviour::WORLD;
 
 use super::part::Part;
 use super::world::{self, Disturbed};
@@ -159,9 +160,6 @@ impl Scene {
         }
     }
 }
-
-/// How the names of the b-threads begin that stand for the world.
-pub(super) const WORLD: &str = "world/";
 
 impl std::fmt::Display for Scene {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -1,6 +1,7 @@
 //! The b-threads of the ground station, one file each.
 //!
-//! Adding a b-thread: write its file, name it in [`load`].
+//! Adding a b-thread: write its file, name it in [`load`]. One in a crate of one's own is a
+//! [`Behaviour`](skein_bp::behaviour::Behaviour).
 
 mod delivery;
 pub mod heard;
@@ -23,7 +24,7 @@ pub use script_delivery::ScriptDelivery;
 pub use together::{LAUNCH_LASTS, Together};
 pub use watch::{MissionOutcome, Watch};
 
-use crate::GroundConfig;
+use crate::config::GroundConfig;
 
 /// Loads the ground station's b-threads into its program.
 pub fn load(program: &mut Program, config: &GroundConfig) {
@@ -41,4 +42,5 @@ pub fn load(program: &mut Program, config: &GroundConfig) {
         let scripts = ScriptDelivery::new(ground.clone(), vehicle.clone());
         program.add(ScriptDelivery::name(vehicle), scripts);
     }
+    config.behaviours.load(&config.host(), program);
 }

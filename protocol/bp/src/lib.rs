@@ -31,10 +31,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod behaviour;
 mod bid;
 mod board;
 mod bthread;
 pub mod catalogue;
+pub mod configuration;
 pub mod conformance;
 mod event;
 mod event_set;

@@ -3,7 +3,7 @@
 use std::net::{IpAddr, TcpListener};
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use skein_wire::Fleet;
 
 use crate::error::ZenohError;
@@ -29,7 +29,7 @@ pub struct ZenohConfig {
 ///
 /// Nothing is found by multicast: who is to be reached is named, and peers then tell each other of further ones.
 /// Endpoints are Zenoh's: `tcp/127.0.0.1:7447`, or `tls/192.168.1.4:7447` where [`Security`] is configured.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct NetworkSettings {
     /// How it takes part.
@@ -44,7 +44,7 @@ pub struct NetworkSettings {
 }
 
 /// How a session takes part in the network.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
     /// Talks to every other peer directly; relays nothing. Nobody's loss cuts others off.
@@ -57,7 +57,7 @@ pub enum Mode {
 }
 
 /// Certificates, as PEM files: whoever has one of this authority is a member, and all that travels is encrypted.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Security {
     /// The authority's certificate.

@@ -7,7 +7,7 @@ use super::call_off::{self, CalledOff};
 use super::setup::vehicle_name;
 use super::{account, live};
 use crate::cli::{self, Setup};
-use crate::processes::Processes;
+use crate::processes::{Processes, Programs};
 use crate::scenario::Scenario;
 use crate::summary::Summary;
 use crate::table::{LiveTable, Row};
@@ -24,7 +24,9 @@ pub fn fly(
     mut table: LiveTable<std::io::Stderr>,
 ) -> anyhow::Result<Summary> {
     let setup = Setup { network: args.network, port_offset: args.port_offset, launch_on_order: false };
-    let mut swarm = Processes::start(scenario, out, setup)?;
+    let programs = Programs { agent: args.agent.clone(), ground: args.ground.clone() };
+    let mut swarm = Processes::prepare(scenario, out, setup)?.running(programs);
+    swarm.start_all()?;
     table.note(&format!("console: http://{}", swarm.console()))?;
     let mut table = (!args.headless).then_some(table);
     let began = Instant::now();

@@ -19,6 +19,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use skein_agent::{AgentConfig, Parts};
+use skein_bp::behaviour::Behaviours;
 use skein_ground::{Order, Who};
 use skein_wire::{Fleet, Network, NetworkConfig};
 
@@ -43,8 +44,8 @@ const PATIENCE: u32 = 2;
 ///
 /// # Errors
 /// A fault in the scenario or the output folder; a failed mission is no error but a [`Summary`] that says so.
-pub fn run(args: &cli::Fly) -> anyhow::Result<Summary> {
-    let scenario = args.world.open()?;
+pub fn run(args: &cli::Fly, known: &Behaviours) -> anyhow::Result<Summary> {
+    let scenario = args.world.open(known)?;
     let out = args.out.clone().unwrap_or_else(|| default_folder(&scenario));
     std::fs::create_dir_all(&out).with_context(|| {
         format!("output folder {}: cannot be made; name another with --out", out.display())

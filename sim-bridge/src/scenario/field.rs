@@ -3,11 +3,8 @@
 use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error, Unexpected};
-
-/// A finite number above zero.
-pub fn positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    number(deserializer, "a number above 0", |v| v > 0.0)
-}
+pub use skein_agent::field::{lease_ms, positive};
+use skein_agent::field::{number, within};
 
 /// A finite number of at least zero.
 pub fn non_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
@@ -21,12 +18,7 @@ pub fn share<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error
 
 /// The time that a message takes, in milliseconds.
 pub fn latency_ms<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    number(deserializer, "a number from 0 to 60000", |v| (0.0..=60_000.0).contains(&v))
-}
-
-/// A lease, in milliseconds.
-pub fn lease_ms<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    number(deserializer, "a number from 100 to 10000", |v| (100.0..=10_000.0).contains(&v))
+    within(deserializer, "a number from 0 to 60000", 0.0..=60_000.0)
 }
 
 /// A finite number above zero, where the field is given.
@@ -56,18 +48,6 @@ pub fn ground_points<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<V
 pub fn points<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Vector3<f64>>, D::Error> {
     let values = Vec::<[f64; 3]>::deserialize(deserializer)?;
     values.into_iter().map(|v| finite::<D::Error>(v).map(Vector3::from)).collect()
-}
-
-fn number<'de, D, F>(deserializer: D, expected: &'static str, accept: F) -> Result<f64, D::Error>
-where
-    D: Deserializer<'de>,
-    F: Fn(f64) -> bool,
-{
-    let value = f64::deserialize(deserializer)?;
-    if value.is_finite() && accept(value) {
-        return Ok(value);
-    }
-    Err(D::Error::invalid_value(Unexpected::Float(value), &expected))
 }
 
 /// Passes on coordinates of which each is finite.

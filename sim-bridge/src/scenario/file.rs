@@ -8,6 +8,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 use skein_agent::{AirspaceTable, GlobalPlanner, LocalPlanner, Planners};
+use skein_bp::behaviour::{Behaviours, Settings};
+use skein_bp::configuration::{self, Malformed};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_planning::airspace::Airspace;
 use skein_world::{Aabb, Obstacle, Scene, Shape, VehicleModel, WindConfig};
@@ -81,6 +83,8 @@ struct FileTable {
     order: Vec<OrderTable>,
     #[serde(default)]
     script: Vec<ScriptTable>,
+    #[serde(default)]
+    behaviours: Settings,
     #[serde(default)]
     vehicle: Vec<VehicleTable>,
     #[serde(default)]
@@ -195,21 +199,9 @@ impl ScenarioFile {
     /// # Errors
     /// [`ScenarioError::Malformed`] at the first thing that is not as expected.
     pub fn parse(text: &str, file: &str) -> Result<Self, ScenarioError> {
-        let malformed = |error: &toml::de::Error, field: String| {
-            let (line, column) = line_and_column(text, error.span().map_or(0, |span| span.start));
-            ScenarioError::Malformed {
-                file: file.to_owned(),
-                line,
-                column,
-                field,
-                message: error.message().to_owned(),
-            }
-        };
-        let parser = toml::Deserializer::parse(text).map_err(|e| malformed(&e, String::new()))?;
-        let table = serde_path_to_error::deserialize(parser).map_err(|error| {
-            let field = error.path().to_string();
-            let field = if field == "." { String::new() } else { field };
-            malformed(error.inner(), field)
+        let table = configuration::read(text).map_err(|malformed| {
+            let Malformed { line, column, field, problem: message } = malformed;
+            ScenarioError::Malformed { file: file.to_owned(), line, column, field, message }
         })?;
         Ok(Self { file: file.to_owned(), table })
     }
@@ -220,7 +212,12 @@ impl ScenarioFile {
     }
 
     /// Makes the world and the vehicles' plans; see [`Scenario::validate`] for what is left to check.
-    pub fn build(self, vehicles: Option<usize>, seed: u64) -> Result<Scenario, ScenarioError> {
+    pub fn build(
+        self,
+        vehicles: Option<usize>,
+        seed: u64,
+        known: &Behaviours,
+    ) -> Result<Scenario, ScenarioError> {
         self.check_tables()?;
         let name = self.name();
         let world = self.table.world.as_deref().map(|path| read_world(&self.beside(path))).transpose()?;
@@ -236,6 +233,9 @@ impl ScenarioFile {
         let (scene, notes) = self.scene(&name, layout, world)?;
         let orders = self.orders(count)?;
         let scripts = self.scripts(count)?;
+        let behaviours = known
+            .choose(&self.table.behaviours)
+            .map_err(|error| self.contradiction(error.field, error.problem))?;
         let airspace = self.airspace()?;
         let fixed_bounds = self.fixed_bounds();
         let time_limit_s = self.time_limit_s(count.saturating_sub(self.count(None, set.missions.len())));
@@ -257,6 +257,7 @@ impl ScenarioFile {
             wind: table.wind.map(WindConfig::from).unwrap_or_default(),
             orders,
             scripts,
+            behaviours,
             network: table.network,
             notes,
         };
@@ -579,12 +580,4 @@ fn from_under(PacedRoute { route, pace }: PacedRoute, model: &VehicleModel) -> V
         pace,
         model: model.clone(),
     }
-}
-
-/// Line and column (both from 1, the column in characters) of a byte offset.
-fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
-    let before = text.get(..offset).unwrap_or(text);
-    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-    let column = before.get(line_start..).map_or(0, |line| line.chars().count());
-    (before.matches('\n').count() + 1, column + 1)
 }

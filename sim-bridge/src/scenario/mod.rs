@@ -26,6 +26,7 @@ use clap::Args;
 use nalgebra::Vector3;
 use serde::Deserialize;
 use skein_agent::Planners;
+use skein_bp::behaviour::{Behaviours, Chosen};
 use skein_bp::script::Assignment;
 use skein_mav::Datum;
 use skein_planning::airspace::{Airspace, KeepOut};
@@ -93,6 +94,9 @@ pub struct Scenario {
     pub orders: Vec<Order>,
     /// Scripts that run on vehicles from the start.
     pub scripts: Vec<VehicleScript>,
+    /// The behaviours that are switched on, each on the nodes that it is for.
+    pub behaviours: Chosen,
+    /// The treatment of messages by the network in memory.
     pub network: Network,
     /// Notes for the user: parameters that gave way, parts of files that were not understood.
     pub notes: Vec<String>,
@@ -229,7 +233,18 @@ impl Scenario {
         vehicles: Option<usize>,
         seed: u64,
     ) -> Result<Self, ScenarioError> {
-        let scenario = file::ScenarioFile::parse(text, file)?.build(vehicles, seed)?;
+        Self::of_program(text, file, vehicles, seed, &Behaviours::default())
+    }
+
+    /// The same for a program with these behaviours.
+    fn of_program(
+        text: &str,
+        file: &str,
+        vehicles: Option<usize>,
+        seed: u64,
+        known: &Behaviours,
+    ) -> Result<Self, ScenarioError> {
+        let scenario = file::ScenarioFile::parse(text, file)?.build(vehicles, seed, known)?;
         scenario.validate()?;
         Ok(scenario)
     }
@@ -239,13 +254,26 @@ impl Scenario {
     /// # Errors
     /// Whatever is wrong with any of the files, or with all together.
     pub fn open(name: &str, overrides: &Overrides, seed: u64) -> Result<Self, ScenarioError> {
+        Self::open_with(name, overrides, seed, &Behaviours::default())
+    }
+
+    /// The same for a program with these behaviours.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_with(
+        name: &str,
+        overrides: &Overrides,
+        seed: u64,
+        known: &Behaviours,
+    ) -> Result<Self, ScenarioError> {
         let world = overrides.world.as_deref().map(read_world).transpose()?;
         let datum = world.as_ref().and_then(|(scene, _)| stated_datum(scene));
         let set = mission::read_files(&overrides.missions, datum)?;
         let own_number = || (set.missions.len() > 1).then_some(set.missions.len());
         let vehicles = overrides.vehicles.or_else(own_number);
         let mut scenario = match text_of(name)? {
-            Some(text) => Self::from_toml(&text, name, vehicles, seed)?,
+            Some(text) => Self::of_program(&text, name, vehicles, seed, known)?,
             None => Self::built_in(name, vehicles, seed)?,
         };
         if let Some((scene, warnings)) = world {

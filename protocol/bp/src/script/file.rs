@@ -42,6 +42,7 @@ use crate::script::{Script, ScriptError};
 
 /// The longest name, in letters.
 const MAX_NAME: usize = 32;
+
 /// A script as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

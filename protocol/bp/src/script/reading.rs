@@ -1,29 +1,27 @@
 //! Reading TOML and JSON so that a fault names its line and its field.
 
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 
+use crate::configuration::{self, Malformed};
 use crate::script::fault::{Fault, ScriptFileError};
 
 /// The longest text of a script, in bytes.
 pub const MAX_TEXT: usize = 16 * 1024;
+
 pub(super) fn too_long(length: usize) -> String {
     format!("the script is {length} bytes long: expected at most {MAX_TEXT}")
 }
 
-pub(super) fn from_toml<T: for<'de> Deserialize<'de>>(file: &str, text: &str) -> Result<T, ScriptFileError> {
-    let fault = |error: &toml::de::Error, field: String| ScriptFileError {
-        file: file.to_owned(),
-        line: error
-            .span()
-            .and_then(|span| text.get(..span.start))
-            .map(|before| before.matches('\n').count() + 1),
-        field,
-        problem: error.message().to_owned(),
-    };
+pub(super) fn from_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, ScriptFileError> {
     check_length(file, text)?;
-    let parser = toml::Deserializer::parse(text).map_err(|error| fault(&error, String::new()))?;
-    serde_path_to_error::deserialize(parser).map_err(|error| fault(error.inner(), path(&error)))
+    configuration::read(text).map_err(|Malformed { line, field, problem, .. }| ScriptFileError {
+        file: file.to_owned(),
+        line: Some(line),
+        field,
+        problem,
+    })
 }
 
 pub(super) fn from_json<T: for<'de> Deserialize<'de>>(file: &str, text: &str) -> Result<T, ScriptFileError> {

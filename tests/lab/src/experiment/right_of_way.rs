@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use clap::Args;
 use serde_json::json;
-use skein_agent::{Behaviour, Mind, Parts};
+use skein_agent::{BThreads, Mind, Parts};
 use skein_bp::Event;
 use skein_dbp::{Happened, NodeName};
 use skein_sim::cli::Controller;
@@ -24,7 +24,7 @@ use crate::statistics::mean;
 const RUNS: usize = 20;
 /// Makes the mind that follows a rule.
 type Rule = fn() -> Box<dyn Mind>;
-const RULES: [(Rule, &str); 2] = [(|| Box::new(Behaviour), "confirmed"), (|| Box::new(Naive), "naive")];
+const RULES: [(Rule, &str); 2] = [(|| Box::new(BThreads), "confirmed"), (|| Box::new(Naive), "naive")];
 /// A network that is slow and loses messages: mean latency, milliseconds, and the share lost.
 const SLOW: (f64, f64) = (100.0, 0.2);
 /// Two places nearer than this, per axis, are in one passage, metres.

@@ -5,14 +5,14 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::Context as _;
-use skein_agent::AgentCore;
 use skein_disk::{PromiseStore, ScriptStore, next_incarnation};
 use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
 use skein_wire::{Fleet, Key, Link as _, Payload, Scan};
 use skein_zenoh::{Bell, Complaints, ZenohConfig, ZenohLink, ZenohSession};
 
 use crate::autopilot_link::AutopilotLink;
-use crate::config::{Config, LidarSource};
+use crate::config_file::Config;
+use crate::core::AgentCore;
 
 /// The control loop's period.
 const TICK: Duration = Duration::from_millis(20);
@@ -78,7 +78,7 @@ impl Driver {
         let fleet = Fleet::new(&config.agent.fleet).context("`fleet`")?;
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
         let link = session.link(&config.name)?;
-        let scans = config.lidar.map(|LidarSource { sensor, network }| {
+        let scans = config.lidar.map(|(sensor, network)| {
             let key = Key::to_one::<Scan>(&fleet, sensor, config.name.clone());
             let own = network.map(|network| ZenohSession::open(ZenohConfig::new(fleet.clone(), network)));
             let session = own.transpose()?.unwrap_or_else(|| session.clone());

@@ -1,6 +1,5 @@
-//! `skein-ground`: see `skein-ground --help`.
+//! The program of a ground station: see `skein-ground --help`.
 
-mod config;
 mod explain;
 mod recording;
 mod serve;
@@ -10,12 +9,16 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use serde_json::json;
+use skein_bp::behaviour::Behaviours;
 
-/// Skein's ground station: launches the swarm, shows it in a browser, carries orders to it, records what happens.
+use crate::config_file::Config;
+
+/// The ground station: launches the swarm, shows it in a browser, sends it orders, and records the mission.
 #[derive(Parser)]
 #[command(
     name = "skein-ground",
     version,
+    max_term_width = 80,
     after_help = "Exit codes: 0 done, 1 the mission failed or nothing can be explained, 2 wrong usage or input."
 )]
 struct Cli {
@@ -28,32 +31,33 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Be the ground station, with its console, until Ctrl-C.
+    /// Run the ground station with its console until Ctrl-C.
     Serve {
-        /// The station's configuration; ground/ground.toml explains every field.
+        /// Configuration of the station; ground/ground.toml explains every field.
         #[arg(long, value_name = "FILE")]
         config: PathBuf,
-        /// End when every vehicle's mission is over: exit 0 if all went well, 1 if not.
+        /// End when every vehicle's mission is over: exit 0 if all succeeded, 1 if not.
         #[arg(long)]
         until_over: bool,
     },
-    /// Say why vehicles did what they did, or stood still, in a recorded mission: who requests, who blocks, and what would
+    /// Explain why vehicles of a recorded mission moved or stood still: who requested what, who blocked it, and what would
     /// have to change.
     Explain {
         /// The recording, such as mission.mcap.
         file: PathBuf,
-        /// The moment, in seconds of the mission's time; counted back from the recording's end if negative. The end unless
-        /// given.
+        /// Moment of the mission, in seconds; negative counts back from the end [default: the end].
         #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
         at: Option<f64>,
-        /// The vehicle: its number or its name, such as 3 or uav/3. Unless given, all: a line each, and more of those that
-        /// stand still.
+        /// Number or name of one vehicle, such as 3 or uav/3 [default: all, with details of those that stand still].
         #[arg(long, value_name = "VEHICLE")]
         vehicle: Option<String>,
     },
 }
 
-fn main() -> ExitCode {
+/// Runs the program, with the behaviours that `add` adds to it.
+pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
+    let mut known = Behaviours::default();
+    add(&mut known);
     skein_zenoh::share_threads();
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
@@ -66,7 +70,7 @@ fn main() -> ExitCode {
         .init();
     let cli = Cli::parse();
     let outcome = match &cli.command {
-        Command::Serve { config, until_over } => serve(config, *until_over, cli.json),
+        Command::Serve { config, until_over } => serve(config, &known, *until_over, cli.json),
         Command::Explain { file, at, vehicle } => explain::run(file, *at, vehicle.as_deref(), cli.json),
     };
     match outcome {
@@ -82,8 +86,8 @@ fn main() -> ExitCode {
     }
 }
 
-fn serve(config: &Path, until_over: bool, json: bool) -> anyhow::Result<ExitCode> {
-    let outcome = serve::run(config::Config::read(config)?, until_over)?;
+fn serve(config: &Path, known: &Behaviours, until_over: bool, json: bool) -> anyhow::Result<ExitCode> {
+    let outcome = serve::run(Config::read(config, known)?, until_over)?;
     let failed = outcome.as_ref().map(|outcome| outcome.failed.clone()).unwrap_or_default();
     if json {
         println!(

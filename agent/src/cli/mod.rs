@@ -1,7 +1,5 @@
-//! `skein-agent`: see `skein-agent --help`.
+//! The program of one vehicle: see `skein-agent --help`.
 
-mod autopilot_link;
-mod config;
 mod run;
 mod verify;
 
@@ -9,13 +7,17 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use skein_bp::behaviour::Behaviours;
 
-/// Skein's agent: one vehicle's behavioural program, its navigation, and its autopilot's link.
+use crate::config_file::Config;
+
+/// Flies one vehicle: runs its b-threads, navigates, and talks to its autopilot.
 #[derive(Parser)]
 #[command(
     name = "skein-agent",
     version,
-    after_help = "Exit codes: 0 done, 1 `verify` has found a violation, 2 wrong usage or input."
+    max_term_width = 80,
+    after_help = "Exit codes: 0 done, 1 `verify` found a violation, 2 wrong usage or input."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -24,17 +26,20 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Fly one vehicle until Ctrl-C, which lands it first. A second Ctrl-C ends at once, in the air too.
+    /// Fly the vehicle until Ctrl-C, which lands it first. A second Ctrl-C ends at once, even in the air.
     Run {
-        /// The agent's configuration; agent/agent.toml explains every field.
+        /// Configuration of the agent; agent/agent.toml explains every field.
         #[arg(long, value_name = "FILE")]
         config: PathBuf,
     },
-    /// Look at every run of a vehicle's b-threads, with the world around them abstracted, or of a small network.
+    /// Model-check a vehicle's b-threads against an abstract world, or programs on a small network.
     Verify(verify::Verify),
 }
 
-fn main() -> ExitCode {
+/// Runs the program, with the behaviours that `add` adds to it.
+pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
+    let mut known = Behaviours::default();
+    add(&mut known);
     skein_zenoh::share_threads();
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
@@ -47,9 +52,9 @@ fn main() -> ExitCode {
         .init();
     let done = match Cli::parse().command {
         Command::Run { config } => {
-            config::Config::read(&config).and_then(run::run).map(|()| ExitCode::SUCCESS)
+            Config::read(&config, &known).and_then(run::run).map(|()| ExitCode::SUCCESS)
         }
-        Command::Verify(verify) => verify.run(),
+        Command::Verify(verify) => verify.run(&known),
     };
     match done {
         Ok(code) => code,

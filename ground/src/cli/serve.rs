@@ -6,14 +6,15 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use skein_disk::{PromiseStore, next_incarnation};
-use skein_ground::console::Console;
-use skein_ground::recorder::Level;
-use skein_ground::{GroundCore, MissionOutcome};
 use skein_wire::{Key, Payload, Scene};
 use skein_zenoh::{Complaints, ZenohConfig, ZenohLink, ZenohSession};
 
-use crate::config::Config;
-use crate::recording::Recording;
+use super::recording::Recording;
+use crate::bthreads::MissionOutcome;
+use crate::config_file::Config;
+use crate::console::Console;
+use crate::core::GroundCore;
+use crate::recorder::Level;
 
 /// The station goes on at least this often, and at once when a message or an order has come.
 const TICK: Duration = Duration::from_millis(20);

@@ -5,11 +5,14 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context as _;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
+use skein_bp::behaviour::{Behaviours, Settings};
+use skein_bp::configuration;
 use skein_dbp::{Authority, NodeName};
-use skein_ground::GroundConfig;
 use skein_wire::{Fleet, standard_authority};
 use skein_zenoh::NetworkSettings;
+
+use crate::config::GroundConfig;
 
 /// Everything that the station must know, checked.
 pub struct Config {
@@ -20,32 +23,40 @@ pub struct Config {
     pub state: PathBuf,
 }
 
-#[derive(Deserialize)]
+/// The example, with an explanation of every field.
+pub const EXAMPLE: &str = include_str!("../ground.toml");
+
+/// The file, field by field. What is never written keeps its default in files that are made.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File {
-    fleet: String,
-    node: String,
-    vehicles: Vec<String>,
+pub struct GroundFile {
+    pub fleet: String,
+    pub node: String,
+    pub vehicles: Vec<String>,
     #[serde(default = "operators")]
-    operators: Vec<String>,
-    launch: Launch,
+    pub operators: Vec<String>,
+    pub launch: Launch,
     #[serde(default)]
-    muster: bool,
+    pub muster: bool,
     #[serde(default = "console")]
-    console: SocketAddr,
+    pub console: SocketAddr,
     #[serde(default = "record")]
-    record: PathBuf,
-    #[serde(default = "state")]
+    pub record: PathBuf,
+    #[serde(default = "state", skip_serializing)]
     state: PathBuf,
-    #[serde(default = "lease_ms")]
+    #[serde(default = "lease_ms", skip_serializing)]
     lease_ms: u64,
-    network: NetworkSettings,
+    #[serde(default, skip_serializing_if = "Settings::is_empty")]
+    pub behaviours: Settings,
+    pub network: NetworkSettings,
+    #[serde(skip_serializing)]
     authority: Option<Authority>,
 }
 
-#[derive(Deserialize, PartialEq)]
+/// When the swarm takes off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum Launch {
+pub enum Launch {
     AtStart,
     OnOrder,
 }
@@ -71,17 +82,44 @@ fn lease_ms() -> u64 {
 }
 
 impl Config {
-    /// Reads and checks a configuration file.
-    pub fn read(path: &Path) -> anyhow::Result<Self> {
+    /// Reads and checks a configuration file for a program with these behaviours.
+    ///
+    /// # Errors
+    /// The file, and the field at fault.
+    pub fn read(path: &Path, known: &Behaviours) -> anyhow::Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let file: File = toml::from_str(&text).with_context(|| path.display().to_string())?;
-        file.check(folder).with_context(|| path.display().to_string())
+        Self::parse(&text, folder, known).with_context(|| path.display().to_string())
+    }
+
+    fn parse(text: &str, folder: &Path, known: &Behaviours) -> anyhow::Result<Self> {
+        configuration::read::<GroundFile>(text)?.check(folder, known)
     }
 }
 
-impl File {
-    fn check(self, folder: &Path) -> anyhow::Result<Config> {
+impl GroundFile {
+    /// The file of a station with this configuration.
+    #[must_use]
+    pub fn of(station: &GroundConfig, console: SocketAddr, network: NetworkSettings) -> Self {
+        let names = |nodes: &[NodeName]| nodes.iter().map(NodeName::to_string).collect();
+        Self {
+            fleet: station.fleet.to_string(),
+            node: station.name.to_string(),
+            vehicles: names(&station.vehicles),
+            operators: names(&station.operators),
+            launch: if station.launch_on_order { Launch::OnOrder } else { Launch::AtStart },
+            muster: station.muster,
+            console,
+            record: record(),
+            state: state(),
+            lease_ms: lease_ms(),
+            behaviours: station.behaviours.settings(station.name.as_str()),
+            network,
+            authority: None,
+        }
+    }
+
+    fn check(self, folder: &Path, known: &Behaviours) -> anyhow::Result<Config> {
         let name = |field: &str, text: &str| NodeName::new(text).with_context(|| format!("`{field}`"));
         let vehicles =
             self.vehicles.iter().map(|vehicle| name("vehicles", vehicle)).collect::<Result<Vec<_>, _>>()?;
@@ -100,6 +138,7 @@ impl File {
             launch_on_order: self.launch == Launch::OnOrder,
             muster: self.muster,
             operators,
+            behaviours: known.choose_for(&self.node, &self.behaviours)?,
             lease: Duration::from_millis(self.lease_ms),
             authority: self.authority.unwrap_or_else(standard_authority),
             ..GroundConfig::new(fleet, node, vehicles)
@@ -118,10 +157,8 @@ impl File {
 mod tests {
     use super::*;
 
-    const EXAMPLE: &str = include_str!("../../../ground.toml");
-
     fn check(text: &str) -> anyhow::Result<Config> {
-        toml::from_str::<File>(text)?.check(Path::new("/etc/skein"))
+        Config::parse(text, Path::new("/etc/skein"), &Behaviours::default())
     }
 
     #[test]
@@ -144,6 +181,16 @@ mod tests {
     }
 
     #[test]
+    fn what_is_written_is_what_was_read() {
+        let config = check(EXAMPLE).unwrap();
+        let file = GroundFile::of(&config.station, config.console, config.network);
+        let again = check(&toml::to_string(&file).unwrap()).unwrap().station;
+        assert_eq!((again.name, again.vehicles), (config.station.name, config.station.vehicles));
+        assert!(again.launch_on_order && !again.muster);
+        assert_eq!(again.operators, config.station.operators);
+    }
+
+    #[test]
     fn faults_are_named() {
         for (from, to, fault) in [
             ("\"uav/1\", \"uav/2\"", "", "`vehicles` is empty"),
@@ -153,6 +200,7 @@ mod tests {
             ("fleet = \"demo\"", "fleet = \"a b\"", "`fleet`"),
             ("#lease_ms = 1000", "lease_ms = 1", "`lease_ms` is 1"),
             ("#muster = false", "mustard = true", "unknown field `mustard`"),
+            ("[network]", "[behaviours]\nwell = {}\n[network]", "`behaviours.well`"),
         ] {
             let text = EXAMPLE.replace(from, to);
             assert_ne!(text, EXAMPLE, "{from} is not in the example");

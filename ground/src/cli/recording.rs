@@ -6,10 +6,11 @@ use std::time::Duration;
 use anyhow::Context as _;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use skein_dbp::Happened;
-use skein_ground::GroundCore;
-use skein_ground::recorder::{Level, Recorder, RecorderError};
 use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
 use skein_wire::{Scene, State};
+
+use crate::core::GroundCore;
+use crate::recorder::{Level, Recorder, RecorderError};
 
 /// Planned paths are recorded this often.
 const PATH_PERIOD: Duration = Duration::from_millis(500);

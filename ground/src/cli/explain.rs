@@ -7,7 +7,8 @@ use std::time::Duration;
 use anyhow::Context as _;
 use serde_json::json;
 use skein_dbp::NodeName;
-use skein_ground::explain::{Evidence, Explanation, Recorded, explain};
+
+use crate::explain::{Evidence, Explanation, Recorded, explain};
 
 /// Explains one vehicle, or all of them, `at_s` seconds into the mission. Exits with 1 when there is nothing to explain.
 pub fn run(file: &Path, at_s: Option<f64>, vehicle: Option<&str>, json: bool) -> anyhow::Result<ExitCode> {

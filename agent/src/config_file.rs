@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context as _, ensure};
-use serde::Deserialize;
-use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AgentConfig, AirspaceTable, Envelope, Fence, GlobalPlanner, LocalPlanner, Planners};
+use serde::{Deserialize, Deserializer, Serialize};
+use skein_bp::behaviour::{Behaviours, Settings};
+use skein_bp::configuration;
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
@@ -15,152 +15,106 @@ use skein_planning::airspace::{Airspace, KeepOut};
 use skein_wire::{NodeName, standard_authority};
 use skein_zenoh::NetworkSettings;
 
+use crate::airspace_table::AirspaceTable;
 use crate::autopilot_link::Address;
+use crate::bthreads::LinkLossPolicy;
+use crate::config::{AgentConfig, Envelope, Fence, Planners};
+use crate::field;
 
-/// Everything that the agent must know, checked.
-pub struct Config {
-    pub agent: AgentConfig,
-    pub name: NodeName,
-    pub autopilot: Address,
-    pub lidar: Option<LidarSource>,
+/// The file, field by field. What is never written keeps its default in files that are made.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AgentFile {
+    pub fleet: String,
+    pub node: String,
+    pub ground: String,
+    pub roster: Vec<String>,
+    #[serde(default = "state", skip_serializing)]
+    state: PathBuf,
+    #[serde(default = "lease_ms", skip_serializing, deserialize_with = "field::lease_ms")]
+    lease_ms: f64,
+    #[serde(default)]
+    pub seed: u64,
+    pub autopilot: Autopilot,
+    pub lidar: Option<Lidar>,
+    pub datum: DatumTable,
+    pub mission: Mission,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub script: Vec<ScriptEntry>,
+    #[serde(default, skip_serializing_if = "Settings::is_empty")]
+    pub behaviours: Settings,
+    pub fence: Fence,
+    #[serde(default)]
+    pub airspace: AirspaceTable,
+    #[serde(default)]
+    pub envelope: Envelope,
+    #[serde(default)]
+    pub planners: Planners,
     pub network: NetworkSettings,
-    pub state: PathBuf,
+    #[serde(skip_serializing)]
+    authority: Option<Authority>,
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Autopilot {
+    pub link: Address,
+    pub system_id: u8,
+    #[serde(default, skip_serializing)]
+    pub cable_is_private: bool,
 }
 
 /// Where the lidar's scans come from.
-pub struct LidarSource {
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lidar {
     /// The node that reads it.
-    pub sensor: NodeName,
+    pub sensor: String,
     /// A way of its own, if it has one.
     pub network: Option<NetworkSettings>,
 }
 
-#[derive(Deserialize)]
+/// A [`Datum`] in degrees.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File {
-    fleet: String,
-    node: String,
-    ground: String,
-    roster: Vec<String>,
-    #[serde(default = "state")]
-    state: PathBuf,
-    #[serde(default = "lease_ms")]
-    lease_ms: u64,
-    #[serde(default)]
-    seed: u64,
-    autopilot: Autopilot,
-    lidar: Option<Lidar>,
-    datum: DatumTable,
-    mission: Mission,
-    #[serde(default)]
-    script: Vec<ScriptTable>,
-    fence: FenceTable,
-    #[serde(default)]
-    airspace: AirspaceTable,
-    #[serde(default)]
-    envelope: EnvelopeTable,
-    #[serde(default)]
-    planners: PlannersTable,
-    network: NetworkSettings,
-    authority: Option<Authority>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Autopilot {
-    link: String,
-    system_id: u8,
-    #[serde(default)]
-    cable_is_private: bool,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Lidar {
-    sensor: String,
-    network: Option<NetworkSettings>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct DatumTable {
+pub struct DatumTable {
+    #[serde(deserialize_with = "latitude_deg")]
     latitude_deg: f64,
+    #[serde(deserialize_with = "longitude_deg")]
     longitude_deg: f64,
+    #[serde(deserialize_with = "field::finite")]
     height_m: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Mission {
-    home: [f64; 3],
-    waypoints: Vec<[f64; 3]>,
-    #[serde(default = "takeoff_height_m")]
-    takeoff_height_m: f64,
-    #[serde(default = "return_altitude_m")]
-    return_altitude_m: f64,
+pub struct Mission {
+    pub home: [f64; 3],
+    pub waypoints: Vec<[f64; 3]>,
+    #[serde(default = "takeoff_height_m", deserialize_with = "field::positive")]
+    pub takeoff_height_m: f64,
+    #[serde(default = "return_altitude_m", deserialize_with = "field::positive")]
+    pub return_altitude_m: f64,
     #[serde(default)]
-    without_ground: WithoutGround,
+    pub without_ground: LinkLossPolicy,
 }
 
-#[derive(Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct ScriptTable {
-    file: PathBuf,
+pub struct ScriptEntry {
+    pub file: PathBuf,
     #[serde(default)]
-    with: BTreeMap<String, Argument>,
+    pub with: BTreeMap<String, Argument>,
     #[serde(rename = "as")]
-    called: Option<String>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum WithoutGround {
-    #[default]
-    Continue,
-    Return,
-    Land,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FenceTable {
-    min: [f64; 3],
-    max: [f64; 3],
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct EnvelopeTable {
-    cruise_m_s: f64,
-    climb_m_s: f64,
-    brake_m_s2: f64,
-    latency_s: f64,
-    hull_m: f64,
-    margin_m: f64,
-    separation_m: f64,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct PlannersTable {
-    global: GlobalPlanner,
-    local: LocalPlanner,
-}
-
-impl Default for EnvelopeTable {
-    fn default() -> Self {
-        let Envelope { cruise_m_s, climb_m_s, brake_m_s2, latency_s, hull_m, margin_m, separation_m } =
-            Envelope::default();
-        Self { cruise_m_s, climb_m_s, brake_m_s2, latency_s, hull_m, margin_m, separation_m }
-    }
+    pub called: Option<String>,
 }
 
 fn state() -> PathBuf {
     "state".into()
 }
 
-fn lease_ms() -> u64 {
-    1000
+fn lease_ms() -> f64 {
+    1000.0
 }
 
 fn takeoff_height_m() -> f64 {
@@ -171,78 +125,135 @@ fn return_altitude_m() -> f64 {
     4.0
 }
 
+fn latitude_deg<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    field::within(deserializer, "-89 to 89", -89.0..=89.0)
+}
+
+fn longitude_deg<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    field::within(deserializer, "-180 to 180", -180.0..=180.0)
+}
+
+/// Everything that the agent must know, checked.
+pub struct Config {
+    pub agent: AgentConfig,
+    pub name: NodeName,
+    pub autopilot: Address,
+    /// The node that reads the lidar, and the way of its scans if they have one of their own.
+    pub lidar: Option<(NodeName, Option<NetworkSettings>)>,
+    pub network: NetworkSettings,
+    pub state: PathBuf,
+}
+
+/// The example, with an explanation of every field.
+pub const EXAMPLE: &str = include_str!("../agent.toml");
+
 impl Config {
-    /// Reads and checks a configuration file.
-    pub fn read(path: &Path) -> anyhow::Result<Self> {
+    /// Reads and checks a configuration file for a program with these behaviours.
+    ///
+    /// # Errors
+    /// The file, and the field at fault.
+    pub fn read(path: &Path, known: &Behaviours) -> anyhow::Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        Self::parse(&text, folder).with_context(|| path.display().to_string())
+        Self::parse(&text, folder, known).with_context(|| path.display().to_string())
     }
 
     /// The configuration that `agent/agent.toml` shows.
+    ///
+    /// # Errors
+    /// None: it is sound.
     pub fn example() -> anyhow::Result<Self> {
-        Self::parse(EXAMPLE, Path::new("")).context("agent/agent.toml")
+        Self::parse(EXAMPLE, Path::new(""), &Behaviours::default()).context("agent/agent.toml")
     }
 
-    fn parse(text: &str, folder: &Path) -> anyhow::Result<Self> {
-        toml::from_str::<File>(text)?.check(folder)
+    fn parse(text: &str, folder: &Path, known: &Behaviours) -> anyhow::Result<Self> {
+        configuration::read::<AgentFile>(text)?.check(folder, known)
     }
 }
 
-const EXAMPLE: &str = include_str!("../../../agent.toml");
+impl AgentFile {
+    /// The file of a vehicle whose autopilot and lidar are reached in these ways. The files of its scripts are still to be
+    /// named.
+    #[must_use]
+    pub fn of(agent: &AgentConfig, link: Address, sensor: &str, network: NetworkSettings) -> Self {
+        Self {
+            fleet: agent.fleet.clone(),
+            node: agent.node.clone(),
+            ground: agent.ground.clone(),
+            roster: agent.roster.clone(),
+            state: state(),
+            lease_ms: lease_ms(),
+            // TOML has no greater number.
+            seed: agent.seed.min(i64::MAX.unsigned_abs()),
+            autopilot: Autopilot { link, system_id: agent.system_id, cable_is_private: false },
+            lidar: agent.lidar.then(|| Lidar { sensor: sensor.to_owned(), network: None }),
+            datum: agent.datum.into(),
+            mission: Mission {
+                home: agent.home,
+                waypoints: agent.waypoints.clone(),
+                takeoff_height_m: agent.takeoff_height_m,
+                return_altitude_m: agent.return_altitude_m,
+                without_ground: agent.link_loss,
+            },
+            script: Vec::new(),
+            behaviours: agent.behaviours.settings(&agent.node),
+            fence: agent.fence,
+            airspace: AirspaceTable::of(&agent.airspace),
+            envelope: agent.envelope,
+            planners: agent.planners,
+            network,
+            authority: None,
+        }
+    }
 
-impl File {
-    fn check(self, folder: &Path) -> anyhow::Result<Config> {
+    fn check(self, folder: &Path, known: &Behaviours) -> anyhow::Result<Config> {
         let name = NodeName::new(&self.node).context("`node`")?;
         ensure!(self.roster.contains(&self.node), "`roster` lacks this vehicle, {name}");
         ensure!(self.roster.contains(&self.ground), "`roster` lacks the ground station, {}", self.ground);
-        ensure!(
-            (100..=10_000).contains(&self.lease_ms),
-            "`lease_ms` is {}: expected 100 to 10000",
-            self.lease_ms
-        );
         ensure!(self.autopilot.system_id > 0, "`autopilot.system_id` is 0: expected 1 to 255");
-        let autopilot: Address = self.autopilot.link.parse().context("`autopilot.link`")?;
-        autopilot.check(self.autopilot.cable_is_private).context("`autopilot.link`")?;
+        self.autopilot.link.check(self.autopilot.cable_is_private).context("`autopilot.link`")?;
         let lidar = self.lidar.map(|lidar| lidar.check(folder)).transpose()?;
-        let fence = Fence { min: self.fence.min, max: self.fence.max };
-        self.mission.check(&fence)?;
+        self.mission.check(&self.fence)?;
         let airspace = self.airspace.check()?;
         self.mission.check_zones(&airspace)?;
         let agent = AgentConfig {
+            behaviours: known.choose_for(&self.node, &self.behaviours)?,
             fleet: self.fleet,
             node: self.node,
             ground: self.ground,
             roster: self.roster,
             incarnation: 0,
             system_id: self.autopilot.system_id,
-            datum: self.datum.check()?,
+            datum: self.datum.into(),
             home: self.mission.home,
             waypoints: self.mission.waypoints,
             takeoff_height_m: self.mission.takeoff_height_m,
             return_altitude_m: self.mission.return_altitude_m,
             lidar: lidar.is_some(),
-            fence,
+            fence: self.fence,
             airspace,
-            envelope: self.envelope.check()?,
-            planners: Planners { global: self.planners.global, local: self.planners.local },
-            link_loss: match self.mission.without_ground {
-                WithoutGround::Continue => LinkLossPolicy::Continue,
-                WithoutGround::Return => LinkLossPolicy::Return,
-                WithoutGround::Land => LinkLossPolicy::Land,
-            },
+            envelope: self.envelope,
+            planners: self.planners,
+            link_loss: self.mission.without_ground,
             scripts: self.script.iter().map(|script| script.read(folder)).collect::<anyhow::Result<_>>()?,
-            lease: Duration::from_millis(self.lease_ms),
+            lease: Duration::from_secs_f64(self.lease_ms / 1000.0),
             authority: self.authority.unwrap_or_else(standard_authority),
             kept: Kept::default(),
             seed: self.seed,
         };
         let network = self.network.relative_to(folder);
-        Ok(Config { agent, name, autopilot, lidar, network, state: folder.join(self.state) })
+        Ok(Config {
+            agent,
+            name,
+            autopilot: self.autopilot.link,
+            lidar,
+            network,
+            state: folder.join(self.state),
+        })
     }
 }
 
-impl ScriptTable {
+impl ScriptEntry {
     fn read(&self, folder: &Path) -> anyhow::Result<Assignment> {
         let path = folder.join(&self.file);
         let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
@@ -252,9 +263,9 @@ impl ScriptTable {
 }
 
 impl Lidar {
-    fn check(self, folder: &Path) -> anyhow::Result<LidarSource> {
+    fn check(self, folder: &Path) -> anyhow::Result<(NodeName, Option<NetworkSettings>)> {
         let sensor = NodeName::new(&self.sensor).context("`lidar.sensor`")?;
-        Ok(LidarSource { sensor, network: self.network.map(|network| network.relative_to(folder)) })
+        Ok((sensor, self.network.map(|network| network.relative_to(folder))))
     }
 }
 
@@ -282,8 +293,6 @@ impl Mission {
             ensure!(inside(*point), "`mission.waypoints`: number {number}, {point:?}, is outside the fence");
         }
         ensure!(inside(self.home), "`mission.home`, {:?}, is outside the fence", self.home);
-        positive("mission.takeoff_height_m", self.takeoff_height_m)?;
-        positive("mission.return_altitude_m", self.return_altitude_m)?;
         let [x, y, z] = self.home;
         for (field, height_m) in
             [("takeoff_height_m", z + self.takeoff_height_m), ("return_altitude_m", self.return_altitude_m)]
@@ -309,39 +318,20 @@ impl Mission {
     }
 }
 
-impl DatumTable {
-    fn check(&self) -> anyhow::Result<Datum> {
-        let Self { latitude_deg, longitude_deg, height_m } = *self;
-        ensure!(
-            (-89.0..=89.0).contains(&latitude_deg),
-            "`datum.latitude_deg` is {latitude_deg}: expected -89 to 89"
-        );
-        ensure!(
-            (-180.0..=180.0).contains(&longitude_deg),
-            "`datum.longitude_deg` is {longitude_deg}: expected -180 to 180"
-        );
-        ensure!(height_m.is_finite(), "`datum.height_m` is {height_m}: expected a number");
-        Ok(Datum::from_degrees(latitude_deg, longitude_deg, height_m))
+impl From<Datum> for DatumTable {
+    fn from(datum: Datum) -> Self {
+        Self {
+            latitude_deg: datum.latitude_rad.to_degrees(),
+            longitude_deg: datum.longitude_rad.to_degrees(),
+            height_m: datum.height_m,
+        }
     }
 }
 
-impl EnvelopeTable {
-    fn check(&self) -> anyhow::Result<Envelope> {
-        Ok(Envelope {
-            cruise_m_s: positive("envelope.cruise_m_s", self.cruise_m_s)?,
-            climb_m_s: positive("envelope.climb_m_s", self.climb_m_s)?,
-            brake_m_s2: positive("envelope.brake_m_s2", self.brake_m_s2)?,
-            latency_s: positive("envelope.latency_s", self.latency_s)?,
-            hull_m: positive("envelope.hull_m", self.hull_m)?,
-            margin_m: positive("envelope.margin_m", self.margin_m)?,
-            separation_m: positive("envelope.separation_m", self.separation_m)?,
-        })
+impl From<DatumTable> for Datum {
+    fn from(table: DatumTable) -> Self {
+        Self::from_degrees(table.latitude_deg, table.longitude_deg, table.height_m)
     }
-}
-
-fn positive(field: &str, number: f64) -> anyhow::Result<f64> {
-    ensure!(number.is_finite() && number > 0.0, "`{field}` is {number}: expected a number above 0");
-    Ok(number)
 }
 
 #[cfg(test)]
@@ -349,7 +339,7 @@ mod tests {
     use super::*;
 
     fn check(text: &str) -> anyhow::Result<Config> {
-        Config::parse(text, Path::new("/etc/skein"))
+        Config::parse(text, Path::new("/etc/skein"), &Behaviours::default())
     }
 
     #[test]
@@ -365,6 +355,15 @@ mod tests {
         assert_eq!(full.agent, config.agent);
         assert_eq!(full.network.listen, config.network.listen);
         assert!(full.network.security.is_some());
+    }
+
+    #[test]
+    fn what_is_written_is_what_was_read() {
+        let config = check(EXAMPLE).unwrap();
+        let file = AgentFile::of(&config.agent, config.autopilot, "sim/world", config.network);
+        let again = check(&toml::to_string(&file).unwrap()).unwrap();
+        assert_eq!(again.agent, config.agent);
+        assert_eq!(again.lidar.unwrap().0.as_str(), "sim/world");
     }
 
     #[test]
@@ -391,6 +390,7 @@ mod tests {
             ("#cruise_m_s = 3.0", "cruise_m_s = -1.0", "`envelope.cruise_m_s`"),
             ("#cruise_m_s = 3.0", "cruise = 3.0", "unknown field `cruise`"),
             ("\"sim/world\"", "\"world\"", "`lidar.sensor`"),
+            ("[fence]", "[behaviours]\nwell = {}\n[fence]", "`behaviours.well`"),
         ] {
             let text = EXAMPLE.replace(from, to);
             assert_ne!(text, EXAMPLE, "{from} is not in the example");

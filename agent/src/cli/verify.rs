@@ -8,15 +8,17 @@ use std::time::Instant;
 
 use anyhow::{Context as _, bail, ensure};
 use serde_json::{Value, json};
-use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::verify::{NotCovered, Scene, SceneReport, VehicleVerifier};
-use skein_agent::{AgentConfig, AgentError};
+use skein_bp::behaviour::Behaviours;
 use skein_bp::script::{Argument, Assignment, ParameterKind, ScriptFile};
 use skein_bp::verify::{Progress, Report, Violation};
 use skein_dbp::verify::programs::{self, Network};
 use skein_dbp::verify::{Faults, MoveCounts};
 
-use crate::config::Config;
+use crate::bthreads::LinkLossPolicy;
+use crate::config::AgentConfig;
+use crate::config_file::Config;
+use crate::agent_error::AgentError;
+use crate::verify::{NotCovered, Scene, SceneReport, VehicleVerifier};
 
 /// States of a scene that are looked at unless told otherwise.
 const STATES_OF_SCENE: usize = 1_000_000;
@@ -36,36 +38,36 @@ const LOOKED_FOR: [&str; 4] = [
 /// The arguments of `skein-agent verify`.
 #[derive(clap::Args)]
 pub struct Verify {
-    /// The vehicle's configuration; the one in agent/agent.toml, with a return when the ground is lost, unless given.
+    /// Configuration of the vehicle [default: agent/agent.toml, returning home when the ground station is lost].
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// A script that runs besides. Parameters without a default are given values that fit.
+    /// Run this script too; parameters without a default get values that fit.
     #[arg(long, value_name = "FILE")]
     script: Vec<PathBuf>,
-    /// Only this scene; may be given more than once.
+    /// Check this scene only; may be repeated.
     #[arg(long, value_name = "NAME")]
     scene: Vec<String>,
-    /// Instead of a vehicle: programs on up to three nodes, all or the one of this name.
+    /// Check programs on networks of up to three nodes instead: all, or the one of this name.
     #[arg(long, value_name = "NAME", num_args = 0..=1, conflicts_with_all = ["config", "script", "scene", "dot"])]
     network: Option<Option<String>>,
-    /// Look at no more states of each scene or network; 0: at all, whatever it takes.
+    /// Explore at most N states of each scene or network; 0 explores all.
     #[arg(long, value_name = "N")]
     states: Option<usize>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
-    /// Draw the states of one scene, for Graphviz, instead of judging them.
+    /// Write the state graph of one scene for Graphviz instead of checking it.
     #[arg(long, value_name = "FILE", requires = "scene")]
     dot: Option<PathBuf>,
 }
 
 impl Verify {
     /// Verifies, prints what was found, and says whether all is well.
-    pub fn run(self) -> anyhow::Result<ExitCode> {
+    pub fn run(self, known: &Behaviours) -> anyhow::Result<ExitCode> {
         let is_well = match (&self.network, &self.dot) {
             (Some(name), _) => self.networks(name.as_deref())?,
-            (None, Some(file)) => self.draw(file)?,
-            (None, None) => self.vehicle()?,
+            (None, Some(file)) => self.draw(file, known)?,
+            (None, None) => self.vehicle(known)?,
         };
         Ok(if is_well { ExitCode::SUCCESS } else { ExitCode::from(1) })
     }
@@ -78,9 +80,13 @@ impl Verify {
     }
 
     /// Of the vehicle with its scripts; why not, if one of these is refused.
-    fn verifier(&self, unless_told: usize) -> anyhow::Result<Result<VehicleVerifier, String>> {
+    fn verifier(
+        &self,
+        unless_told: usize,
+        known: &Behaviours,
+    ) -> anyhow::Result<Result<VehicleVerifier, String>> {
         let mut config = match &self.config {
-            Some(path) => Config::read(path)?.agent,
+            Some(path) => Config::read(path, known)?.agent,
             None => AgentConfig { link_loss: LinkLossPolicy::Return, ..Config::example()?.agent },
         };
         for path in &self.script {
@@ -115,8 +121,8 @@ impl Verify {
         self.scene.iter().map(named).collect()
     }
 
-    fn vehicle(&self) -> anyhow::Result<bool> {
-        let verifier = match self.verifier(STATES_OF_SCENE)? {
+    fn vehicle(&self, known: &Behaviours) -> anyhow::Result<bool> {
+        let verifier = match self.verifier(STATES_OF_SCENE, known)? {
             Ok(verifier) => verifier,
             Err(why) => {
                 self.tell_refusal(&why);
@@ -153,8 +159,8 @@ impl Verify {
         Ok(is_well)
     }
 
-    fn draw(&self, file: &Path) -> anyhow::Result<bool> {
-        let verifier = match self.verifier(STATES_DRAWN)? {
+    fn draw(&self, file: &Path, known: &Behaviours) -> anyhow::Result<bool> {
+        let verifier = match self.verifier(STATES_DRAWN, known)? {
             Ok(verifier) => verifier,
             Err(why) => {
                 self.tell_refusal(&why);

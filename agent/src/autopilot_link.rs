@@ -7,6 +7,7 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, bail, ensure};
+use serde::{Deserialize, Serialize};
 use serialport::SerialPort;
 
 /// A link that is broken, or cannot be opened yet, is tried again this often.
@@ -21,7 +22,8 @@ const BUFFER: usize = 8192;
 const MOST_AT_ONCE: usize = 4096;
 
 /// Where the autopilot is, as the configuration says it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub enum Address {
     /// Listens here and answers whoever speaks.
     UdpIn(SocketAddr),
@@ -55,8 +57,25 @@ impl FromStr for Address {
     }
 }
 
+impl TryFrom<String> for Address {
+    type Error = anyhow::Error;
+
+    fn try_from(text: String) -> anyhow::Result<Self> {
+        text.parse()
+    }
+}
+
+impl From<Address> for String {
+    fn from(address: Address) -> Self {
+        address.to_string()
+    }
+}
+
 impl Address {
     /// Refuses what other computers could speak to, unless the cable is private.
+    ///
+    /// # Errors
+    /// It is such an address.
     pub fn check(&self, cable_is_private: bool) -> anyhow::Result<()> {
         let ip: IpAddr = match self {
             Self::UdpIn(address) | Self::UdpOut(address) | Self::Tcp(address) => address.ip(),

@@ -1,0 +1,72 @@
+//! What a ground station must know.
+
+use std::time::Duration;
+
+use skein_bp::behaviour::{Chosen, Host};
+use skein_dbp::{Authority, Kept, NodeName};
+use skein_wire::{Fleet, standard_authority};
+
+use crate::order::Order;
+
+/// The configuration of a ground station.
+#[derive(Clone, Debug)]
+pub struct GroundConfig {
+    pub fleet: Fleet,
+    /// The station's node name, such as `ground/main`.
+    pub name: NodeName,
+    /// The vehicles, in the order in which they take off.
+    pub vehicles: Vec<NodeName>,
+    /// Operators' scripts that may speak to the station too; nobody misses one that is not there.
+    pub operators: Vec<NodeName>,
+    /// A number that grows with every start of this node.
+    pub incarnation: u64,
+    /// Orders known in advance, each with its time.
+    pub orders: Vec<(Duration, Order)>,
+    /// Whether the b-threads are loaded; without them the station listens and asks for nothing.
+    pub loaded: bool,
+    /// Whether the swarm takes off when an operator orders it, and not as soon as it is there.
+    pub launch_on_order: bool,
+    /// Whether nobody sets out before everybody is in the air.
+    pub muster: bool,
+    /// The behaviours that are switched on; those for other nodes count for nothing.
+    pub behaviours: Chosen,
+    /// Lease of the station's bids.
+    pub lease: Duration,
+    /// Who of the others may request and block what here.
+    pub authority: Authority,
+    /// What a former life of this station has kept: joint decisions, and a roster that an operator has given.
+    pub kept: Kept,
+    /// Seed of the program's tie-breaks.
+    pub seed: u64,
+}
+
+impl GroundConfig {
+    /// The station `name`, in its first incarnation, with the usual lease and nothing ordered yet.
+    #[must_use]
+    pub fn new(fleet: Fleet, name: NodeName, vehicles: Vec<NodeName>) -> Self {
+        let lease = Duration::from_secs(1);
+        Self {
+            fleet,
+            name,
+            vehicles,
+            operators: Vec::new(),
+            incarnation: 1,
+            orders: Vec::new(),
+            loaded: true,
+            launch_on_order: false,
+            muster: false,
+            behaviours: Chosen::default(),
+            lease,
+            authority: standard_authority(),
+            kept: Kept::default(),
+            seed: 0,
+        }
+    }
+
+    /// The station as its behaviours see it.
+    #[must_use]
+    pub fn host(&self) -> Host<'_> {
+        let roster = self.vehicles.iter().chain([&self.name]).chain(&self.operators);
+        Host { node: self.name.as_str(), roster: roster.map(NodeName::as_str).collect() }
+    }
+}

@@ -1,0 +1,111 @@
+//! The program that flies swarms on one host: see `skein-sim --help`.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::Parser as _;
+use serde_json::json;
+use skein_bp::behaviour::Behaviours;
+
+use crate::cli::{Cli, Command, Exit};
+use crate::scenario::{Scenario, ScenarioError};
+use crate::summary::Summary;
+use crate::{check, fly};
+
+/// Runs the program, with the behaviours that `add` adds to it: vehicles' and ground stations'.
+pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
+    let mut known = Behaviours::default();
+    add(&mut known);
+    #[cfg(feature = "zenoh")]
+    skein_zenoh::share_threads();
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
+        .with_env_filter(
+            // Zenoh warns of things that are as they should be on one host; RUST_LOG says otherwise.
+            tracing_subscriber::EnvFilter::try_from_default_env()
+                .unwrap_or_else(|_| "warn,zenoh=error".into()),
+        )
+        .init();
+    let cli = Cli::parse();
+    let exit = run(&cli, &known).unwrap_or_else(|error| {
+        let message = format!("{error:#}");
+        if cli.json {
+            println!("{}", json!({ "error": message }));
+        }
+        eprintln!("skein-sim: {message}");
+        Exit::WrongInput
+    });
+    exit.into()
+}
+
+fn run(cli: &Cli, known: &Behaviours) -> anyhow::Result<Exit> {
+    match &cli.command {
+        Command::Fly(args) => {
+            let summary = fly::run(args, known)?;
+            show(&summary, cli.json)?;
+            Ok(Exit::of(summary.succeeded))
+        }
+        #[cfg(feature = "zenoh")]
+        Command::Serve(args) => {
+            let summary = crate::serve::run(args, known, cli.json)?;
+            show(&summary, cli.json)?;
+            Ok(Exit::Done)
+        }
+        #[cfg(feature = "zenoh")]
+        Command::Configure(args) => crate::configure::run(args, known, cli.json).map(|()| Exit::Done),
+        #[cfg(not(feature = "zenoh"))]
+        Command::Serve(_) | Command::Configure(_) => {
+            anyhow::bail!("built without the cargo feature `zenoh`, which this needs")
+        }
+        Command::List => {
+            list(cli.json);
+            Ok(Exit::Done)
+        }
+        Command::Check { file } => check(file, known, cli.json),
+    }
+}
+
+fn show(summary: &Summary, as_json: bool) -> anyhow::Result<()> {
+    if as_json {
+        print!("{}", summary.to_json()?);
+    } else {
+        print!("{}", summary.render());
+    }
+    Ok(())
+}
+
+/// An unsound file is an answer, and the check has failed; a file that cannot be read is wrong input.
+fn check(file: &Path, known: &Behaviours, as_json: bool) -> anyhow::Result<Exit> {
+    match check::check(file, known) {
+        Ok(findings) => {
+            if as_json {
+                println!("{}", serde_json::to_string(&findings)?);
+            } else {
+                println!("{findings}");
+            }
+            Ok(Exit::Done)
+        }
+        Err(error @ ScenarioError::Unreadable { .. }) => Err(error.into()),
+        Err(error) => {
+            if as_json {
+                println!("{}", json!({ "file": file, "error": error.to_string() }));
+            }
+            eprintln!("skein-sim: {error}");
+            Ok(Exit::Failed)
+        }
+    }
+}
+
+fn list(as_json: bool) {
+    let scenarios = Scenario::names();
+    if as_json {
+        let names: serde_json::Map<_, _> =
+            scenarios.into_iter().map(|(name, about)| (name.to_owned(), about.into())).collect();
+        println!("{}", json!({ "scenarios": names }));
+    } else {
+        for (name, about) in scenarios {
+            println!("{name:<10} {about}");
+        }
+    }
+}
