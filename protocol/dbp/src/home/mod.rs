@@ -73,7 +73,7 @@ impl Home {
         run: &mut Run,
     ) -> Option<BidAck> {
         let past = Past { history: &self.history, term, decisions };
-        let TakenIn::Yes { proxies, denied } = self.table.take_in(now, record, &past) else { return None };
+        let TakenIn { proxies, denied } = self.table.take_in(now, record, &past)?;
         run.change_proxies(proxies);
         for refusal in denied {
             run.fact(facts::DENIED, |fact| {

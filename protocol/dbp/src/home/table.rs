@@ -20,29 +20,19 @@ use crate::run::ProxyChange;
 
 /// The occurrences at this home.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Past<'a> {
+pub(super) struct Past<'a> {
     pub(crate) history: &'a History,
     pub(crate) term: u64,
     /// The decisions of that term, if it makes them.
     pub(crate) decisions: Option<&'a History>,
 }
 
-/// The outcome of a record.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum TakenIn {
-    /// It counts, and is acknowledged.
-    Yes {
-        proxies: Vec<ProxyChange>,
-        /// The refusals that are not those of the record before.
-        denied: Vec<Refusal>,
-    },
-    /// It is older than what is known, or its sender has to catch up first: no answer.
-    No,
-}
-
-impl TakenIn {
-    /// It counts and changes nothing.
-    const AGAIN: Self = Self::Yes { proxies: Vec::new(), denied: Vec::new() };
+/// The consequences of a record that counts; none if it is a repeated copy.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct TakenIn {
+    pub(super) proxies: Vec<ProxyChange>,
+    /// The refusals that are not those of the record before.
+    pub(super) denied: Vec<Refusal>,
 }
 
 /// All remote bids.
@@ -122,8 +112,9 @@ impl BidTable {
         changes(node, &before, &bidder.bids)
     }
 
-    /// Takes in a record of a roster member in its present life.
-    pub(crate) fn take_in(&mut self, now: Duration, record: &BidRecord, past: &Past<'_>) -> TakenIn {
+    /// Takes in a record of a roster member in its present life. One that is older than what is known, or whose sender has
+    /// to catch up first, does not count.
+    pub(super) fn take_in(&mut self, now: Duration, record: &BidRecord, past: &Past<'_>) -> Option<TakenIn> {
         let for_this_life = record.home_incarnation == Some(self.incarnation);
         let mut since = Vec::new();
         if for_this_life {
@@ -133,7 +124,7 @@ impl BidTable {
                 (Some(own), Some(Some(joint))) => {
                     since.extend(own.chain(joint).map(|occurrence| &occurrence.event));
                 }
-                _ => return TakenIn::No,
+                _ => return None,
             }
         }
         let bidder = self.bidders.entry(record.node.clone()).or_default();
@@ -141,9 +132,9 @@ impl BidTable {
             *bidder = bidder.reborn(record.incarnation);
         }
         match (record.epoch, record.sent_at).cmp(&(bidder.epoch, bidder.sent_at)) {
-            Ordering::Less => return TakenIn::No,
+            Ordering::Less => return None,
             // A repeated copy does not renew the lease.
-            Ordering::Equal => return if bidder.live { TakenIn::AGAIN } else { TakenIn::No },
+            Ordering::Equal => return bidder.live.then(TakenIn::default),
             Ordering::Greater => {}
         }
         let refused_before = std::mem::take(&mut bidder.refused);
@@ -164,8 +155,7 @@ impl BidTable {
             let over = bidder.has_been_served(bid) || resumed;
             #[cfg(feature = "mutants")]
             let over = over && self.rights.mutant != Some(Mutant::G4);
-            let astray =
-                record.term != past.term && bid.requests.iter().any(|e| Roster::joint_events().contains(e));
+            let astray = record.term != past.term && bid.requests.iter().any(Roster::is_joint);
             honoured.open &= for_this_life && !over && !astray;
             if honoured.keep && bidder.lifted.get(&bid.bthread).is_some_and(|sync| bid.block_since <= *sync) {
                 honoured.block = EventSet::None;
@@ -190,10 +180,8 @@ impl BidTable {
         self.unsaved |= kept_blocks(&bidder.bids).ne(kept_blocks(&taken));
         let before = std::mem::replace(&mut bidder.bids, taken);
         let denied = bidder.refused.iter().filter(|refusal| !refused_before.contains(refusal));
-        TakenIn::Yes {
-            proxies: changes(&record.node, &before, &bidder.bids),
-            denied: denied.cloned().collect(),
-        }
+        let proxies = changes(&record.node, &before, &bidder.bids);
+        Some(TakenIn { proxies, denied: denied.cloned().collect() })
     }
 
     /// The refusals of the last record of `node`.
