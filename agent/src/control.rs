@@ -110,7 +110,7 @@ impl Control {
         let others: Vec<_> = self.neighbours.at(now).map(|neighbour| neighbour.position()).collect();
         self.perception.take_in(scan, &Pose { position, attitude }, &others);
         let (returns, rays) = (self.perception.returns(), scan.ranges_m.len());
-        self.guidance.look(scan.stamp, &position, returns, rays, self.perception.map());
+        self.guidance.steering.look(scan.stamp, &position, returns, rays, self.perception.map());
     }
 
     /// Takes in what other vehicles say of themselves.
@@ -124,7 +124,7 @@ impl Control {
     /// The agent has not run for `pause`: if it flew the vehicle, it does not any more.
     pub fn wake(&mut self, pause: Duration) -> Option<Report> {
         let report = self.flight.wake(pause)?;
-        self.guidance.rest();
+        self.guidance.steering.rest();
         self.neighbours.look_away();
         Some(report)
     }
@@ -204,7 +204,7 @@ impl Control {
             mode: telemetry.mode.to_string(),
             battery: self.battery(),
             armed: telemetry.armed,
-            path: self.guidance.path_ahead().take(State::MAX_PATH).collect(),
+            path: self.guidance.course.path_ahead().take(State::MAX_PATH).collect(),
             echo: self.neighbours.echo(now),
             ..State::new(self.name.clone())
         })
@@ -242,9 +242,9 @@ impl Control {
                 map: self.perception.map(),
                 neighbours: self.neighbours.around(),
             };
-            descent.detour(self.guidance.settles_at())
+            descent.detour(self.guidance.steering.settles_at)
         });
-        self.guidance.settle_at(place);
+        self.guidance.steering.settles_at = place;
         if place.is_none() {
             self.flight.touch_down(now, &mut self.companion);
         }
@@ -254,7 +254,7 @@ impl Control {
     pub fn steer(&mut self, now: Duration) {
         self.settle(now);
         if !self.flight.sends_set_points() {
-            self.guidance.rest();
+            self.guidance.steering.rest();
             return;
         }
         let Some(motion) = self.motion() else { return };
@@ -277,10 +277,10 @@ impl Control {
             }
             KeepAlive::Stop => {
                 self.set_points.stops += 1;
-                self.guidance.rest();
+                self.guidance.steering.rest();
                 self.companion.set_point(now, SetPoint::Velocity { velocity: Vector3::zeros(), yaw: None });
             }
-            KeepAlive::Silence => self.guidance.rest(),
+            KeepAlive::Silence => self.guidance.steering.rest(),
         }
     }
 

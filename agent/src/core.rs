@@ -236,7 +236,7 @@ impl AgentCore {
 
     /// The path ahead, from the vehicle to its waypoint; empty without one.
     pub fn path_ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
-        self.control.guidance().path_ahead()
+        self.control.guidance().course.path_ahead()
     }
 
     /// The vehicle's node: its program, its peers, and what has come in that was not understood.
@@ -248,7 +248,7 @@ impl AgentCore {
     /// Whether a path is being searched for that the last tick was not enough for.
     #[must_use]
     pub fn is_planning(&self) -> bool {
-        self.control.guidance().is_planning()
+        self.control.guidance().planning.is_under_way()
     }
 
     /// The vehicle's node name.

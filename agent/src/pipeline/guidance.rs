@@ -30,11 +30,11 @@ const ROOM_AHEAD_M: f64 = 1.5;
 #[derive(Debug)]
 pub struct Guidance {
     envelope: Envelope,
-    course: Course,
     leave_until: Duration,
-    planning: Planning,
+    pub course: Course,
+    pub planning: Planning,
     progress: Progress,
-    steering: Steering,
+    pub steering: Steering,
 }
 
 impl Guidance {
@@ -44,8 +44,8 @@ impl Guidance {
         let Layers { finder, follower, repulsion, filter, escape, passages } = layers;
         Self {
             envelope,
-            course: Course::default(),
             leave_until: Duration::ZERO,
+            course: Course::default(),
             planning: Planning::new(envelope, finder),
             progress: Progress::new(envelope.separation_m, passages, escape),
             steering: Steering::new(envelope, follower, repulsion, filter),
@@ -70,45 +70,12 @@ impl Guidance {
         self.steering.stop(&unheld, &motion.velocity).xy().push(motion.position.z)
     }
 
-    /// Where the vehicle goes before it lands.
-    #[must_use]
-    pub fn settles_at(&self) -> Option<Vector3<f64>> {
-        self.steering.settles_at
-    }
-
-    /// Goes to a place to land there, metres ENU, and needs no leave for it; `None` to follow its path again.
-    pub fn settle_at(&mut self, place: Option<Vector3<f64>>) {
-        self.steering.settles_at = place;
-    }
-
-    /// Somebody else moves the vehicle, or nobody.
-    pub fn rest(&mut self) {
-        self.steering.rest();
-    }
-
-    /// Takes in the obstacle points of a scan of `rays` rays that was taken at `stamp` and `origin`; metres ENU.
-    pub fn look(
-        &mut self,
-        stamp: Duration,
-        origin: &Vector3<f64>,
-        returns: &[Vector3<f64>],
-        rays: usize,
-        map: &ClearanceMap,
-    ) {
-        self.steering.look(stamp, origin, returns, rays, map);
-    }
-
     /// The flight is over.
     pub fn forget(&mut self) {
-        self.rest();
+        self.steering.rest();
         self.course = Course::default();
         self.progress.forget();
         self.planning.abandon();
-    }
-
-    /// The path ahead, from the vehicle's place on it to its end.
-    pub fn path_ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
-        self.course.path_ahead()
     }
 
     /// A place on the path so far ahead that a vehicle whose leave to move ends now stops well before it; none without a path.
@@ -144,12 +111,6 @@ impl Guidance {
             self.progress.begin_path();
         }
         report
-    }
-
-    /// Whether a plan has been begun that has no answer yet.
-    #[must_use]
-    pub fn is_planning(&self) -> bool {
-        self.planning.is_under_way()
     }
 
     /// Looks along the path; once in each navigation cycle.

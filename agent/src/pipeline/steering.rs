@@ -43,7 +43,7 @@ pub struct Steering {
     filter: Box<dyn VelocityFilter>,
     /// Where to hover while there is no leave to move.
     hover_at: Option<Vector3<f64>>,
-    /// Where to go before landing, without leave.
+    /// Where to go, without leave, to land there; `None` to follow the path.
     pub settles_at: Option<Vector3<f64>>,
 }
 
