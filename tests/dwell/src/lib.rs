@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
+use skein_agent::bthreads::{HOME_LEG, OPERATOR_LEG};
 use skein_agent::verify::Requirement;
 use skein_agent::{Me, field, precedence};
 use skein_bp::behaviour::{Behaviour, Behaviours, Host, Model};
@@ -59,9 +60,10 @@ fn of_mission(me: &Me, verb: &str) -> EventSet {
     me.any(verb).and(EventSet::field_range("leg", 0.0, f64::MAX))
 }
 
-/// What leads a vehicle elsewhere: home, to an operator's point, or down.
+/// What leads a vehicle elsewhere: to an operator's point, home, or down.
 fn elsewhere(me: &Me) -> EventSet {
-    me.any(GOTO).and(of_mission(me, GOTO).not()).or(me.any_of(&[RETURN, LAND, LANDED]))
+    let away = EventSet::field_is("leg", OPERATOR_LEG).or(EventSet::field_is("leg", HOME_LEG));
+    me.any(GOTO).and(away).or(me.any_of(&[RETURN, LAND, LANDED]))
 }
 
 /// Blocks the mission's next `goto` for a while after each `arrived`, then tells that it has.
