@@ -47,7 +47,7 @@ pub use authority::{joint_roster, standard_authority};
 pub use decode_error::DecodeError;
 pub use key::{Fleet, Key, KeyError};
 pub use link::Link;
-pub use message::{Addressee, Echo, Form, Kind, MissionState, Payload, Record, Scan, Scene, Solid, State};
+pub use message::*;
 pub use network::{MemoryLink, Network, NetworkConfig, NetworkStats};
 pub use node_link::{NodeLink, NodeLinkStats};
 pub use proto::{MAX_PAYLOAD, VERSION};

@@ -181,7 +181,7 @@ impl NodeLink {
                 Ok(Payload::Board(board)) => self.note_board(board),
                 Ok(Payload::Message(message)) => self.node.handle(now, message),
                 // Not for a node: a sensor's and a world's words have listeners of their own.
-                Ok(Payload::Scan(_) | Payload::Scene(_)) => self.stats.forged += 1,
+                Ok(_) => self.stats.forged += 1,
             }
         }
     }
