@@ -7,6 +7,7 @@ use skein_bp::script::Assignment;
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
 use skein_planning::airspace::Airspace;
+use skein_wire::event::Catalogue;
 
 use crate::bthreads::LinkLossPolicy;
 
@@ -190,4 +191,12 @@ pub struct AgentConfig {
     pub kept: Kept,
     /// Seed of the program's tie-breaks.
     pub seed: u64,
+}
+
+impl AgentConfig {
+    /// The events that the vehicle knows.
+    #[must_use]
+    pub fn events(&self) -> Catalogue {
+        Catalogue::standard()
+    }
 }

@@ -4,20 +4,21 @@ use std::time::Duration;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use skein_bp::script::Assignment;
-use skein_bp::{Event, EventSet, Origin, Program, ProgramConfig};
+use skein_bp::{Event, Origin, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_mav::{Companion, CompanionConfig, Landed, SetPoint};
 use skein_planning::airspace::{Airspace, KeepOut};
 use skein_planning::map::MapError;
-use skein_wire::vocabulary::{
-    ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, HOMEWARD, LAND, LANDED, LOAD, ORDER, PLAN, RETURN, SCRIPT,
-    UNLOAD,
+use skein_wire::event::{
+    Advance, Complete, Declared as _, Enter, Failed, Goto, Hold, Homeward, Land, Load, OrderTaken, Plan,
+    PlanReason, Return, ScriptNews, Takeoff, Unload, What,
 };
-use skein_wire::{Fleet, Link, MissionState, NodeLink, State, Store, joint_roster, vocabulary};
+use skein_wire::{Fleet, Link, MissionState, NodeLink, State, Store, event, joint_roster};
 
 use crate::{
     bthreads,
     config::{AgentConfig, Controller, Envelope},
+    error::AgentError,
     failsafes::Failsafes,
     flight::{Flight, FlightPhase},
     me::Me,
@@ -29,6 +30,7 @@ use crate::{
         touchdown::Descent,
     },
     precedence,
+    safety::safety_events,
     scripts::{
         Begins, CONFIGURATION, Circumstances, KeptScript, RunningScript, ScriptFacts, ScriptStore, Scripts,
     },
@@ -66,32 +68,6 @@ const STATES_TRIED: usize = 500;
 const SEQUENTIAL: &str = "sequential";
 /// A navigation cycle and a state message to the others begin this often.
 const CYCLE_PERIOD: Duration = Duration::from_millis(100);
-
-/// Why an agent cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum AgentError {
-    /// A node name in the configuration is none.
-    #[error("agent configuration: `{field}` is {value:?}: {source}")]
-    Name {
-        field: &'static str,
-        value: String,
-        /// What is wrong with it.
-        source: skein_dbp::NodeNameError,
-    },
-    /// The fleet's name is none.
-    #[error("agent configuration: `fleet` is {value:?}: {source}")]
-    Fleet {
-        value: String,
-        /// What is wrong with it.
-        source: skein_wire::KeyError,
-    },
-    /// A script is not run.
-    #[error("agent configuration: script `{name}`: {why}")]
-    Script { name: String, why: String },
-    /// The fence is no space to fly in.
-    #[error("agent configuration: `fence`: {0}")]
-    Fence(#[from] MapError),
-}
 
 /// How a vehicle's mission ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -190,15 +166,15 @@ impl AgentCore {
         let name = |field, value: &str| {
             NodeName::new(value).map_err(|source| AgentError::Name { field, value: value.to_owned(), source })
         };
-        let me = Me::new(&config.node);
+        let (me, events) = (Me::new(&config.node), config.events());
         let mut program = Program::new(ProgramConfig {
-            protected: safety_events(&me),
+            protected: safety_events(&me, &events),
             ..ProgramConfig::vehicle(config.seed)
         });
         if config.controller == Controller::Bp {
             bthreads::load(&mut program, &config);
         }
-        let mut scripts = Scripts::new(me.clone(), &config.roster);
+        let mut scripts = Scripts::new(me.clone(), &config.roster, &events);
         for assignment in &config.scripts {
             scripts
                 .load(&mut program, assignment, CONFIGURATION, Begins::WhenReleased)
@@ -211,8 +187,8 @@ impl AgentCore {
         let neighbours = Neighbours::new(own_name.clone(), config.incarnation);
         let node_config = NodeConfig {
             lease: config.lease,
-            safety: safety_events(&me),
-            gateway: me.any_of(&[ORDER, LOAD, UNLOAD]),
+            safety: safety_events(&me, &events),
+            gateway: me.any_in(events.gateway()),
             // What comes from afar never outranks a vehicle's own b-threads for its safety.
             remote_priority: precedence::MISSION..=precedence::LINK,
             authority: config.authority.clone(),
@@ -268,9 +244,9 @@ impl AgentCore {
         self.companion.take_output()
     }
 
-    /// An order of whoever is at this vehicle's own computer: `what` as in [`vocabulary::order`].
-    pub fn order(&mut self, what: &str) {
-        self.node.node_mut().enqueue(vocabulary::order(&self.name, what));
+    /// An order of whoever is at this vehicle's own computer.
+    pub fn order(&mut self, what: What) {
+        self.node.node_mut().enqueue(OrderTaken::plain(what).at(&self.name));
     }
 
     /// Takes in a lidar scan.
@@ -490,36 +466,39 @@ impl AgentCore {
 
     fn carry_out(&mut self, now: Duration, event: &Event, neighbours: &[Neighbour]) {
         self.flight.carry_out(now, event, &mut self.companion);
-        let why = event.text("why").unwrap_or_default();
+        let why = event::why(event).unwrap_or_default();
         match self.me.verb(event) {
-            Some(GOTO) => {
+            Some(Goto::NAME) => {
                 self.guidance.head_for(event);
-                self.task = match event.int("leg") {
-                    Some(bthreads::HOME_LEG) => "flying home".to_owned(),
-                    Some(bthreads::OPERATOR_LEG) => "going where the operator points".to_owned(),
-                    leg => format!("leg {} of {}", leg.unwrap_or_default() + 1, self.config.waypoints.len()),
+                self.task = match Goto::read(event).map_or(0, |goto| goto.leg) {
+                    bthreads::HOME_LEG => "flying home".to_owned(),
+                    bthreads::OPERATOR_LEG => "going where the operator points".to_owned(),
+                    leg => format!("leg {} of {}", leg + 1, self.config.waypoints.len()),
                 };
             }
-            Some(PLAN) => {
+            Some(Plan::NAME) => {
                 if let Some(motion) = self.motion() {
+                    let why = Plan::read(event).map_or(PlanReason::Waypoint, |plan| plan.why);
                     let report = self.guidance.plan(why, &motion, self.perception.map_mut(), neighbours);
                     self.hear_of_path(now, report);
                 }
             }
-            Some(ADVANCE | HOMEWARD) => self.guidance.grant_leave(now),
-            Some(LAND) => {
+            Some(Advance::NAME | Homeward::NAME) => self.guidance.grant_leave(now),
+            Some(Land::NAME) => {
                 self.task = format!("landing: {why}");
                 self.settle(now, neighbours);
             }
-            Some(RETURN) if !self.flight.is_landing() => {
+            Some(Return::NAME) if !self.flight.is_landing() => {
                 self.task = format!("returning: {why}");
             }
-            Some(HOLD) => self.task = "holding".to_owned(),
-            Some(LANDED) => self.guidance.forget(),
-            Some(vocabulary::TAKEOFF) => self.task = "taking off".to_owned(),
-            Some(ORDER) if matches!(event.text("what"), Some("resume" | "return")) => self.flight.resume(now),
-            Some(COMPLETE) => self.end(Outcome::Complete, "arrived"),
-            Some(FAILED) => self.end(Outcome::Failed(why.to_owned()), why),
+            Some(Hold::NAME) => self.task = "holding".to_owned(),
+            Some(event::Landed::NAME) => self.guidance.forget(),
+            Some(Takeoff::NAME) => self.task = "taking off".to_owned(),
+            Some(OrderTaken::NAME) if OrderTaken::read(event).is_some_and(|order| order.what.releases()) => {
+                self.flight.resume(now);
+            }
+            Some(Complete::NAME) => self.end(Outcome::Complete, "arrived"),
+            Some(Failed::NAME) => self.end(Outcome::Failed(why.to_owned()), why),
             _ => {}
         }
     }
@@ -528,18 +507,18 @@ impl AgentCore {
     fn look_after_scripts(&mut self, selection: &Happened) {
         let event = &selection.event;
         let verdict = match self.me.verb(event) {
-            Some(LOAD) => {
+            Some(Load::NAME) => {
                 let (name, outcome) = self.load_script(selection);
                 self.scripts.verdict(&name, outcome)
             }
-            Some(UNLOAD) => {
-                let name = event.text("name").unwrap_or_default();
-                if self.scripts.runs(name) {
+            Some(Unload::NAME) => {
+                let name = Unload::read(event).map(|unload| unload.name).unwrap_or_default();
+                if self.scripts.runs(&name) {
                     return;
                 }
-                self.scripts.verdict(name, Err("no script of this name runs".to_owned()))
+                self.scripts.verdict(&name, Err("no script of this name runs".to_owned()))
             }
-            Some(SCRIPT) => return self.scripts.hear(event),
+            Some(ScriptNews::NAME) => return self.scripts.hear(event),
             _ => return,
         };
         self.node.node_mut().enqueue(verdict);
@@ -547,8 +526,8 @@ impl AgentCore {
 
     /// Runs a script that is sent; gives back its name, and why it is not run if it is not.
     fn load_script(&mut self, selection: &Happened) -> (String, Result<(), String>) {
-        let text = selection.event.text("script").unwrap_or_default();
-        let assignment = match Assignment::from_json(text) {
+        let text = Load::read(&selection.event).map(|load| load.script).unwrap_or_default();
+        let assignment = match Assignment::from_json(&text) {
             Ok(assignment) => assignment,
             Err(error) => return (String::new(), Err(error.to_string())),
         };
@@ -578,7 +557,7 @@ impl AgentCore {
     fn may_send(&self, assignment: &Assignment, from: &str) -> Result<bool, String> {
         let Some((node, bthread)) = from.split_once('#') else { return Ok(from == self.name.as_str()) };
         let text = assignment.to_json().map_err(|error| error.to_string())?;
-        let load = self.me.event(LOAD).with("script", text);
+        let load = self.me.event(Load { name: None, script: text.into() });
         let is_member = self.config.roster.iter().any(|member| member == node);
         let may_request = |node| self.config.authority.may_request(&node, bthread, &load);
         Ok(is_member && !node.starts_with("uav/") && NodeName::new(node).is_ok_and(may_request))
@@ -729,7 +708,7 @@ impl AgentCore {
         if let Some(complaint) = self.failsafes.complaint() {
             return complaint.to_owned();
         }
-        let question = self.me.any_of(&[ADVANCE, ENTER, vocabulary::TAKEOFF]);
+        let question = self.me.any::<(Advance, Enter, Takeoff)>();
         let explanation = self.node.node().explain(question).local;
         if explanation.requested.is_empty() {
             return String::new();
@@ -807,25 +786,4 @@ fn heights(config: &AgentConfig) -> [f64; 2] {
     let heights = || waypoints.clone().chain([config.return_altitude_m, home_m + config.takeoff_height_m]);
     let lowest_m = heights().fold(f64::INFINITY, f64::min) - BELOW_WAYPOINTS_M;
     [lowest_m.max(home_m + LEAST_HEIGHT_M), heights().fold(0.0, f64::max) + ABOVE_WAYPOINTS_M]
-}
-
-/// What no remote b-thread can block, and only the operator's gateway can request; the waypoint at home is part of it, for
-/// without it `return` would lead nowhere.
-pub(crate) fn safety_events(me: &Me) -> EventSet {
-    let home = me.any(GOTO).and(EventSet::field_is("leg", bthreads::HOME_LEG));
-    me.any_of(&vocabulary::OWN).or(home)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn from_afar_nobody_blocks_the_way_home_and_anybody_with_a_say_any_other() {
-        let me = Me::new("uav/1");
-        let goto = |leg: i64| me.event(GOTO).with("leg", leg);
-        let safety = safety_events(&me);
-        assert!(safety.contains(&goto(bthreads::HOME_LEG)) && safety.contains(&me.event(HOMEWARD)));
-        assert!(!safety.contains(&goto(bthreads::OPERATOR_LEG)) && !safety.contains(&goto(0)));
-    }
 }

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use skein_bp::Event;
 use skein_mav::{Command, CommandResult, Companion, FlightMode, Landed, MavEvent};
-use skein_wire::vocabulary::{
-    AIRBORNE, COMMAND_FAILED, FOUND_AIRBORNE, HAND_BACK, HOLD, LAND, LANDED, PILOT, SLEPT, TAKEOFF,
+use skein_wire::event::{
+    self, Airborne, CommandFailed, Declared as _, FoundAirborne, HandBack, Hold, Land, PilotTook, Slept,
+    Takeoff,
 };
 
 use crate::me::Me;
@@ -113,20 +114,20 @@ impl Flight {
     /// Carries out one selected event.
     pub fn carry_out(&mut self, now: Duration, event: &Event, companion: &mut Companion) {
         match (self.me.verb(event), self.phase) {
-            (Some(TAKEOFF), FlightPhase::Grounded) => {
+            (Some(Takeoff::NAME), FlightPhase::Grounded) => {
                 self.phase = FlightPhase::Arming;
                 self.left_ground = false;
                 companion.command(now, Command::Arm);
             }
             // Where, is seen before the tick is over: see `touch_down`.
-            (Some(LAND), FlightPhase::Flying) => {
+            (Some(Land::NAME), FlightPhase::Flying) => {
                 self.phase = FlightPhase::Settling { until: now + SETTLES_FOR };
             }
             // Said again it changes nothing: to come down upon somebody is worse than some seconds more of an empty battery.
-            (Some(LAND), FlightPhase::Grounded | FlightPhase::Settling { .. }) => {}
-            (Some(LAND), _) => self.touch_down(now, companion),
-            (Some(HOLD), FlightPhase::Adopted) => companion.command(now, Command::Hold),
-            (Some(HAND_BACK), FlightPhase::Taken) => self.engage(now),
+            (Some(Land::NAME), FlightPhase::Grounded | FlightPhase::Settling { .. }) => {}
+            (Some(Land::NAME), _) => self.touch_down(now, companion),
+            (Some(Hold::NAME), FlightPhase::Adopted) => companion.command(now, Command::Hold),
+            (Some(HandBack::NAME), FlightPhase::Taken) => self.engage(now),
             _ => {}
         }
     }
@@ -158,7 +159,7 @@ impl Flight {
         );
         flew.then(|| {
             self.phase = FlightPhase::Taken;
-            self.me.event(SLEPT).with("seconds", pause.as_secs_f64())
+            self.me.event(Slept { seconds: pause.as_secs_f64() })
         })
     }
 
@@ -184,7 +185,7 @@ impl Flight {
             MavEvent::ModeChanged { to, .. } if self.is_foreign(*to) => {
                 // Control ends with the mode change itself; the b-threads hear of it afterwards.
                 self.phase = FlightPhase::Taken;
-                Some(self.me.event(PILOT).with("mode", to.to_string()))
+                Some(self.me.event(PilotTook { mode: to.to_string().into() }))
             }
             _ => None,
         }
@@ -210,7 +211,7 @@ impl Flight {
         match self.phase {
             FlightPhase::Arming | FlightPhase::Climbing if !self.left_ground => {
                 self.phase = FlightPhase::Grounded;
-                Some(self.me.because(COMMAND_FAILED, &format!("{command:?}: {why}")))
+                Some(self.me.event(CommandFailed { why: format!("{command:?}: {why}").into() }))
             }
             FlightPhase::Engaging { .. } if command == Command::Offboard => {
                 self.engage(now);
@@ -224,7 +225,7 @@ impl Flight {
     fn adopt(&mut self, mode: FlightMode) -> Event {
         if matches!(mode, FlightMode::Offboard | FlightMode::Hold) {
             self.phase = FlightPhase::Adopted;
-            self.me.event(FOUND_AIRBORNE)
+            self.me.event(FoundAirborne)
         } else {
             self.leave_to_pilot(mode)
         }
@@ -232,7 +233,7 @@ impl Flight {
 
     fn leave_to_pilot(&mut self, mode: FlightMode) -> Event {
         self.phase = FlightPhase::Taken;
-        self.me.event(PILOT).with("mode", mode.to_string())
+        self.me.event(PilotTook { mode: mode.to_string().into() })
     }
 
     /// Moves on to the next phase when the telemetry says so; returns what the b-threads should hear of it.
@@ -261,7 +262,7 @@ impl Flight {
             }
             FlightPhase::Engaging { asked: true, .. } if mode == FlightMode::Offboard => {
                 self.phase = FlightPhase::Flying;
-                return Some(self.me.event(AIRBORNE));
+                return Some(self.me.event(Airborne));
             }
             FlightPhase::Settling { .. }
             | FlightPhase::Landing
@@ -271,7 +272,7 @@ impl Flight {
                 if landed == Landed::OnGround && !armed =>
             {
                 self.phase = FlightPhase::Grounded;
-                return Some(self.me.event(LANDED));
+                return Some(self.me.event(event::Landed));
             }
             FlightPhase::Landing if mode != FlightMode::Land && now >= self.land_again => {
                 self.land_again = now + REPEAT_LAND;

@@ -8,12 +8,14 @@ mod airspace_table;
 pub mod bthreads;
 mod config;
 mod core;
+mod error;
 mod failsafes;
 mod flight;
 mod me;
 mod neighbours;
 pub mod pipeline;
 pub mod precedence;
+mod safety;
 pub mod scripts;
 pub mod sequential;
 pub mod verify;
@@ -24,7 +26,8 @@ pub use self::{
     config::{
         AgentConfig, Controller, Envelope, Fence, GlobalPlanner, Layer, LocalPlanner, PassageRule, Planners,
     },
-    core::{AgentCore, AgentError, Outcome, SetPointRecord, Status},
+    core::{AgentCore, Outcome, SetPointRecord, Status},
+    error::AgentError,
     flight::FlightPhase,
     me::Me,
     pipeline::perception::Scan,

@@ -5,9 +5,7 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_bp::Event;
 use skein_mav::{Battery, Landed, Telemetry};
-use skein_wire::vocabulary::{
-    BATTERY_CRITICAL, BATTERY_LOW, CLEAR, FENCE_BREACHED, READY, TOO_CLOSE, UNREADY,
-};
+use skein_wire::event::{BatteryCritical, BatteryLow, Clear, FenceBreached, Ready, TooClose, Unready};
 
 use crate::{config::Fence, me::Me, neighbours::Neighbour};
 
@@ -93,7 +91,7 @@ impl Watches {
             && telemetry.is_fresh(now, TELEMETRY_FRESH_FOR)
             && charged
             && failsafes_sound;
-        self.ready.turns(ready).map(|ready| self.me.event(if ready { READY } else { UNREADY }))
+        self.ready.turns(ready).map(|ready| if ready { self.me.event(Ready) } else { self.me.event(Unready) })
     }
 
     /// Battery: low when what is left is what the way home needs, with reserve.
@@ -106,10 +104,10 @@ impl Watches {
         let needed = drain_per_s * seconds_home + BATTERY_RESERVE;
         let mut events = Vec::new();
         if self.low.rises(battery.fraction <= needed) {
-            events.push(self.me.event(BATTERY_LOW));
+            events.push(self.me.event(BatteryLow));
         }
         if self.critical.rises(battery.fraction <= BATTERY_EMERGENCY) {
-            events.push(self.me.event(BATTERY_CRITICAL));
+            events.push(self.me.event(BatteryCritical));
         }
         events
     }
@@ -120,7 +118,7 @@ impl Watches {
             position[axis] < fence.min[axis] - FENCE_TOLERANCE_M
                 || position[axis] > fence.max[axis] + FENCE_TOLERANCE_M
         });
-        self.outside.rises(outside).then(|| self.me.event(FENCE_BREACHED))
+        self.outside.rises(outside).then(|| self.me.event(FenceBreached))
     }
 
     /// Separation: a neighbour in the air is inside the emergency distance.
@@ -133,8 +131,8 @@ impl Watches {
         let limit = if self.close.0 { CLEAR_DISTANCE_M } else { EMERGENCY_DISTANCE_M };
         let too_close = nearest.filter(|(distance, _)| *distance < limit);
         self.close.turns(too_close.is_some()).map(|_| match too_close {
-            Some((_, node)) => self.me.event(TOO_CLOSE).with("other", node.as_str()),
-            None => self.me.event(CLEAR),
+            Some((_, node)) => self.me.event(TooClose { other: node.as_str().into() }),
+            None => self.me.event(Clear),
         })
     }
 }

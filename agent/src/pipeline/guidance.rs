@@ -16,7 +16,9 @@ use skein_planning::{
     passage::{Passage, PassageConfig, first_passage},
     separation::{self, FilterConfig, Outcome, RepulsionConfig, filter, repulsion},
 };
-use skein_wire::vocabulary::{ARRIVED, LEAVE, PASSAGE, PATH_BLOCKED, PLANNED, STUCK, UNPLANNABLE};
+use skein_wire::event::{
+    self, Arrived, Declared as _, Goto, Leave, PathBlocked, PlanReason, Planned, Stuck, Unplannable,
+};
 
 use super::evasion::{Evasion, Room, Way};
 use crate::{
@@ -117,13 +119,13 @@ impl Report {
     #[must_use]
     pub fn into_event(self, me: &Me) -> Event {
         match self {
-            Self::Planned { leg, length_m } => me.event(PLANNED).with("leg", leg).with("length_m", length_m),
-            Self::Unplannable { leg, why } => me.because(UNPLANNABLE, &why).with("leg", leg),
-            Self::Arrived { leg } => me.event(ARRIVED).with("leg", leg),
-            Self::PathBlocked => me.event(PATH_BLOCKED),
-            Self::Stuck => me.event(STUCK),
-            Self::Passage(at) => me.event(PASSAGE).with("x", at.x).with("y", at.y).with("z", at.z),
-            Self::PassageLeft => me.event(LEAVE),
+            Self::Planned { leg, length_m } => me.event(Planned { leg, length_m }),
+            Self::Unplannable { leg, why } => me.event(Unplannable { leg, why: why.into() }),
+            Self::Arrived { leg } => me.event(Arrived { leg }),
+            Self::PathBlocked => me.event(PathBlocked),
+            Self::Stuck => me.event(Stuck),
+            Self::Passage(at) => me.event(event::Passage { x: at.x, y: at.y, z: at.z }),
+            Self::PassageLeft => me.event(Leave),
         }
     }
 }
@@ -204,14 +206,8 @@ impl Guidance {
 
     /// Takes a `goto` as the waypoint to plan to.
     pub fn head_for(&mut self, goto: &Event) {
-        let coordinate = |axis| goto.real(axis);
-        let (Some(number), Some(x), Some(y), Some(z)) =
-            (goto.int("leg"), coordinate("x"), coordinate("y"), coordinate("z"))
-        else {
-            return;
-        };
-        let lands = goto.bool("lands").unwrap_or(true);
-        self.leg = Some(Leg { number, target: Vector3::new(x, y, z), lands, arrived: false });
+        let Some(Goto { leg, lands, x, y, z }) = Goto::read(goto) else { return };
+        self.leg = Some(Leg { number: leg, target: Vector3::new(x, y, z), lands, arrived: false });
         self.following = None;
         self.routes.abandon();
     }
@@ -293,12 +289,12 @@ impl Guidance {
         Some(following.path.point_at((following.station_m + reach_m).min(following.path.length_m())))
     }
 
-    /// Begins to plan a path to the waypoint. `why` is `stuck` when the vehicle made no way: neighbours that stand around are
+    /// Begins to plan a path to the waypoint. If the vehicle is stuck, neighbours that stand around are
     /// then obstacles too. One that has fallen silent always is, as large as its ghost will be. The answer comes at once if
     /// this tick's allowance is enough for it, else from [`Guidance::go_on_planning`].
     pub fn plan(
         &mut self,
-        why: &str,
+        why: PlanReason,
         motion: &Motion,
         map: &mut ClearanceMap,
         neighbours: &[Neighbour],
@@ -331,7 +327,7 @@ impl Guidance {
         let potential = Potential::gated(&motion.position, &heading, &repellers, 2.0);
         let radius_m = self.envelope.separation_m;
         let in_the_way = |disc: &&Vector3<f64>| {
-            why == "stuck"
+            why == PlanReason::Stuck
                 && (*disc - target).xy().norm() > radius_m
                 && (*disc - motion.position).xy().norm() > radius_m
         };

@@ -5,6 +5,8 @@
  * never takes the others off the screen. Only a message that is no JSON object of a known type is refused.
  */
 
+import type { What } from './vocabulary';
+
 export type Vec3 = [x: number, y: number, z: number];
 export type Quaternion = [x: number, y: number, z: number, w: number];
 
@@ -189,7 +191,8 @@ export type Argument = number | string | Vec3 | Vec3[];
 
 export type ServerMessage = Scene | Fleet | Orders | Events | Why | Ordered | ScriptAnswer | Refusal;
 
-export type Command = 'hold' | 'resume' | 'return' | 'land' | 'goto' | 'abort' | 'launch' | 'launch_together';
+/** The orders that have a button. */
+export type Command = Exclude<What, typeof What.handBack | typeof What.load | typeof What.unload>;
 
 /** A go-to's place; without a height every vehicle keeps its own. */
 export type Point = [x: number, y: number, z: number | null];
@@ -220,7 +223,7 @@ export interface ReadingRequest {
 export interface ScriptRequest {
   type: 'order';
   tag: string;
-  what: 'load';
+  what: typeof What.load;
   to: 'all' | string[];
   script: { script: unknown; with: Record<string, Argument> };
 }
@@ -229,7 +232,7 @@ export interface ScriptRequest {
 export interface WithdrawalRequest {
   type: 'order';
   tag: string;
-  what: 'unload';
+  what: typeof What.unload;
   name: string;
   to: string[];
 }

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use skein_bp::Event;
 use skein_dbp::{Board, Happened, NodeName};
+use skein_wire::event::{Advance, Declared as _, Enter, Events as _, Goto, Homeward, Plan, Takeoff};
 use skein_wire::proto::{self, TraceEvent};
-use skein_wire::vocabulary::{ADVANCE, ENTER, GOTO, HOMEWARD, PLAN, TAKEOFF};
 use skein_wire::{DecodeError, State};
 
 use super::party::Party;
@@ -17,7 +17,7 @@ const EVENTS_KEPT: usize = 4;
 /// Of how many b-threads of a node it is remembered that they ask for movement: quotas of the bids allow no more names.
 const MOST_MOVERS: usize = 64;
 /// What a vehicle's movement is made of, take-off apart.
-const MOVES: [&str; 5] = [GOTO, PLAN, ADVANCE, HOMEWARD, ENTER];
+type Moves = (Goto, Plan, Advance, Homeward, Enter);
 
 /// What has been heard up to a moment: feed it in the order in which it was heard.
 #[derive(Clone, Debug, Default)]
@@ -110,15 +110,15 @@ impl Evidence {
     /// Something has happened.
     pub fn note_event(&mut self, occurred: Occurred) {
         let requested_by = || occurred.requested_by.iter().map(|name| Party::read(&occurred.home, name));
-        if occurred.event.kind() == TAKEOFF && self.launchers.len() < MOST_MOVERS {
+        if occurred.event.kind() == Takeoff::NAME && self.launchers.len() < MOST_MOVERS {
             self.launchers.extend(requested_by());
         }
         let Some(vehicle) = self.vehicles.get_mut(&occurred.home) else { return };
-        if MOVES.contains(&occurred.event.kind()) && vehicle.movers.len() < MOST_MOVERS {
+        if Moves::NAMES.contains(&occurred.event.kind()) && vehicle.movers.len() < MOST_MOVERS {
             let own = requested_by().filter(|party| party.node == occurred.home);
             vehicle.movers.extend(own.map(|party| party.bthread));
         }
-        if matches!(occurred.event.kind(), ADVANCE | HOMEWARD) {
+        if matches!(occurred.event.kind(), Advance::NAME | Homeward::NAME) {
             vehicle.leave = Some(occurred);
             return;
         }

@@ -288,6 +288,7 @@ impl Datum for String {
     }
 }
 
+/// A datum of another kind than `T` counts as none.
 impl<T: Datum> Datum for Option<T> {
     const KIND: Kind = Kind::Optional(&T::KIND);
     type Plain = T::Plain;
@@ -297,10 +298,7 @@ impl<T: Datum> Datum for Option<T> {
     }
 
     fn read(value: Option<&Value>) -> Option<Self> {
-        match value {
-            None => Some(None),
-            some => T::read(some).map(Some),
-        }
+        Some(T::read(value))
     }
 }
 
@@ -309,9 +307,28 @@ impl Field {
     #[doc(hidden)]
     pub fn read<T: Datum>(&self, event: &Event) -> Option<T> {
         let value = event.get(self.name);
-        let number = value.and_then(Value::as_number);
-        let fits = number.zip(self.range.as_ref()).is_none_or(|(number, range)| range.contains(&number));
-        fits.then(|| T::read(value))?
+        self.takes_number(value.and_then(Value::as_number)).then(|| T::read(value))?
+    }
+
+    /// Whether a number is within the range, if there is one of each.
+    #[must_use]
+    pub fn takes_number(&self, number: Option<f64>) -> bool {
+        number.zip(self.range.as_ref()).is_none_or(|(number, range)| range.contains(&number))
+    }
+
+    /// What it may be, in words: `number in m, at least 0`.
+    #[must_use]
+    pub fn expected(&self) -> String {
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" in {}", self.unit) };
+        let range = match self.range.as_ref().map(|range| (range.start(), range.end())) {
+            None => String::new(),
+            Some((least, most)) if most.is_infinite() => format!(", at least {least}"),
+            Some((least, most)) => format!(", {least} to {most}"),
+        };
+        match self.kind {
+            Kind::Optional(kind) => format!("{kind}{unit}{range}, or none"),
+            kind => format!("{kind}{unit}{range}"),
+        }
     }
 }
 

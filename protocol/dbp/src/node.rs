@@ -11,10 +11,11 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
+use skein_bp::catalogue::Declared;
 use skein_bp::{Bid, Event, EventSet, Origin, Program, ProgramError, Selection};
 
 use crate::explain::NodeExplanation;
-use crate::facts::{self, count, tell};
+use crate::facts::{self, Confirmed, Misdirected};
 use crate::held_blocks::{BlockNews, HeldBlocks};
 use crate::history::History;
 use crate::joint::Joint;
@@ -293,9 +294,7 @@ impl Node {
         let event = event.into();
         match self.home_of(&event) {
             Home::Here | Home::Local => self.program.enqueue(event),
-            Home::Elsewhere(_) | Home::Unroutable => {
-                self.fact(facts::MISDIRECTED, |fact| fact.with("event", event.name()))
-            }
+            Home::Elsewhere(_) | Home::Unroutable => self.fact(Misdirected { event: event.name().into() }),
         }
     }
 
@@ -534,12 +533,12 @@ impl Node {
         }
     }
 
-    fn fact(&mut self, what: &str, data: impl FnOnce(Event) -> Event) {
-        self.deliveries.push_back(Delivery::Fact(data(tell(&self.config.name, what))));
+    fn fact(&mut self, fact: impl Declared) {
+        self.deliveries.push_back(Delivery::Fact(fact.at(&self.config.name)));
     }
 }
 
 /// The fact that a b-thread's block is confirmed.
 fn confirmation(node: &NodeName, bthread: &str, sync: u64) -> Event {
-    tell(node, facts::CONFIRMED).with("bthread", bthread).with("sync", count(sync))
+    Confirmed { bthread: bthread.into(), sync }.at(node)
 }

@@ -14,7 +14,7 @@ use skein_agent::pipeline::perception::{Perception, Pose};
 use skein_agent::{AgentConfig, Me};
 use skein_mav::SetPoint;
 use skein_planning::separation::{self, FilterConfig, Neighbour, filter};
-use skein_wire::vocabulary::GOTO;
+use skein_wire::event::Goto;
 use skein_world::{Lidar, Scene};
 
 use crate::cli::Controller;
@@ -142,8 +142,8 @@ impl<'a> Flight<'a> {
     fn head_for(&mut self, goal: Vector3<f64>, times: &mut Times) -> anyhow::Result<()> {
         self.legs += 1;
         self.has_arrived = false;
-        let goto = self.me.event(GOTO).with("leg", self.legs as i64);
-        self.guidance.head_for(&goto.with("x", goal.x).with("y", goal.y).with("z", HEIGHT_M));
+        let goto = Goto { leg: self.legs as i64, lands: true, x: goal.x, y: goal.y, z: HEIGHT_M };
+        self.guidance.head_for(&self.me.event(goto));
         self.plan(times)
     }
 

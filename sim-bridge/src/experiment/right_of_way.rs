@@ -7,7 +7,7 @@ use serde_json::json;
 use skein_agent::PassageRule;
 use skein_bp::Event;
 use skein_dbp::{Happened, NodeName};
-use skein_wire::vocabulary::{ENTER, LANDED, LEAVE};
+use skein_wire::event::{Declared as _, Enter, Landed, Leave};
 
 use super::statistics::mean;
 use super::{Bound, Figure, Line, Options, Report, Style, runs};
@@ -39,13 +39,13 @@ impl Passage {
     fn watch(&mut self, now_s: f64, happened: &Happened) {
         let before = self.inside.len();
         match happened.event.kind() {
-            ENTER => {
+            Enter::NAME => {
                 let place = place(&happened.event);
                 self.entries += 1;
                 self.shared += usize::from(self.inside.values().any(|other| is_same(other, &place)));
                 self.inside.insert(happened.home.clone(), place);
             }
-            LEAVE | LANDED => drop(self.inside.remove(&happened.home)),
+            Leave::NAME | Landed::NAME => drop(self.inside.remove(&happened.home)),
             _ => {}
         }
         let now = self.inside.len();

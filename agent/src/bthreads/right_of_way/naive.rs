@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ADVANCE, ENTER, HOMEWARD, LANDED, LEAVE, PASSAGE, of_every_vehicle};
+use skein_wire::event::{Advance, Declared as _, Enter, Homeward, Landed, Leave, Passage, of_every_vehicle};
 
 use super::around;
 use crate::{me::Me, precedence};
@@ -35,19 +35,19 @@ impl BThread for NaiveRightOfWay {
         let me = &self.me;
         let bid = Bid::new()
             .priority(precedence::COLLISION)
-            .wait_for([ENTER, LEAVE, LANDED].map(of_every_vehicle))
-            .wait_for(me.any(PASSAGE));
+            .wait_for(of_every_vehicle::<(Enter, Leave, Landed)>())
+            .wait_for(me.any::<Passage>());
         let Some(passage) = &self.ahead else { return Some(bid) };
         let taken = self.inside.values().any(|enter| around(passage).contains(enter));
-        let bid = bid.block(me.any_of(&[ADVANCE, HOMEWARD]));
+        let bid = bid.block(me.any::<(Advance, Homeward)>());
         Some(if taken { bid } else { bid.request(super::entering(me, passage)) })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         let mine = event.home() == self.me.name();
         match event.kind() {
-            PASSAGE => self.ahead = Some(event.clone()),
-            ENTER if !mine => drop(self.inside.insert(event.home().to_owned(), event.clone())),
+            Passage::NAME => self.ahead = Some(event.clone()),
+            Enter::NAME if !mine => drop(self.inside.insert(event.home().to_owned(), event.clone())),
             _ if !mine => drop(self.inside.remove(event.home())),
             _ => self.ahead = None,
         }

@@ -8,8 +8,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use skein_dbp::Happened;
 use skein_ground::GroundCore;
 use skein_ground::recorder::{Level, Recorder, RecorderError};
+use skein_wire::event::{Advance, Declared as _, Homeward};
 use skein_wire::proto::TraceEvent;
-use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
 use skein_wire::{Scene, State};
 
 /// Planned paths are recorded this often.
@@ -49,7 +49,7 @@ impl Recording {
         for happened in happened {
             self.write(|recorder| recorder.trace(&TraceEvent::new(station.name(), happened)));
             // The trace holds every leave to move; people do not need to read each.
-            if !matches!(happened.event.kind(), ADVANCE | HOMEWARD) {
+            if !matches!(happened.event.kind(), Advance::NAME | Homeward::NAME) {
                 self.note(now, Level::Info, happened.home.as_str(), &happened.event.to_string());
             }
         }

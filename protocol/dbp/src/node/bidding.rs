@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use skein_bp::{Bid, Event, EventSet};
 
-use crate::facts;
+use crate::facts::Unroutable;
 use crate::held_blocks::Block;
 use crate::node::{Home, Node, NodeError, confirmation};
 use crate::{NodeName, OnLoss, RemoteBid, Roster};
@@ -120,9 +120,7 @@ impl Node {
     fn report_unroutable(&mut self, bid: &BidAbroad) {
         let Some(event) = &bid.unroutable else { return };
         if self.unroutable.insert(bid.bthread.clone(), bid.sync) != Some(bid.sync) {
-            self.fact(facts::UNROUTABLE, |fact| {
-                fact.with("event", event.as_str()).with("bthread", bid.bthread.as_str())
-            });
+            self.fact(Unroutable { event: event.as_str().into(), bthread: bid.bthread.as_str().into() });
         }
     }
 

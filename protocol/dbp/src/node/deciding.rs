@@ -3,12 +3,14 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use skein_bp::catalogue::Declared as _;
 use skein_bp::{Bid, Event, EventSet};
 
-use crate::facts::{self, count};
+use crate::facts::{InStep, OutOfStep, RosterRefused, Unknown};
 use crate::joint::Joint;
 use crate::node::{BoardChange, Delivery, Node};
 use crate::outbox::Outbox;
+use crate::rule::Lift;
 use crate::{JointWord, Message, NodeName, Occurrence, Presence, ROSTER, Recipient, Repair, Roster};
 
 /// The proxy that keeps joint events back while a member has not been heard, or has yet to apply a decision.
@@ -82,7 +84,7 @@ impl Node {
                 }
             },
         };
-        self.fact(facts::ROSTER_REFUSED, |fact| fact.with("why", refused));
+        self.fact(RosterRefused { why: refused.into() });
     }
 
     /// What was asked of the coordinator of a term that is over may have been decided there or not: it is not asked again
@@ -103,9 +105,7 @@ impl Node {
                 // From now on it would be decided here.
                 None => self.change_board(BoardChange::Withdrawn(bthread.as_str().into())),
             }
-            self.fact(facts::UNKNOWN, |fact| {
-                fact.with("event", event.name()).with("bthread", bthread).with("home", home.as_str())
-            });
+            self.fact(Unknown { event: event.name().into(), bthread: bthread.into(), home: home.clone() });
         }
     }
 
@@ -119,9 +119,8 @@ impl Node {
         match own.and_then(|rest| rest.strip_prefix('/')) {
             Some(ROSTER) => self.adopt(event),
             Some(LIFT) => {
-                let node = event.text("node").and_then(|node| NodeName::new(node).ok());
-                if let (Some(node), Some(bthread)) = (node, event.text("bthread")) {
-                    let changes = self.table.lift(&node, bthread);
+                if let Some(lift) = Lift::read(event) {
+                    let changes = self.table.lift(&lift.node, &lift.bthread);
                     self.change_proxies(changes);
                 }
             }
@@ -145,7 +144,7 @@ impl Node {
         }
         self.deliver(node, heard);
         if let Some(term) = astray {
-            self.fact(facts::OUT_OF_STEP, |fact| fact.with("node", node.as_str()).with("term", count(term)));
+            self.fact(OutOfStep { node: node.clone(), term });
         }
     }
 
@@ -219,11 +218,7 @@ impl Node {
         if joint.comes_into_step() {
             let (term, decided, coordinator) =
                 (joint.term(), joint.decided(), joint.roster.coordinator.clone());
-            self.fact(facts::IN_STEP, |fact| {
-                fact.with("term", count(term))
-                    .with("decided", count(decided))
-                    .with("coordinator", coordinator.as_str())
-            });
+            self.fact(InStep { term, decided, coordinator });
         }
     }
 }

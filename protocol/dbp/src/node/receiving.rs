@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use crate::facts::{self, count};
+use crate::facts::{Denied, DuplicateName, Gap, PeerJoined, Refused, Unknown};
 use crate::node::{BoardChange, Delivery, LEAST_LEASE, Node, REPEAT_DOUBLE};
 use crate::peers::Word;
 use crate::stream::{Heard, REPAIR_CHUNK, Stream};
@@ -29,9 +29,7 @@ impl Node {
                 self.begin_life(node, incarnation);
             }
         }
-        self.fact(facts::PEER_JOINED, |fact| {
-            fact.with("node", node.as_str()).with("incarnation", count(incarnation))
-        });
+        self.fact(PeerJoined { node: node.clone(), incarnation });
         // So that the other one need not wait for the next sign of life.
         self.presence_due = self.now;
         true
@@ -60,11 +58,8 @@ impl Node {
         }
         for bid in outbox.home_restarted(incarnation) {
             for event in &bid.requests {
-                self.fact(facts::UNKNOWN, |fact| {
-                    fact.with("event", event.name())
-                        .with("bthread", bid.bthread.as_str())
-                        .with("home", node.as_str())
-                });
+                let bthread = bid.bthread.as_str().into();
+                self.fact(Unknown { event: event.name().into(), bthread, home: node.clone() });
             }
         }
     }
@@ -82,9 +77,7 @@ impl Node {
         for heard in heard {
             match heard {
                 Heard::Occurrence(occurrence) => self.deliveries.push_back(Delivery::Occurrence(occurrence)),
-                Heard::Gap { from, to } => self.fact(facts::GAP, |fact| {
-                    fact.with("home", home.as_str()).with("from", count(from)).with("to", count(to))
-                }),
+                Heard::Gap { from, to } => self.fact(Gap { home: home.clone(), from, to }),
             }
         }
     }
@@ -101,11 +94,8 @@ impl Node {
         };
         self.change_proxies(proxies);
         for refusal in denied {
-            self.fact(facts::DENIED, |fact| {
-                fact.with("node", record.node.as_str())
-                    .with("bthread", refusal.bthread.as_str())
-                    .with("reason", refusal.reason.as_str())
-            });
+            let bthread = refusal.bthread.as_str().into();
+            self.fact(Denied { node: record.node.clone(), bthread, reason: refusal.reason });
         }
         let ack = BidAck {
             home: self.config.name.clone(),
@@ -131,11 +121,8 @@ impl Node {
         let home = ack.home.clone();
         let refused = self.outboxes.get_mut(&home).map(|outbox| outbox.acknowledged(self.now, ack));
         for refusal in refused.into_iter().flatten() {
-            self.fact(facts::REFUSED, |fact| {
-                fact.with("bthread", refusal.bthread.as_str())
-                    .with("home", home.as_str())
-                    .with("reason", refusal.reason.as_str())
-            });
+            let bthread = refusal.bthread.as_str().into();
+            self.fact(Refused { bthread, home: home.clone(), reason: refusal.reason });
         }
         true
     }
@@ -213,7 +200,7 @@ impl Node {
         }
         if self.double_told.is_none_or(|at| self.now >= at + REPEAT_DOUBLE) {
             self.double_told = Some(self.now);
-            self.fact(facts::DUPLICATE_NAME, |fact| fact.with("incarnation", count(presence.incarnation)));
+            self.fact(DuplicateName { incarnation: presence.incarnation });
         }
         true
     }

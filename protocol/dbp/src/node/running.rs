@@ -4,10 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
+use skein_bp::catalogue::Declared as _;
 use skein_bp::{Event, Origin, Rival, Selection};
 
 use crate::board::shorten;
-use crate::facts::{self, tell};
+use crate::facts::{BlockLapsed, Orphan, PeerLost, Stalled, Unstalled};
 use crate::held_blocks::BlockNews;
 use crate::node::{
     Delivery, Happened, Home, MOST_ROUNDS, Node, NodeError, RESTART_GUARD, Select, confirmation,
@@ -41,10 +42,8 @@ impl Node {
     pub(super) fn tell_loss(&mut self, node: &NodeName) {
         let names = |bthreads: BTreeSet<String>| bthreads.into_iter().collect::<Vec<_>>().join(" ");
         let (released, held) = (names(self.table.released_by(node)), names(self.table.held_for(node)));
-        self.fact(facts::PEER_LOST, |fact| {
-            let fact = fact.with("node", node.as_str()).with("released", released);
-            if held.is_empty() { fact } else { fact.with("held", held) }
-        });
+        let held = (!held.is_empty()).then(|| held.into());
+        self.fact(PeerLost { node: node.clone(), released: released.into(), held });
     }
 
     pub(super) fn guard_ends(&self) -> Duration {
@@ -129,10 +128,7 @@ impl Node {
                 .then(|| confirmation(&self.config.name, &bthread, sync)),
             BlockNews::Lapsed { bthread, home } => {
                 let blocks = self.program.bid(&bthread).is_some_and(|bid| !bid.blocks().is_none());
-                blocks.then(|| {
-                    let fact = tell(&self.config.name, facts::BLOCK_LAPSED);
-                    fact.with("bthread", bthread).with("home", home.as_str())
-                })
+                blocks.then(|| BlockLapsed { bthread: bthread.into(), home }.at(&self.config.name))
             }
         }
     }
@@ -151,12 +147,8 @@ impl Node {
             let wanted = request.incarnation == self.config.incarnation
                 && self.sync_of(&request.bthread) == Some(request.sync);
             if ours && !wanted {
-                let (event, home) = (event.clone(), home.clone());
-                self.fact(facts::ORPHAN, |fact| {
-                    fact.with("event", event.name())
-                        .with("home", home.as_str())
-                        .with("bthread", request.bthread.as_str())
-                });
+                let bthread = request.bthread.as_str().into();
+                self.fact(Orphan { event: event.name().into(), bthread, home: home.clone() });
             }
         }
         self.stats.heard += 1;
@@ -257,11 +249,9 @@ impl Node {
         for news in self.stalls.update(stalled) {
             match news {
                 StallNews::Stalled { event, by } => {
-                    self.fact(facts::STALLED, |fact| fact.with("event", event).with("by", by))
+                    self.fact(Stalled { event: event.into(), by: by.into() });
                 }
-                StallNews::Unstalled { event } => {
-                    self.fact(facts::UNSTALLED, |fact| fact.with("event", event))
-                }
+                StallNews::Unstalled { event } => self.fact(Unstalled { event: event.into() }),
             }
         }
     }

@@ -4,8 +4,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use skein_bp::catalogue::Declared as _;
 use skein_bp::{Event, Program};
-use skein_dbp::{ROSTER, RefusalReason, Roster, facts};
+use skein_dbp::facts::Refused;
+use skein_dbp::{ROSTER, RefusalReason, Roster};
 
 use super::{Findings, Oracle};
 use crate::knowledge::{Knowledge, Member, Step};
@@ -45,11 +47,11 @@ impl Oracle for GoesOn {
                 if let Some(home) = knowledge.number(happened.home.as_str()) {
                     self.heard.insert((step.node, home), happened.seq);
                 }
-            } else if me.is_fact(happened) && happened.event.kind() == facts::REFUSED {
-                let (bthread, reason) = (happened.event.text("bthread"), happened.event.text("reason"));
-                if let Some(bthread) = bthread.filter(|_| reason == Some(RefusalReason::Safety.as_str())) {
-                    self.refused.insert((step.node, bthread.to_owned()));
-                }
+            } else if me.is_fact(happened)
+                && let Some(refused) = Refused::read(&happened.event)
+                && refused.reason == RefusalReason::Safety
+            {
+                self.refused.insert((step.node, refused.bthread.to_string()));
             }
         }
         for (marks, since) in
