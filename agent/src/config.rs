@@ -9,6 +9,7 @@ use skein_bp::script::Assignment;
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
 use skein_planning::airspace::Airspace;
+use skein_wire::event::Catalogue;
 
 use crate::bthreads::LinkLossPolicy;
 use crate::field::positive;
@@ -147,5 +148,11 @@ impl AgentConfig {
     #[must_use]
     pub fn host(&self) -> Host<'_> {
         Host { node: &self.node, roster: self.roster.iter().map(String::as_str).collect() }
+    }
+
+    /// The events that the vehicle knows.
+    #[must_use]
+    pub fn events(&self) -> Catalogue {
+        self.behaviours.declarations(&self.node).fold(Catalogue::standard(), Catalogue::with)
     }
 }

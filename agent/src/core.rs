@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_dbp::{Happened, NodeName};
+use skein_wire::event::What;
 use skein_wire::{KeptScript, Link, NodeLink, Scan, Store};
 
 use crate::{
@@ -106,8 +107,8 @@ impl AgentCore {
         self.control.take_mavlink()
     }
 
-    /// An order of whoever is at this vehicle's own computer: `what` as in [`skein_wire::vocabulary::order`].
-    pub fn order(&mut self, what: &str) {
+    /// Takes in an order of whoever is at this vehicle's own computer.
+    pub fn order(&mut self, what: What) {
         self.mission.order(what);
     }
 

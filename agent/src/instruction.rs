@@ -2,7 +2,10 @@
 
 use nalgebra::Vector3;
 use skein_bp::Event;
-use skein_wire::vocabulary::{ADVANCE, GOTO, HAND_BACK, HOLD, HOMEWARD, LAND, LANDED, ORDER, PLAN, TAKEOFF};
+use skein_wire::event::{
+    Advance, Declared as _, Goto, HandBack, Hold, Homeward, Land, Landed, OrderTaken, Plan, PlanReason,
+    Takeoff,
+};
 
 use crate::bthreads::HOME_LEG;
 use crate::me::Me;
@@ -47,25 +50,22 @@ impl Instruction {
     #[must_use]
     pub fn of(me: &Me, event: &Event) -> Option<Self> {
         Some(match me.verb(event)? {
-            TAKEOFF => Self::TakeOff,
-            LAND => Self::Land,
-            HOLD => Self::Hold,
-            HAND_BACK => Self::TakeBack,
-            ORDER if matches!(event.text("what"), Some("resume" | "return")) => Self::Resume,
-            GOTO => Self::GoTo(Waypoint::of(event)?),
-            PLAN => Self::Plan { is_stuck: event.text("why") == Some("stuck") },
-            ADVANCE | HOMEWARD => Self::GrantLeave,
-            LANDED => Self::EndFlight,
+            Takeoff::NAME => Self::TakeOff,
+            Land::NAME => Self::Land,
+            Hold::NAME => Self::Hold,
+            HandBack::NAME => Self::TakeBack,
+            OrderTaken::NAME if OrderTaken::read(event)?.what.releases() => Self::Resume,
+            Goto::NAME => Self::GoTo(Goto::read(event)?.into()),
+            Plan::NAME => Self::Plan { is_stuck: Plan::read(event)?.why == PlanReason::Stuck },
+            Advance::NAME | Homeward::NAME => Self::GrantLeave,
+            Landed::NAME => Self::EndFlight,
             _ => return None,
         })
     }
 }
 
-impl Waypoint {
-    fn of(goto: &Event) -> Option<Self> {
-        let leg = goto.int("leg")?;
-        let target = Vector3::new(goto.real("x")?, goto.real("y")?, goto.real("z")?);
-        let lands = goto.bool("lands").unwrap_or(true);
-        Some(Self { leg, target, lands, is_home: leg == HOME_LEG })
+impl From<Goto> for Waypoint {
+    fn from(Goto { leg, lands, x, y, z }: Goto) -> Self {
+        Self { leg, target: Vector3::new(x, y, z), lands, is_home: leg == HOME_LEG }
     }
 }

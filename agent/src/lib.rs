@@ -29,7 +29,7 @@ pub mod pipeline;
 pub mod positioning;
 pub mod precedence;
 mod report;
-mod safety_events;
+mod safety;
 pub mod scripts;
 pub mod verify;
 mod watches;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use skein_bp::{Event, EventSet};
-use skein_wire::vocabulary;
+use skein_wire::event::{self, Declaration, Declared, Events};
 
 /// A vehicle's node name, such as `uav/3`, as its b-threads use it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -14,34 +14,33 @@ impl Me {
         Self(node.to_string())
     }
 
-    /// The node name.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.0
     }
 
-    /// The event `<me>/<verb>` without data.
+    /// This event of mine: `me.event(Land { why: "battery low".into() })`.
     #[must_use]
-    pub fn event(&self, verb: &str) -> Event {
-        vocabulary::event(&self.0, verb)
+    pub fn event(&self, event: impl Declared) -> Event {
+        event.at(&self.0)
     }
 
-    /// The event `<me>/<verb>` that says why it is requested.
+    /// The name of my event `verb`.
     #[must_use]
-    pub fn because(&self, verb: &str, why: &str) -> Event {
-        self.event(verb).with("why", why)
+    pub fn event_name(&self, verb: &str) -> String {
+        format!("{}/{verb}", self.0)
     }
 
-    /// All events `<me>/<verb>`, whatever their data.
+    /// My events of one or several declared types, whatever their data: `me.any::<(Land, Landed)>()`.
     #[must_use]
-    pub fn any(&self, verb: &str) -> EventSet {
-        vocabulary::of(&self.0, verb)
+    pub fn any<E: Events>(&self) -> EventSet {
+        E::any_at(&self.0)
     }
 
-    /// All events `<me>/<verb>` for several verbs.
+    /// My events of a list, whatever their data.
     #[must_use]
-    pub fn any_of(&self, verbs: &[&str]) -> EventSet {
-        EventSet::Or(verbs.iter().map(|verb| self.any(verb)).collect())
+    pub fn any_in(&self, events: impl IntoIterator<Item = &'static Declaration>) -> EventSet {
+        event::any_of(&self.0, events)
     }
 
     /// The verb of one of my events; `None` for an event of another home.
@@ -50,9 +49,15 @@ impl Me {
         event.name().strip_prefix(self.0.as_str())?.strip_prefix('/')
     }
 
-    /// Whether `event` is `<me>/<verb>`.
+    /// Whether `event` is mine, and of this type.
     #[must_use]
-    pub fn heard(&self, event: &Event, verb: &str) -> bool {
-        self.verb(event) == Some(verb)
+    pub fn heard<D: Declared>(&self, event: &Event) -> bool {
+        self.verb(event) == Some(D::NAME)
+    }
+
+    /// The data of `event`, if it is mine, and of this type.
+    #[must_use]
+    pub fn read<D: Declared>(&self, event: &Event) -> Option<D> {
+        if self.heard::<D>(event) { D::read(event) } else { None }
     }
 }

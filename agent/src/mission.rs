@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use skein_bp::catalogue::Whose;
 use skein_bp::script::Assignment;
 use skein_bp::{Event, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
-use skein_wire::vocabulary::{
-    self, ADVANCE, COMPLETE, ENTER, FAILED, GOTO, HOLD, LAND, LOAD, ORDER, RETURN, SCRIPT, TAKEOFF, UNLOAD,
+use skein_wire::event::{
+    self, Advance, Complete, Declared as _, Enter, Failed, Goto, Hold, Land, Load, OrderTaken, Return,
+    ScriptNews, Takeoff, Unload, What,
 };
 use skein_wire::{Fleet, KeptScript, Link, MissionState, NodeLink, State, Store, joint_roster};
 
@@ -22,7 +22,7 @@ use crate::{
     mind::Mind,
     precedence,
     report::Report,
-    safety_events::safety_events,
+    safety::safety_events,
     scripts::{Begins, CONFIGURATION, Circumstances, ScriptFacts, Scripts},
     verify::check_script,
 };
@@ -71,7 +71,7 @@ impl Mission {
         let protected = node_config.safety.clone();
         let mut program = Program::new(ProgramConfig { protected, ..ProgramConfig::vehicle(config.seed) });
         mind.load(&mut program, &config);
-        let mut scripts = Scripts::new(me.clone(), &config.roster);
+        let mut scripts = Scripts::new(me.clone(), &config.roster, &config.events());
         for assignment in &config.scripts {
             scripts
                 .load(&mut program, assignment, CONFIGURATION, Begins::WhenReleased)
@@ -111,9 +111,9 @@ impl Mission {
         self.scripts.keep_in(store);
     }
 
-    /// An order of whoever is at this vehicle's own computer: `what` as in [`vocabulary::order`].
-    pub fn order(&mut self, what: &str) {
-        self.node.node_mut().enqueue(vocabulary::order(&self.name, what));
+    /// Takes in an order of whoever is at this vehicle's own computer.
+    pub fn order(&mut self, what: What) {
+        self.node.node_mut().enqueue(OrderTaken::plain(what).at(&self.name));
     }
 
     /// Takes in what other nodes say; gives back what vehicles say of themselves.
@@ -194,22 +194,22 @@ impl Mission {
     }
 
     fn note_task(&mut self, event: &Event, is_landing: bool) {
-        let why = event.text("why").unwrap_or_default();
+        let why = event::why(event).unwrap_or_default();
         self.task = match self.me.verb(event) {
-            Some(TAKEOFF) => "taking off".to_owned(),
-            Some(GOTO) => match event.int("leg") {
-                Some(bthreads::HOME_LEG) => "flying home".to_owned(),
-                Some(bthreads::OPERATOR_LEG) => "going where the operator points".to_owned(),
-                leg => format!("leg {} of {}", leg.unwrap_or_default() + 1, self.config.waypoints.len()),
+            Some(Takeoff::NAME) => "taking off".to_owned(),
+            Some(Goto::NAME) => match Goto::read(event).map_or(0, |goto| goto.leg) {
+                bthreads::HOME_LEG => "flying home".to_owned(),
+                bthreads::OPERATOR_LEG => "going where the operator points".to_owned(),
+                leg => format!("leg {} of {}", leg + 1, self.config.waypoints.len()),
             },
-            Some(HOLD) => "holding".to_owned(),
-            Some(RETURN) if !is_landing => format!("returning: {why}"),
-            Some(LAND) => format!("landing: {why}"),
-            Some(COMPLETE) => {
+            Some(Hold::NAME) => "holding".to_owned(),
+            Some(Return::NAME) if !is_landing => format!("returning: {why}"),
+            Some(Land::NAME) => format!("landing: {why}"),
+            Some(Complete::NAME) => {
                 self.outcome = Some(Outcome::Complete);
                 "arrived".to_owned()
             }
-            Some(FAILED) => {
+            Some(Failed::NAME) => {
                 self.outcome = Some(Outcome::Failed(why.to_owned()));
                 why.to_owned()
             }
@@ -221,18 +221,18 @@ impl Mission {
     fn look_after_scripts(&mut self, happened: &Happened) {
         let event = &happened.event;
         let verdict = match self.me.verb(event) {
-            Some(LOAD) => {
+            Some(Load::NAME) => {
                 let (name, outcome) = self.load_script(happened);
                 self.scripts.verdict(&name, outcome)
             }
-            Some(UNLOAD) => {
-                let name = event.text("name").unwrap_or_default();
-                if self.scripts.runs(name) {
+            Some(Unload::NAME) => {
+                let name = Unload::read(event).map(|unload| unload.name).unwrap_or_default();
+                if self.scripts.runs(&name) {
                     return;
                 }
-                self.scripts.verdict(name, Err("no script of this name runs".to_owned()))
+                self.scripts.verdict(&name, Err("no script of this name runs".to_owned()))
             }
-            Some(SCRIPT) => return self.scripts.hear(event),
+            Some(ScriptNews::NAME) => return self.scripts.hear(event),
             _ => return,
         };
         self.node.node_mut().enqueue(verdict);
@@ -240,8 +240,8 @@ impl Mission {
 
     /// Runs a script that is sent; gives back its name, and why it is not run if it is not.
     fn load_script(&mut self, happened: &Happened) -> (String, Result<(), String>) {
-        let text = happened.event.text("script").unwrap_or_default();
-        let assignment = match Assignment::from_json(text) {
+        let text = Load::read(&happened.event).map(|load| load.script).unwrap_or_default();
+        let assignment = match Assignment::from_json(&text) {
             Ok(assignment) => assignment,
             Err(error) => return (String::new(), Err(error.to_string())),
         };
@@ -271,7 +271,7 @@ impl Mission {
     fn may_send(&self, assignment: &Assignment, from: &str) -> Result<bool, String> {
         let Some((node, bthread)) = from.split_once('#') else { return Ok(from == self.name.as_str()) };
         let text = assignment.to_json().map_err(|error| error.to_string())?;
-        let load = self.me.event(LOAD).with("script", text);
+        let load = self.me.event(Load { name: None, script: text.into() });
         let is_member = self.config.roster.iter().any(|member| member == node);
         let may_request = |node| self.config.authority.may_request(&node, bthread, &load);
         Ok(is_member && !node.starts_with("uav/") && NodeName::new(node).is_ok_and(may_request))
@@ -283,7 +283,7 @@ impl Mission {
         if let Some(fault) = self.fault.as_deref().or(complaint) {
             return fault.to_owned();
         }
-        let question = self.me.any_of(&[ADVANCE, ENTER, TAKEOFF]);
+        let question = self.me.any::<(Advance, Enter, Takeoff)>();
         let explanation = self.node.node().explain(question).local;
         if explanation.requested.is_empty() {
             return String::new();
@@ -332,10 +332,11 @@ fn node_config(config: &AgentConfig, me: &Me, durable: bool) -> Result<NodeConfi
     };
     let roster: Vec<_> = config.roster.iter().map(|node| name("roster", node)).collect::<Result<_, _>>()?;
     let own_name = name("node", &config.node)?;
+    let events = config.events();
     Ok(NodeConfig {
         lease: config.lease,
-        safety: safety_events(me).or(config.behaviours.events(me.name(), Whose::Own)),
-        gateway: me.any_of(&[ORDER, LOAD, UNLOAD]).or(config.behaviours.events(me.name(), Whose::Operator)),
+        safety: safety_events(me, &events),
+        gateway: me.any_in(events.gateway()),
         // What comes from afar never outranks a vehicle's own b-threads for its safety.
         remote_priority: precedence::MISSION..=precedence::LINK,
         authority: config.authority.clone(),

@@ -6,10 +6,9 @@ use nalgebra::Vector3;
 use skein_bp::Event;
 use skein_dbp::NodeName;
 use skein_mav::FlightMode;
-use skein_wire::vocabulary::{
-    AIRBORNE, ARRIVED, BATTERY_CRITICAL, BATTERY_LOW, CLEAR, COMMAND_FAILED, FENCE_BREACHED, FOUND_AIRBORNE,
-    LANDED, LEAVE, PASSAGE, PATH_BLOCKED, PILOT, PLANNED, READY, SLEPT, STUCK, TOO_CLOSE, UNPLANNABLE,
-    UNREADY,
+use skein_wire::event::{
+    self, Airborne, Arrived, BatteryCritical, BatteryLow, Clear, CommandFailed, FenceBreached, FoundAirborne,
+    Landed, Leave, PathBlocked, PilotTook, Planned, Ready, Slept, Stuck, TooClose, Unplannable, Unready,
 };
 
 use crate::me::Me;
@@ -71,26 +70,26 @@ impl Report {
     #[must_use]
     pub fn into_event(self, me: &Me) -> Event {
         match self {
-            Self::Ready => me.event(READY),
-            Self::Unready => me.event(UNREADY),
-            Self::Airborne => me.event(AIRBORNE),
-            Self::Landed => me.event(LANDED),
-            Self::FoundAirborne => me.event(FOUND_AIRBORNE),
-            Self::Pilot(mode) => me.event(PILOT).with("mode", mode.to_string()),
-            Self::Slept(pause) => me.event(SLEPT).with("seconds", pause.as_secs_f64()),
-            Self::CommandFailed(why) => me.because(COMMAND_FAILED, &why),
-            Self::BatteryLow => me.event(BATTERY_LOW),
-            Self::BatteryCritical => me.event(BATTERY_CRITICAL),
-            Self::FenceBreached => me.event(FENCE_BREACHED),
-            Self::TooClose(other) => me.event(TOO_CLOSE).with("other", other.as_str()),
-            Self::Clear => me.event(CLEAR),
-            Self::Planned { leg, length_m } => me.event(PLANNED).with("leg", leg).with("length_m", length_m),
-            Self::Unplannable { leg, why } => me.because(UNPLANNABLE, &why).with("leg", leg),
-            Self::Arrived { leg } => me.event(ARRIVED).with("leg", leg),
-            Self::PathBlocked => me.event(PATH_BLOCKED),
-            Self::Stuck => me.event(STUCK),
-            Self::Passage(at) => me.event(PASSAGE).with("x", at.x).with("y", at.y).with("z", at.z),
-            Self::PassageLeft => me.event(LEAVE),
+            Self::Ready => me.event(Ready),
+            Self::Unready => me.event(Unready),
+            Self::Airborne => me.event(Airborne),
+            Self::Landed => me.event(Landed),
+            Self::FoundAirborne => me.event(FoundAirborne),
+            Self::Pilot(mode) => me.event(PilotTook { mode: mode.to_string().into() }),
+            Self::Slept(pause) => me.event(Slept { seconds: pause.as_secs_f64() }),
+            Self::CommandFailed(why) => me.event(CommandFailed { why: why.into() }),
+            Self::BatteryLow => me.event(BatteryLow),
+            Self::BatteryCritical => me.event(BatteryCritical),
+            Self::FenceBreached => me.event(FenceBreached),
+            Self::TooClose(other) => me.event(TooClose { other: other.as_str().into() }),
+            Self::Clear => me.event(Clear),
+            Self::Planned { leg, length_m } => me.event(Planned { leg, length_m }),
+            Self::Unplannable { leg, why } => me.event(Unplannable { leg, why: why.into() }),
+            Self::Arrived { leg } => me.event(Arrived { leg }),
+            Self::PathBlocked => me.event(PathBlocked),
+            Self::Stuck => me.event(Stuck),
+            Self::Passage(at) => me.event(event::Passage { x: at.x, y: at.y, z: at.z }),
+            Self::PassageLeft => me.event(Leave),
         }
     }
 }

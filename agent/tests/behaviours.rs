@@ -7,7 +7,7 @@ use skein_agent::{AgentConfig, AgentCore, Me};
 use skein_bp::behaviour::{Behaviour, Behaviours, Chosen, Host, Model};
 use skein_bp::catalogue::{Declaration, Declared as _, Whose};
 use skein_bp::{BThread, Bid, Context, Event, EventSet, Program};
-use skein_wire::vocabulary::{LAND, TAKEOFF};
+use skein_wire::event::{Land, Takeoff};
 
 use crate::verify::config;
 
@@ -31,7 +31,7 @@ struct Gauge {
 }
 
 fn takeoff() -> String {
-    TAKEOFF.to_owned()
+    Takeoff::NAME.to_owned()
 }
 
 impl Behaviour for Gauge {
@@ -52,7 +52,7 @@ impl Behaviour for Gauge {
         ]);
         model.tell("wind", wind);
         let rule = "in a gust nobody takes off";
-        let never = Me::new(host.node).any(TAKEOFF);
+        let never = Me::new(host.node).any::<Takeoff>();
         model.require(rule, Requirement::absence(rule, never, gust.into(), calm.into()));
     }
 }
@@ -66,8 +66,8 @@ struct Gauging {
 
 impl BThread for Gauging {
     fn bid(&self) -> Option<Bid> {
-        let bid = Bid::new().wait_for(Gust::any_at(self.me.name())).wait_for(Calm::any_at(self.me.name()));
-        Some(if self.blows { bid.block(self.me.any(&self.verb)) } else { bid })
+        let bid = Bid::new().wait_for(self.me.any::<(Gust, Calm)>());
+        Some(if self.blows { bid.block(EventSet::named(self.me.event_name(&self.verb))) } else { bid })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
@@ -103,7 +103,7 @@ fn a_behaviour_that_breaks_its_own_requirement_is_found() {
 
 #[test]
 fn a_behaviour_that_blocks_a_safety_event_is_found() {
-    let verifier = VehicleVerifier::new(&with(json!({ "verb": LAND }))).unwrap();
+    let verifier = VehicleVerifier::new(&with(json!({ "verb": Land::NAME }))).unwrap();
     let violation = verifier.verify(Scene::Launch, |_| {}).report.verdict.unwrap().to_string();
     assert!(violation.contains("`gauge` blocks `uav/1/land`"), "{violation}");
 }

@@ -7,9 +7,10 @@ use skein_agent::{
     bthreads::{self, LinkLossPolicy},
 };
 use skein_bp::{Bid, Event, EventSet, Program, ProgramConfig};
-use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, DUPLICATE_NAME, PEER_JOINED, PEER_LOST, STALLED};
+use skein_dbp::NodeName;
+use skein_dbp::facts::{BlockLapsed, Confirmed, DuplicateName, PeerJoined, PeerLost, Stalled};
 use skein_mav::Datum;
-use skein_wire::vocabulary::{self, *};
+use skein_wire::event::*;
 
 /// Its number follows 9 as a number, not as a text.
 const ME: &str = "uav/10";
@@ -50,7 +51,15 @@ fn config() -> AgentConfig {
 }
 
 fn mine(verb: &str) -> Event {
-    vocabulary::event(ME, verb)
+    Event::new(format!("{ME}/{verb}"))
+}
+
+fn joined(node: &str) -> Event {
+    PeerJoined { node: NodeName::new(node).unwrap(), incarnation: 1 }.at(ME)
+}
+
+fn lost(node: &str, released: &str) -> Event {
+    PeerLost { node: NodeName::new(node).unwrap(), released: released.into(), held: None }.at(ME)
 }
 
 fn at(verb: Event, [x, y, z]: [f64; 3]) -> Event {
@@ -60,7 +69,7 @@ fn at(verb: Event, [x, y, z]: [f64; 3]) -> Event {
 /// What the tests compare: the verb, with the datum that matters; other nodes are named.
 fn told(event: &Event) -> String {
     let verb = Me::new(ME).verb(event).unwrap_or(event.name()).to_owned();
-    match (event.text("why"), event.text("what"), event.int("leg")) {
+    match (why(event), event.text("what"), event.int("leg")) {
         (Some(why), _, _) => format!("{verb}: {why}"),
         (_, Some(what), _) => format!("{verb} {what}"),
         (_, _, Some(leg)) => format!("{verb} {leg}"),
@@ -87,16 +96,16 @@ impl Vehicle {
     /// In the air, on its way to the first waypoint, without a path yet.
     fn in_the_air(config: &AgentConfig) -> Self {
         let mut vehicle = Self::new(config);
-        assert_eq!(vehicle.reports(READY), ["ready"]);
-        assert_eq!(vehicle.reports(TAKEOFF), ["takeoff"]);
-        assert_eq!(vehicle.reports(AIRBORNE), ["airborne", "goto 0", "plan: waypoint"]);
+        assert_eq!(vehicle.reports(Ready::NAME), ["ready"]);
+        assert_eq!(vehicle.reports(Takeoff::NAME), ["takeoff"]);
+        assert_eq!(vehicle.reports(Airborne::NAME), ["airborne", "goto 0", "plan: waypoint"]);
         vehicle
     }
 
     /// Moving along a path to the first waypoint.
     fn on_its_way() -> Self {
         let mut vehicle = Self::in_the_air(&config());
-        assert_eq!(vehicle.reports(PLANNED), ["planned", "advance"]);
+        assert_eq!(vehicle.reports(Planned::NAME), ["planned", "advance"]);
         vehicle
     }
 
@@ -120,11 +129,11 @@ impl Vehicle {
     }
 
     fn arrives(&mut self, leg: i64) -> Vec<String> {
-        self.hears(mine(ARRIVED).with("leg", leg))
+        self.hears(Arrived { leg }.at(ME))
     }
 
-    fn is_ordered(&mut self, what: &str) -> Vec<String> {
-        self.hears(order(ME, what))
+    fn is_ordered(&mut self, what: What) -> Vec<String> {
+        self.hears(OrderTaken::plain(what).at(ME))
     }
 
     /// A fact of the fleet, or an event of another home.
@@ -163,16 +172,16 @@ mod mission {
     fn flies_the_waypoints_in_turn_then_lands_and_completes_whatever_the_seed() {
         for seed in 0..8 {
             let mut vehicle = Vehicle::in_the_air(&AgentConfig { seed, ..config() });
-            assert_eq!(*vehicle.last(GOTO), {
-                let goto = mine(GOTO).with("leg", 0_i64).with("lands", false);
+            assert_eq!(*vehicle.last(Goto::NAME), {
+                let goto = mine(Goto::NAME).with("leg", 0_i64).with("lands", false);
                 at(goto, [10.0, 0.0, 2.0])
             });
-            assert_eq!(vehicle.reports(PLANNED), ["planned", "advance"]);
+            assert_eq!(vehicle.reports(Planned::NAME), ["planned", "advance"]);
             assert_eq!(vehicle.arrives(0), ["arrived 0", "goto 1", "plan: waypoint"]);
-            assert_eq!(vehicle.last(GOTO).bool("lands"), Some(true));
+            assert_eq!(Goto::read(vehicle.last(Goto::NAME)).map(|goto| goto.lands), Some(true));
             assert_eq!(vehicle.arrives(0), ["arrived 0"], "an old waypoint does not count again");
             assert_eq!(vehicle.arrives(1), ["arrived 1", "land: mission complete"]);
-            assert_eq!(vehicle.reports(LANDED), ["landed", "complete"]);
+            assert_eq!(vehicle.reports(Landed::NAME), ["landed", "complete"]);
             assert_eq!(vehicle.after(10 * SECOND), NOTHING);
         }
     }
@@ -180,16 +189,16 @@ mod mission {
     #[test]
     fn fails_when_the_vehicle_cannot_take_off() {
         let mut vehicle = Vehicle::new(&config());
-        vehicle.reports(READY);
-        vehicle.reports(TAKEOFF);
-        let refused = mine(COMMAND_FAILED).with("why", "Arm: denied");
+        vehicle.reports(Ready::NAME);
+        vehicle.reports(Takeoff::NAME);
+        let refused = CommandFailed { why: "Arm: denied".into() }.at(ME);
         assert_eq!(vehicle.hears(refused), ["command_failed: Arm: denied", "failed: Arm: denied"]);
     }
 
     #[test]
     fn fails_when_the_autopilot_lands_by_itself() {
         let mut vehicle = Vehicle::on_its_way();
-        assert_eq!(vehicle.reports(LANDED), ["landed", "failed: the autopilot landed by itself"]);
+        assert_eq!(vehicle.reports(Landed::NAME), ["landed", "failed: the autopilot landed by itself"]);
     }
 }
 
@@ -199,52 +208,52 @@ mod before_take_off {
     #[test]
     fn take_off_waits_until_the_vehicle_is_ready() {
         let mut vehicle = Vehicle::new(&config());
-        assert_eq!(vehicle.reports(TAKEOFF), NOTHING);
-        assert_eq!(vehicle.reports(READY), ["ready", "takeoff"]);
+        assert_eq!(vehicle.reports(Takeoff::NAME), NOTHING);
+        assert_eq!(vehicle.reports(Ready::NAME), ["ready", "takeoff"]);
     }
 
     #[test]
     fn take_off_waits_again_once_a_check_fails() {
         let mut vehicle = Vehicle::new(&config());
-        vehicle.reports(READY);
-        assert!(vehicle.may(TAKEOFF));
-        vehicle.reports(UNREADY);
-        assert_eq!(vehicle.reports(TAKEOFF), NOTHING);
-        assert_eq!(vehicle.reports(READY), ["ready", "takeoff"]);
+        vehicle.reports(Ready::NAME);
+        assert!(vehicle.may(Takeoff::NAME));
+        vehicle.reports(Unready::NAME);
+        assert_eq!(vehicle.reports(Takeoff::NAME), NOTHING);
+        assert_eq!(vehicle.reports(Ready::NAME), ["ready", "takeoff"]);
     }
 
     #[test]
     fn a_vehicle_that_has_taken_off_takes_off_again_only_from_the_ground() {
         let mut vehicle = Vehicle::new(&config());
-        vehicle.reports(READY);
-        vehicle.reports(TAKEOFF);
-        assert!(!vehicle.may(TAKEOFF));
-        vehicle.hears(mine(COMMAND_FAILED).with("why", "Arm: denied"));
+        vehicle.reports(Ready::NAME);
+        vehicle.reports(Takeoff::NAME);
+        assert!(!vehicle.may(Takeoff::NAME));
+        vehicle.hears(CommandFailed { why: "Arm: denied".into() }.at(ME));
         let mut other = Vehicle::new(&config());
-        other.reports(READY);
-        other.reports(TAKEOFF);
+        other.reports(Ready::NAME);
+        other.reports(Takeoff::NAME);
         other.program.remove("mission");
-        other.reports(LANDED);
-        assert!(other.may(TAKEOFF));
+        other.reports(Landed::NAME);
+        assert!(other.may(Takeoff::NAME));
     }
 
     #[test]
     fn an_order_to_return_on_the_ground_does_not_count_in_the_air() {
         let mut vehicle = Vehicle::new(&config());
-        assert_eq!(vehicle.is_ordered("return"), ["order return", "return: ordered by the operator"]);
-        vehicle.reports(READY);
-        vehicle.reports(TAKEOFF);
-        assert_eq!(vehicle.reports(AIRBORNE), ["airborne", "goto 0", "plan: waypoint"]);
+        assert_eq!(vehicle.is_ordered(What::Return), ["order return", "return: ordered by the operator"]);
+        vehicle.reports(Ready::NAME);
+        vehicle.reports(Takeoff::NAME);
+        assert_eq!(vehicle.reports(Airborne::NAME), ["airborne", "goto 0", "plan: waypoint"]);
         let home = ["battery_low", "return: battery low", "goto -1", "plan: waypoint"];
-        assert_eq!(vehicle.reports(BATTERY_LOW), home, "it was still returning");
+        assert_eq!(vehicle.reports(BatteryLow::NAME), home, "it was still returning");
     }
 
     #[test]
     fn a_remote_request_takes_the_vehicle_off_once_it_is_ready() {
         let mut vehicle = Vehicle::new(&config());
-        vehicle.program.put_proxy("ground/1#launch", &Bid::new().request(mine(TAKEOFF)));
+        vehicle.program.put_proxy("ground/1#launch", &Bid::new().request(mine(Takeoff::NAME)));
         assert_eq!(vehicle.happened(), NOTHING);
-        assert_eq!(vehicle.reports(READY), ["ready", "takeoff"]);
+        assert_eq!(vehicle.reports(Ready::NAME), ["ready", "takeoff"]);
     }
 }
 
@@ -253,23 +262,24 @@ mod pilot {
 
     #[test]
     fn blocks_every_movement_until_the_vehicle_is_handed_back() {
-        let moves = [GOTO, PLAN, ADVANCE, ENTER, HOLD, LAND, RETURN];
+        let moves =
+            [Goto::NAME, Plan::NAME, Advance::NAME, Enter::NAME, Hold::NAME, Land::NAME, Return::NAME];
         let mut vehicle = Vehicle::on_its_way();
         assert_eq!(moves.map(|verb| vehicle.may(verb)), [true; 7]);
-        assert_eq!(vehicle.reports(PILOT), ["pilot"]);
+        assert_eq!(vehicle.reports(PilotTook::NAME), ["pilot"]);
         assert_eq!(vehicle.after(SECOND), NOTHING);
         assert_eq!(moves.map(|verb| vehicle.may(verb)), [false; 7]);
-        assert_eq!(vehicle.is_ordered("hand_back"), ["order hand_back", "hand_back", "advance"]);
+        assert_eq!(vehicle.is_ordered(What::HandBack), ["order hand_back", "hand_back", "advance"]);
         assert_eq!(moves.map(|verb| vehicle.may(verb)), [true; 7]);
     }
 
     #[test]
     fn goes_before_an_empty_battery() {
         let mut vehicle = Vehicle::on_its_way();
-        vehicle.reports(PILOT);
-        assert_eq!(vehicle.reports(BATTERY_CRITICAL), ["battery_critical"]);
+        vehicle.reports(PilotTook::NAME);
+        assert_eq!(vehicle.reports(BatteryCritical::NAME), ["battery_critical"]);
         assert_eq!(
-            vehicle.is_ordered("hand_back"),
+            vehicle.is_ordered(What::HandBack),
             ["order hand_back", "hand_back", "land: battery nearly empty"]
         );
     }
@@ -279,7 +289,7 @@ mod path {
     use super::*;
 
     fn unplannable() -> Event {
-        mine(UNPLANNABLE).with("why", "walled in")
+        Unplannable { leg: 0, why: "walled in".into() }.at(ME)
     }
 
     #[test]
@@ -291,7 +301,7 @@ mod path {
             assert_eq!(vehicle.after(CYCLE), ["plan: waypoint"]);
         }
         assert_eq!(vehicle.hears(unplannable()), ["unplannable: walled in", "land: walled in"]);
-        assert_eq!(vehicle.reports(LANDED), ["landed", "failed: walled in"]);
+        assert_eq!(vehicle.reports(Landed::NAME), ["landed", "failed: walled in"]);
     }
 
     #[test]
@@ -301,7 +311,7 @@ mod path {
             vehicle.hears(unplannable());
             vehicle.after(SECOND);
         }
-        assert_eq!(vehicle.reports(PLANNED), ["planned", "advance"]);
+        assert_eq!(vehicle.reports(Planned::NAME), ["planned", "advance"]);
         assert_eq!(vehicle.arrives(0), ["arrived 0", "goto 1", "plan: waypoint"]);
         for _ in 0..2 {
             assert_eq!(vehicle.hears(unplannable()), ["unplannable: walled in"]);
@@ -316,7 +326,7 @@ mod path {
             assert_eq!(vehicle.after(CYCLE / 2), NOTHING);
             assert_eq!(vehicle.after(CYCLE / 2), ["advance"]);
         }
-        vehicle.program.put_proxy("ground/1#freeze", &Bid::new().block(vocabulary::of(ME, ADVANCE)));
+        vehicle.program.put_proxy("ground/1#freeze", &Bid::new().block(of::<Advance>(ME)));
         assert_eq!(vehicle.after(SECOND), NOTHING, "another node may hold the vehicle");
         vehicle.program.remove_proxy("ground/1#freeze");
         assert_eq!(vehicle.happened(), ["advance"]);
@@ -325,23 +335,23 @@ mod path {
     #[test]
     fn that_is_blocked_stops_the_vehicle_until_there_is_a_new_one() {
         let mut vehicle = Vehicle::on_its_way();
-        assert_eq!(vehicle.reports(PATH_BLOCKED), ["path_blocked", "plan: obstacle"]);
+        assert_eq!(vehicle.reports(PathBlocked::NAME), ["path_blocked", "plan: obstacle"]);
         assert_eq!(vehicle.after(SECOND), NOTHING);
-        assert!(!vehicle.may(ADVANCE));
+        assert!(!vehicle.may(Advance::NAME));
         assert_eq!(vehicle.hears(unplannable()), ["unplannable: walled in"]);
         assert_eq!(vehicle.after(SECOND), ["plan: waypoint"], "the waypoint is tried again");
-        assert_eq!(vehicle.reports(PLANNED), ["planned", "advance"]);
+        assert_eq!(vehicle.reports(Planned::NAME), ["planned", "advance"]);
     }
 
     #[test]
     fn is_planned_anew_when_the_vehicle_is_stuck_and_after_twelve_times_it_lands() {
         let mut vehicle = Vehicle::on_its_way();
         for _ in 0..12 {
-            assert_eq!(vehicle.reports(STUCK), ["stuck", "plan: stuck"]);
+            assert_eq!(vehicle.reports(Stuck::NAME), ["stuck", "plan: stuck"]);
         }
         let why = "stuck: no way past what stands around";
-        assert_eq!(vehicle.reports(STUCK), ["stuck".to_owned(), format!("land: {why}")]);
-        assert_eq!(vehicle.reports(LANDED), ["landed".to_owned(), format!("failed: {why}")]);
+        assert_eq!(vehicle.reports(Stuck::NAME), ["stuck".to_owned(), format!("land: {why}")]);
+        assert_eq!(vehicle.reports(Landed::NAME), ["landed".to_owned(), format!("failed: {why}")]);
     }
 
     #[test]
@@ -349,11 +359,11 @@ mod path {
         let mut vehicle = Vehicle::on_its_way();
         for leg in 0..2 {
             for _ in 0..12 {
-                assert_eq!(vehicle.reports(STUCK), ["stuck", "plan: stuck"]);
+                assert_eq!(vehicle.reports(Stuck::NAME), ["stuck", "plan: stuck"]);
             }
             vehicle.arrives(leg);
         }
-        assert_eq!(told(vehicle.last(LAND)), "land: mission complete");
+        assert_eq!(told(vehicle.last(Land::NAME)), "land: mission complete");
     }
 }
 
@@ -363,47 +373,47 @@ mod operator {
     #[test]
     fn holds_the_vehicle_until_it_may_resume() {
         let mut vehicle = Vehicle::on_its_way();
-        assert_eq!(vehicle.is_ordered("hold"), ["order hold", "hold: ordered by the operator"]);
+        assert_eq!(vehicle.is_ordered(What::Hold), ["order hold", "hold: ordered by the operator"]);
         assert_eq!(vehicle.after(SECOND), NOTHING);
-        assert_eq!(vehicle.is_ordered("resume"), ["order resume", "advance"]);
+        assert_eq!(vehicle.is_ordered(What::Resume), ["order resume", "advance"]);
     }
 
     #[test]
     fn lands_the_vehicle() {
         let mut vehicle = Vehicle::on_its_way();
-        assert_eq!(vehicle.is_ordered("land"), ["order land", "land: ordered by the operator"]);
+        assert_eq!(vehicle.is_ordered(What::Land), ["order land", "land: ordered by the operator"]);
         assert_eq!(vehicle.after(SECOND), NOTHING);
-        assert_eq!(vehicle.reports(LANDED), ["landed", "failed: ordered by the operator"]);
+        assert_eq!(vehicle.reports(Landed::NAME), ["landed", "failed: ordered by the operator"]);
     }
 
     #[test]
     fn sends_the_vehicle_home_where_it_lands() {
         let mut vehicle = Vehicle::on_its_way();
         assert_eq!(
-            vehicle.is_ordered("return"),
+            vehicle.is_ordered(What::Return),
             ["order return", "return: ordered by the operator", "goto -1", "plan: waypoint"]
         );
-        assert_eq!(*vehicle.last(GOTO), {
-            let home = mine(GOTO).with("leg", bthreads::HOME_LEG).with("lands", true);
+        assert_eq!(*vehicle.last(Goto::NAME), {
+            let home = mine(Goto::NAME).with("leg", bthreads::HOME_LEG).with("lands", true);
             at(home, [1.0, 2.0, RETURN_ALTITUDE_M])
         });
-        assert_eq!(vehicle.reports(PLANNED), ["planned", "advance"]);
+        assert_eq!(vehicle.reports(Planned::NAME), ["planned", "advance"]);
         assert_eq!(vehicle.arrives(-1), ["arrived -1", "land: ordered by the operator"]);
-        assert_eq!(vehicle.reports(LANDED), ["landed", "failed: ordered by the operator"]);
+        assert_eq!(vehicle.reports(Landed::NAME), ["landed", "failed: ordered by the operator"]);
     }
 
     #[test]
     fn who_orders_a_held_vehicle_home_lets_it_move() {
         let mut vehicle = Vehicle::on_its_way();
-        vehicle.is_ordered("hold");
-        vehicle.is_ordered("return");
-        assert_eq!(vehicle.reports(PLANNED), ["planned", "advance"]);
+        vehicle.is_ordered(What::Hold);
+        vehicle.is_ordered(What::Return);
+        assert_eq!(vehicle.reports(Planned::NAME), ["planned", "advance"]);
     }
 
     #[test]
     fn is_not_heeded_when_the_order_is_unknown() {
         let mut vehicle = Vehicle::on_its_way();
-        assert_eq!(vehicle.is_ordered("dance"), ["order dance"]);
+        assert_eq!(vehicle.hears(mine(OrderTaken::NAME).with("what", "dance")), ["order dance"]);
         assert_eq!(vehicle.after(CYCLE), ["advance"]);
     }
 }
@@ -415,22 +425,25 @@ mod battery {
     fn when_low_sends_the_vehicle_home() {
         let mut vehicle = Vehicle::on_its_way();
         assert_eq!(
-            vehicle.reports(BATTERY_LOW),
+            vehicle.reports(BatteryLow::NAME),
             ["battery_low", "return: battery low", "goto -1", "plan: waypoint"]
         );
-        assert_eq!(vehicle.reports(PLANNED), ["planned", "advance"]);
+        assert_eq!(vehicle.reports(Planned::NAME), ["planned", "advance"]);
         assert_eq!(vehicle.arrives(-1), ["arrived -1", "land: battery low"]);
-        assert_eq!(vehicle.reports(LANDED), ["landed", "failed: battery low"]);
+        assert_eq!(vehicle.reports(Landed::NAME), ["landed", "failed: battery low"]);
     }
 
     #[test]
     fn when_critical_lands_the_vehicle_and_nothing_sends_it_elsewhere() {
         let mut vehicle = Vehicle::on_its_way();
-        vehicle.reports(BATTERY_LOW);
-        assert_eq!([GOTO, RETURN].map(|verb| vehicle.may(verb)), [true; 2]);
-        assert_eq!(vehicle.reports(BATTERY_CRITICAL), ["battery_critical", "land: battery nearly empty"]);
-        assert_eq!([GOTO, RETURN].map(|verb| vehicle.may(verb)), [false; 2]);
-        assert_eq!(vehicle.reports(FENCE_BREACHED), ["fence_breached"], "not even the geofence");
+        vehicle.reports(BatteryLow::NAME);
+        assert_eq!([Goto::NAME, Return::NAME].map(|verb| vehicle.may(verb)), [true; 2]);
+        assert_eq!(
+            vehicle.reports(BatteryCritical::NAME),
+            ["battery_critical", "land: battery nearly empty"]
+        );
+        assert_eq!([Goto::NAME, Return::NAME].map(|verb| vehicle.may(verb)), [false; 2]);
+        assert_eq!(vehicle.reports(FenceBreached::NAME), ["fence_breached"], "not even the geofence");
         assert_eq!(vehicle.after(SECOND), NOTHING);
     }
 }
@@ -442,10 +455,10 @@ mod geofence {
     fn lets_nobody_fly_to_a_waypoint_outside() {
         let waypoints = vec![[10.0, 0.0, 2.0], [30.0, 0.0, 2.0]];
         let mut vehicle = Vehicle::in_the_air(&AgentConfig { waypoints, ..config() });
-        vehicle.reports(PLANNED);
+        vehicle.reports(Planned::NAME);
         assert_eq!(vehicle.arrives(0), ["arrived 0"]);
         assert_eq!(vehicle.after(SECOND), NOTHING);
-        let may_go = |place| vehicle.allows(at(mine(GOTO), place));
+        let may_go = |place| vehicle.allows(at(mine(Goto::NAME), place));
         assert!(may_go([20.0, 20.0, 10.0]));
         assert!(!may_go([20.1, 0.0, 2.0]) && !may_go([0.0, -20.1, 2.0]) && !may_go([0.0, 0.0, 10.1]));
     }
@@ -454,12 +467,12 @@ mod geofence {
     fn sends_a_vehicle_outside_home() {
         let mut vehicle = Vehicle::on_its_way();
         assert_eq!(
-            vehicle.reports(FENCE_BREACHED),
+            vehicle.reports(FenceBreached::NAME),
             ["fence_breached", "return: outside the geofence", "goto -1", "plan: waypoint"]
         );
-        vehicle.reports(PLANNED);
+        vehicle.reports(Planned::NAME);
         assert_eq!(vehicle.arrives(-1), ["arrived -1", "land: outside the geofence"]);
-        assert_eq!(vehicle.reports(LANDED), ["landed", "failed: outside the geofence"]);
+        assert_eq!(vehicle.reports(Landed::NAME), ["landed", "failed: outside the geofence"]);
     }
 }
 
@@ -469,25 +482,28 @@ mod found_airborne {
     #[test]
     fn the_vehicle_holds_until_it_may_resume_and_then_flies_its_mission() {
         let mut vehicle = Vehicle::new(&config());
-        vehicle.reports(READY);
-        assert_eq!([TAKEOFF, GOTO, ADVANCE].map(|verb| vehicle.may(verb)), [true; 3]);
-        assert_eq!(vehicle.reports(FOUND_AIRBORNE), ["found_airborne", "hold: the agent started in the air"]);
-        assert_eq!([TAKEOFF, GOTO, ADVANCE].map(|verb| vehicle.may(verb)), [false; 3]);
-        assert_eq!(vehicle.is_ordered("hold"), ["order hold", "hold: ordered by the operator"]);
-        assert_eq!([TAKEOFF, GOTO, ADVANCE].map(|verb| vehicle.may(verb)), [false; 3]);
-        assert_eq!(vehicle.is_ordered("resume"), ["order resume", "goto 0", "plan: waypoint"]);
-        assert_eq!(vehicle.reports(PLANNED), ["planned", "advance"]);
+        vehicle.reports(Ready::NAME);
+        assert_eq!([Takeoff::NAME, Goto::NAME, Advance::NAME].map(|verb| vehicle.may(verb)), [true; 3]);
+        assert_eq!(
+            vehicle.reports(FoundAirborne::NAME),
+            ["found_airborne", "hold: the agent started in the air"]
+        );
+        assert_eq!([Takeoff::NAME, Goto::NAME, Advance::NAME].map(|verb| vehicle.may(verb)), [false; 3]);
+        assert_eq!(vehicle.is_ordered(What::Hold), ["order hold", "hold: ordered by the operator"]);
+        assert_eq!([Takeoff::NAME, Goto::NAME, Advance::NAME].map(|verb| vehicle.may(verb)), [false; 3]);
+        assert_eq!(vehicle.is_ordered(What::Resume), ["order resume", "goto 0", "plan: waypoint"]);
+        assert_eq!(vehicle.reports(Planned::NAME), ["planned", "advance"]);
         assert_eq!(vehicle.arrives(0), ["arrived 0", "goto 1", "plan: waypoint"]);
         assert_eq!(vehicle.arrives(1), ["arrived 1", "land: mission complete"]);
-        assert_eq!(vehicle.reports(LANDED), ["landed", "complete"]);
+        assert_eq!(vehicle.reports(Landed::NAME), ["landed", "complete"]);
     }
 
     #[test]
     fn the_vehicle_lands_when_ordered_to() {
         let mut vehicle = Vehicle::new(&config());
-        vehicle.reports(FOUND_AIRBORNE);
-        assert_eq!(vehicle.is_ordered("land"), ["order land", "land: ordered by the operator"]);
-        assert_eq!(vehicle.reports(LANDED), ["landed", "failed: ordered by the operator"]);
+        vehicle.reports(FoundAirborne::NAME);
+        assert_eq!(vehicle.is_ordered(What::Land), ["order land", "land: ordered by the operator"]);
+        assert_eq!(vehicle.reports(Landed::NAME), ["landed", "failed: ordered by the operator"]);
     }
 }
 
@@ -498,13 +514,9 @@ mod link_loss {
         Vehicle::in_the_air(&AgentConfig { link_loss, ..config() })
     }
 
-    fn fact(fact: &str, node: &str) -> Event {
-        mine(fact).with("node", node)
-    }
-
     /// What happens within a minute without the ground, and after how many seconds it begins.
     fn without_ground(vehicle: &mut Vehicle) -> Option<(u32, Vec<String>)> {
-        assert_eq!(vehicle.learns(fact(PEER_LOST, GROUND)), ["peer_lost"]);
+        assert_eq!(vehicle.learns(lost(GROUND, "")), ["peer_lost"]);
         (1..=60).map(|second| (second, vehicle.after(SECOND))).find(|(_, happened)| !happened.is_empty())
     }
 
@@ -524,9 +536,9 @@ mod link_loss {
     #[test]
     fn means_nothing_when_the_ground_is_back_in_time() {
         let mut vehicle = in_the_air(LinkLossPolicy::Land);
-        vehicle.learns(fact(PEER_LOST, GROUND));
+        vehicle.learns(lost(GROUND, ""));
         assert_eq!(vehicle.after(4 * SECOND), NOTHING);
-        assert_eq!(vehicle.learns(fact(PEER_JOINED, GROUND)), ["peer_joined"]);
+        assert_eq!(vehicle.learns(joined(GROUND)), ["peer_joined"]);
         assert_eq!(vehicle.after(60 * SECOND), NOTHING);
         assert_eq!(without_ground(&mut vehicle).unwrap().0, 5, "the patience begins anew");
     }
@@ -534,10 +546,10 @@ mod link_loss {
     #[test]
     fn is_about_the_ground_alone() {
         let mut vehicle = in_the_air(LinkLossPolicy::Land);
-        vehicle.learns(fact(PEER_LOST, LOWER));
+        vehicle.learns(lost(LOWER, ""));
         assert_eq!(vehicle.after(60 * SECOND), NOTHING);
-        vehicle.learns(fact(PEER_LOST, GROUND));
-        vehicle.learns(fact(PEER_JOINED, LOWER));
+        vehicle.learns(lost(GROUND, ""));
+        vehicle.learns(joined(LOWER));
         assert_eq!(vehicle.after(5 * SECOND), ["land: ground station lost"]);
     }
 }
@@ -547,29 +559,34 @@ mod right_of_way {
 
     const PLACE: [f64; 3] = [5.0, 0.0, 2.0];
 
-    /// A fact about the vehicle's claim.
-    fn claim(fact: &str) -> Event {
-        mine(fact).with("bthread", "right_of_way")
+    /// Facts about the vehicle's claim.
+    fn confirmed() -> Event {
+        Confirmed { bthread: bthreads::RIGHT_OF_WAY.into(), sync: 1 }.at(ME)
+    }
+
+    fn lapsed() -> Event {
+        let home = NodeName::new(LOWER).unwrap();
+        BlockLapsed { bthread: bthreads::RIGHT_OF_WAY.into(), home }.at(ME)
     }
 
     fn stalled(by: &str) -> Event {
-        let enter = mine(ENTER).name().to_owned();
-        mine(STALLED).with("event", enter).with("by", format!("{by}#right_of_way"))
+        let event = mine(Enter::NAME).name().into();
+        Stalled { event, by: format!("{by}#right_of_way").into() }.at(ME)
     }
 
     /// A vehicle that has just claimed the passage.
     fn claiming() -> Vehicle {
         let mut vehicle = Vehicle::on_its_way();
-        assert_eq!(vehicle.hears(at(mine(PASSAGE), PLACE)), ["passage"]);
+        assert_eq!(vehicle.hears(at(mine(Passage::NAME), PLACE)), ["passage"]);
         vehicle
     }
 
     /// A vehicle whose claim is confirmed but stands against that of `other`.
     fn against(other: &str) -> Vehicle {
         let mut vehicle = claiming();
-        let claim_of_other = Bid::new().block(EventSet::named(mine(ENTER).name()));
+        let claim_of_other = Bid::new().block(EventSet::named(mine(Enter::NAME).name()));
         vehicle.program.put_proxy(format!("{other}#right_of_way"), &claim_of_other);
-        assert_eq!(vehicle.learns(claim(CONFIRMED)), ["confirmed"]);
+        assert_eq!(vehicle.learns(confirmed()), ["confirmed"]);
         assert_eq!(vehicle.learns(stalled(other)), ["stalled"]);
         vehicle
     }
@@ -577,7 +594,7 @@ mod right_of_way {
     /// Whether the vehicle keeps others out of the passage, as they see it from another side.
     fn keeps_out(vehicle: &Vehicle) -> bool {
         [LOWER, HIGHER].iter().all(|other| {
-            let enter = |x| at(vocabulary::event(other, ENTER), [x, 1.0, 2.0]);
+            let enter = |x| at(Event::new(format!("{other}/enter")), [x, 1.0, 2.0]);
             assert!(vehicle.allows(enter(8.5)), "another passage is free");
             !vehicle.allows(enter(7.5))
         })
@@ -588,12 +605,12 @@ mod right_of_way {
         let mut vehicle = claiming();
         assert!(keeps_out(&vehicle));
         assert_eq!(vehicle.after(SECOND), NOTHING, "no way without confirmation");
-        assert_eq!(vehicle.learns(mine(CONFIRMED).with("bthread", "mission")), ["confirmed"]);
-        assert_eq!(vehicle.learns(claim(CONFIRMED)), ["confirmed", "enter", "advance"]);
-        assert_eq!(*vehicle.last(ENTER), at(mine(ENTER), PLACE));
+        assert_eq!(vehicle.learns(Confirmed { bthread: "mission".into(), sync: 1 }.at(ME)), ["confirmed"]);
+        assert_eq!(vehicle.learns(confirmed()), ["confirmed", "enter", "advance"]);
+        assert_eq!(*vehicle.last(Enter::NAME), at(mine(Enter::NAME), PLACE));
         assert_eq!(vehicle.after(CYCLE), ["advance"]);
         assert!(keeps_out(&vehicle));
-        assert_eq!(vehicle.reports(LEAVE), ["leave"]);
+        assert_eq!(vehicle.reports(Leave::NAME), ["leave"]);
         assert!(!keeps_out(&vehicle));
     }
 
@@ -603,10 +620,10 @@ mod right_of_way {
         assert!(!keeps_out(&vehicle));
         assert_eq!(vehicle.after(SECOND), NOTHING);
         vehicle.program.remove_proxy("uav/9#right_of_way");
-        assert_eq!(vehicle.learns(vocabulary::event(LOWER, LEAVE)), ["uav/9/leave"]);
+        assert_eq!(vehicle.learns(Leave.at(LOWER)), ["uav/9/leave"]);
         assert!(keeps_out(&vehicle));
-        assert!(!vehicle.may(ADVANCE), "the new claim is to be confirmed too");
-        assert_eq!(vehicle.learns(claim(CONFIRMED)), ["confirmed", "enter", "advance"]);
+        assert!(!vehicle.may(Advance::NAME), "the new claim is to be confirmed too");
+        assert_eq!(vehicle.learns(confirmed()), ["confirmed", "enter", "advance"]);
     }
 
     #[test]
@@ -622,7 +639,7 @@ mod right_of_way {
     fn is_not_given_to_a_higher_number() {
         let mut vehicle = against(HIGHER);
         assert!(keeps_out(&vehicle));
-        assert!(!vehicle.may(ADVANCE));
+        assert!(!vehicle.may(Advance::NAME));
         vehicle.program.remove_proxy("uav/11#right_of_way");
         assert_eq!(vehicle.happened(), ["enter"]);
     }
@@ -630,18 +647,18 @@ mod right_of_way {
     #[test]
     fn is_to_be_confirmed_again_once_the_claim_has_lapsed() {
         let mut vehicle = against(HIGHER);
-        assert_eq!(vehicle.learns(claim(BLOCK_LAPSED)), ["block_lapsed"]);
+        assert_eq!(vehicle.learns(lapsed()), ["block_lapsed"]);
         vehicle.program.remove_proxy("uav/11#right_of_way");
         assert_eq!(vehicle.after(SECOND), NOTHING);
-        assert_eq!(vehicle.learns(claim(CONFIRMED)), ["confirmed", "enter", "advance"]);
+        assert_eq!(vehicle.learns(confirmed()), ["confirmed", "enter", "advance"]);
     }
 
     #[test]
     fn ends_with_the_flight() {
         let mut vehicle = claiming();
-        vehicle.is_ordered("land");
+        vehicle.is_ordered(What::Land);
         assert!(keeps_out(&vehicle), "a vehicle that lands in a passage fills it");
-        vehicle.reports(LANDED);
+        vehicle.reports(Landed::NAME);
         assert!(!keeps_out(&vehicle));
     }
 }
@@ -652,10 +669,10 @@ mod separation {
     #[test]
     fn a_neighbour_too_close_stops_the_vehicle_until_it_is_clear() {
         let mut vehicle = Vehicle::on_its_way();
-        assert_eq!(vehicle.hears(mine(TOO_CLOSE).with("other", LOWER)), ["too_close"]);
+        assert_eq!(vehicle.hears(TooClose { other: LOWER.into() }.at(ME)), ["too_close"]);
         assert_eq!(vehicle.after(SECOND), NOTHING);
-        assert!(!vehicle.may(ADVANCE));
-        assert_eq!(vehicle.reports(CLEAR), ["clear", "advance"]);
+        assert!(!vehicle.may(Advance::NAME));
+        assert_eq!(vehicle.reports(Clear::NAME), ["clear", "advance"]);
     }
 }
 
@@ -665,10 +682,10 @@ mod sleep {
     #[test]
     fn an_agent_that_did_not_run_leaves_its_vehicle_alone_until_it_is_handed_back() {
         let mut vehicle = Vehicle::on_its_way();
-        assert_eq!(vehicle.hears(mine(SLEPT).with("seconds", 3.0)), ["slept"]);
+        assert_eq!(vehicle.hears(Slept { seconds: 3.0 }.at(ME)), ["slept"]);
         assert_eq!(vehicle.after(SECOND), NOTHING);
-        assert!(!vehicle.may(ADVANCE) && !vehicle.may(LAND));
-        assert_eq!(vehicle.is_ordered("hand_back"), ["order hand_back", "hand_back", "advance"]);
+        assert!(!vehicle.may(Advance::NAME) && !vehicle.may(Land::NAME));
+        assert_eq!(vehicle.is_ordered(What::HandBack), ["order hand_back", "hand_back", "advance"]);
     }
 }
 
@@ -678,13 +695,13 @@ mod one_name {
     #[test]
     fn a_name_that_another_process_has_too_holds_the_vehicle_until_it_is_resumed() {
         let mut vehicle = Vehicle::on_its_way();
-        let told = vehicle.learns(mine(DUPLICATE_NAME).with("incarnation", 4));
+        let told = vehicle.learns(DuplicateName { incarnation: 4 }.at(ME));
         let hold = "hold: another process has this vehicle's name; end one of them, then resume";
         assert_eq!(told, ["duplicate_name", hold]);
         assert_eq!(vehicle.after(SECOND), NOTHING);
-        assert!(!vehicle.may(ADVANCE) && !vehicle.may(TAKEOFF) && vehicle.may(HOMEWARD));
-        assert_eq!(vehicle.is_ordered("resume"), ["order resume", "advance"]);
-        let again = vehicle.learns(mine(DUPLICATE_NAME).with("incarnation", 4));
+        assert!(!vehicle.may(Advance::NAME) && !vehicle.may(Takeoff::NAME) && vehicle.may(Homeward::NAME));
+        assert_eq!(vehicle.is_ordered(What::Resume), ["order resume", "advance"]);
+        let again = vehicle.learns(DuplicateName { incarnation: 4 }.at(ME));
         assert_eq!(again, ["duplicate_name", hold], "it goes on while the other is there");
     }
 }
@@ -695,31 +712,31 @@ mod return_home {
     #[test]
     fn a_vehicle_on_its_way_down_is_not_sent_home() {
         let mut vehicle = Vehicle::on_its_way();
-        vehicle.is_ordered("land");
-        assert_eq!(vehicle.reports(FENCE_BREACHED), ["fence_breached", "return: outside the geofence"]);
+        vehicle.is_ordered(What::Land);
+        assert_eq!(vehicle.reports(FenceBreached::NAME), ["fence_breached", "return: outside the geofence"]);
     }
 
     #[test]
     fn an_order_to_land_on_the_ground_does_not_count_in_the_air() {
         let mut vehicle = Vehicle::new(&config());
-        vehicle.reports(READY);
-        vehicle.is_ordered("hand_back");
-        vehicle.is_ordered("land");
-        vehicle.reports(TAKEOFF);
-        let happened = vehicle.reports(BATTERY_LOW);
+        vehicle.reports(Ready::NAME);
+        vehicle.is_ordered(What::HandBack);
+        vehicle.is_ordered(What::Land);
+        vehicle.reports(Takeoff::NAME);
+        let happened = vehicle.reports(BatteryLow::NAME);
         assert!(happened.contains(&"goto -1".into()), "{happened:?}");
     }
 
     #[test]
     fn who_turned_home_while_climbing_is_led_nowhere_else_once_it_is_up() {
         let mut vehicle = Vehicle::new(&config());
-        vehicle.reports(READY);
-        vehicle.reports(TAKEOFF);
+        vehicle.reports(Ready::NAME);
+        vehicle.reports(Takeoff::NAME);
         let home = ["battery_low", "return: battery low", "goto -1", "plan: waypoint"];
-        assert_eq!(vehicle.reports(BATTERY_LOW), home);
-        assert_eq!(vehicle.reports(AIRBORNE), ["airborne"]);
+        assert_eq!(vehicle.reports(BatteryLow::NAME), home);
+        assert_eq!(vehicle.reports(Airborne::NAME), ["airborne"]);
         let why = "declined: it is not free to go: on the ground, landing or returning";
-        assert_eq!(vehicle.hears(at(order(ME, "goto"), [4.0, 3.0, 2.0])), ["order goto", why]);
+        assert_eq!(vehicle.hears(OrderTaken::go_to([4.0, 3.0, 2.0]).at(ME)), ["order goto", why]);
     }
 }
 
@@ -729,50 +746,50 @@ mod reposition {
     const POINT: [f64; 3] = [4.0, 3.0, 2.0];
 
     fn goto() -> Event {
-        at(order(ME, "goto"), POINT)
+        OrderTaken::go_to(POINT).at(ME)
     }
 
     #[test]
     fn the_vehicle_goes_where_it_is_told_hovers_there_and_resumes_its_mission() {
         let mut vehicle = Vehicle::on_its_way();
         assert_eq!(vehicle.hears(goto()), ["order goto", "goto -2", "plan: waypoint"]);
-        let [x, y, z] = ["x", "y", "z"].map(|axis| vehicle.last(GOTO).real(axis));
-        assert_eq!([x, y, z], POINT.map(Some));
-        assert_eq!(vehicle.hears(mine(PLANNED).with("leg", -2)), ["planned -2", "advance"]);
+        let Goto { x, y, z, .. } = Goto::read(vehicle.last(Goto::NAME)).unwrap();
+        assert_eq!([x, y, z], POINT);
+        assert_eq!(vehicle.hears(Planned { leg: -2, length_m: 5.0 }.at(ME)), ["planned -2", "advance"]);
         assert_eq!(vehicle.arrives(-2), ["arrived -2"]);
         assert_eq!(vehicle.after(10 * SECOND), NOTHING, "it does not go on by itself");
-        assert_eq!(vehicle.is_ordered("resume"), ["order resume", "goto 0", "plan: waypoint"]);
+        assert_eq!(vehicle.is_ordered(What::Resume), ["order resume", "goto 0", "plan: waypoint"]);
     }
 
     #[test]
     fn a_vehicle_on_hold_is_free_to_go() {
         let mut vehicle = Vehicle::on_its_way();
-        vehicle.is_ordered("hold");
-        assert!(!vehicle.may(ADVANCE));
+        vehicle.is_ordered(What::Hold);
+        assert!(!vehicle.may(Advance::NAME));
         vehicle.hears(goto());
-        assert_eq!(vehicle.hears(mine(PLANNED).with("leg", -2)), ["planned -2", "advance"]);
+        assert_eq!(vehicle.hears(Planned { leg: -2, length_m: 5.0 }.at(ME)), ["planned -2", "advance"]);
     }
 
     #[test]
     fn a_point_outside_the_fence_is_declined_and_the_mission_goes_on() {
         let mut vehicle = Vehicle::on_its_way();
-        assert_eq!(vehicle.hears(at(order(ME, "goto"), [1e4, 0.0, 2.0])), ["order goto"]);
+        assert_eq!(vehicle.hears(OrderTaken::go_to([1e4, 0.0, 2.0]).at(ME)), ["order goto"]);
         let declined = vehicle.after(2 * SECOND);
         assert!(declined.iter().any(|event| event.starts_with("declined: ")), "{declined:?}");
-        assert!(vehicle.may(ADVANCE));
+        assert!(vehicle.may(Advance::NAME));
     }
 
     #[test]
     fn a_point_without_a_way_is_declined_and_the_vehicle_stays_in_the_air() {
         let mut vehicle = Vehicle::on_its_way();
         vehicle.hears(goto());
-        let unplannable = || mine(UNPLANNABLE).with("leg", -2).with("why", "walled in");
+        let unplannable = || Unplannable { leg: -2, why: "walled in".into() }.at(ME);
         for _ in 0..2 {
             vehicle.hears(unplannable());
             vehicle.after(SECOND);
         }
         assert_eq!(vehicle.hears(unplannable()), ["unplannable: walled in", "declined: walled in"]);
-        assert_eq!(vehicle.is_ordered("resume"), ["order resume", "goto 0", "plan: waypoint"]);
+        assert_eq!(vehicle.is_ordered(What::Resume), ["order resume", "goto 0", "plan: waypoint"]);
     }
 
     #[test]
@@ -780,7 +797,7 @@ mod reposition {
         let mut grounded = Vehicle::new(&config());
         assert!(grounded.hears(goto())[1].starts_with("declined: it is not free"));
         let mut landing = Vehicle::on_its_way();
-        landing.is_ordered("land");
+        landing.is_ordered(What::Land);
         assert!(landing.hears(goto())[1].starts_with("declined: it is not free"));
     }
 }
@@ -794,20 +811,20 @@ mod right_of_way_without_the_lost {
         let config = AgentConfig { roster: roster.to_vec(), ..config() };
         let mut vehicle = Vehicle::in_the_air(&config);
         for other in [LOWER, HIGHER, "uav/12", "ground/1"] {
-            vehicle.learns(mine(PEER_JOINED).with("node", other));
+            vehicle.learns(joined(other));
         }
         vehicle.after(2 * SECOND);
-        vehicle.reports(PLANNED);
+        vehicle.reports(Planned::NAME);
         vehicle
     }
 
     fn loses(vehicle: &mut Vehicle, other: &str, released: &str) {
-        vehicle.learns(mine(PEER_LOST).with("node", other).with("released", released));
+        vehicle.learns(lost(other, released));
     }
 
     /// The homes whose confirmation a claim waits for.
     fn asks(vehicle: &mut Vehicle) -> Vec<&'static str> {
-        vehicle.hears(at(mine(PASSAGE), [5.0, 0.0, 2.0]));
+        vehicle.hears(at(mine(Passage::NAME), [5.0, 0.0, 2.0]));
         let bids = vehicle.program.bids();
         let claim = bids.into_iter().find(|(name, ..)| *name == "right_of_way").unwrap().1.blocks().clone();
         let asked = |other: &&str| claim.could_match_home(other);
@@ -846,9 +863,9 @@ mod right_of_way_without_the_lost {
     fn claims_cross_before_they_count_when_two_sides_meet() {
         let mut vehicle = in_reach();
         loses(&mut vehicle, HIGHER, "");
-        vehicle.learns(mine(PEER_JOINED).with("node", HIGHER));
+        vehicle.learns(joined(HIGHER));
         assert!(asks(&mut vehicle).is_empty(), "it claims at once");
         vehicle.after(2 * SECOND);
-        assert!(!vehicle.may(ADVANCE));
+        assert!(!vehicle.may(Advance::NAME));
     }
 }

@@ -17,7 +17,7 @@ use skein_agent::{
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_bp::{Event, Program, ProgramConfig};
 use skein_mav::Datum;
-use skein_wire::vocabulary::{self, *};
+use skein_wire::event::*;
 use skein_wire::{KeptScript, MemoryStore, Network, NetworkConfig, Store};
 
 const ME: &str = "uav/1";
@@ -70,13 +70,17 @@ impl Vehicle {
         let config = config();
         let mut program = Program::new(ProgramConfig::vehicle(1));
         bthreads::load(&mut program, &config);
-        Self { program, scripts: Scripts::new(Me::new(ME), &config.roster), now: Duration::ZERO }
+        Self {
+            program,
+            scripts: Scripts::new(Me::new(ME), &config.roster, &config.events()),
+            now: Duration::ZERO,
+        }
     }
 
     /// In the air, with a path to its waypoint.
     fn in_the_air() -> Self {
         let mut vehicle = Self::on_the_ground();
-        for verb in [READY, TAKEOFF, AIRBORNE, PLANNED] {
+        for verb in [Ready::NAME, Takeoff::NAME, Airborne::NAME, Planned::NAME] {
             vehicle.hears(mine(verb));
         }
         vehicle
@@ -106,12 +110,16 @@ impl Vehicle {
     /// Whether it asks for leave to move, and gets it, a navigation cycle later.
     fn moves(&mut self) -> bool {
         self.now += Duration::from_millis(100);
-        self.happens().iter().any(|event| event.kind() == ADVANCE)
+        self.happens().iter().any(|event| event.kind() == Advance::NAME)
     }
 }
 
+fn states(events: &[Event]) -> Vec<ScriptState> {
+    events.iter().filter_map(ScriptNews::read).map(|news| news.state).collect()
+}
+
 fn mine(verb: &str) -> Event {
-    vocabulary::event(ME, verb)
+    Event::new(format!("{ME}/{verb}"))
 }
 
 fn at(verb: &str, [x, y, z]: [f64; 3]) -> Event {
@@ -155,7 +163,10 @@ fn a_script_requests_only_what_it_may() {
 
 #[test]
 fn a_script_blocks_no_safety_event_however_it_is_named() {
-    let never = OWN.iter().chain(&[ORDER, LOAD, UNLOAD, ENTER, "confirmed", "peer_lost"]);
+    let catalogue = Catalogue::standard();
+    let own = catalogue.own().map(|event| event.name);
+    let never =
+        own.chain([OrderTaken::NAME, Load::NAME, Unload::NAME, Enter::NAME, "confirmed", "peer_lost"]);
     for verb in never {
         for set in [
             json!({"any_data": format!("uav/1/{verb}")}),
@@ -183,9 +194,9 @@ fn the_way_home_stays_open_whatever_a_script_blocks() {
         ))
         .unwrap();
     assert!(!vehicle.moves());
-    let verbs = vehicle.verbs_after(order(ME, "return"));
+    let verbs = vehicle.verbs_after(OrderTaken::plain(What::Return).at(ME));
     assert_eq!(verbs, ["order", "return", "goto", "plan"]);
-    let planned = mine(PLANNED).with("leg", bthreads::HOME_LEG);
+    let planned = mine(Planned::NAME).with("leg", bthreads::HOME_LEG);
     assert_eq!(vehicle.verbs_after(planned), ["planned", "homeward"]);
 }
 
@@ -216,12 +227,12 @@ fn a_script_is_explained_withdrawn_and_may_come_again() {
     vehicle.load(&hold).unwrap();
     vehicle.load(&hold).unwrap();
     assert!(!vehicle.moves());
-    let explained = vehicle.program.explain(mine(ADVANCE));
+    let explained = vehicle.program.explain(mine(Advance::NAME));
     assert!(explained.blocked.iter().any(|(bthread, _)| &**bthread == "script/test"), "{explained:?}");
     let other = script(json!([{"sync": {}}]));
     assert!(vehicle.load(&other).unwrap_err().contains("withdraw it first"));
-    let happened = vehicle.hears(mine(UNLOAD).with("name", "test"));
-    assert_eq!(happened.iter().filter_map(|event| event.text("state")).collect::<Vec<_>>(), [WITHDRAWN]);
+    let happened = vehicle.hears(mine(Unload::NAME).with("name", "test"));
+    assert_eq!(states(&happened), [ScriptState::Withdrawn]);
     assert!(vehicle.moves());
     assert_eq!(vehicle.scripts.running().count(), 0);
     vehicle.load(&other).unwrap();
@@ -233,13 +244,13 @@ fn a_script_says_how_it_has_ended() {
         let mut vehicle = Vehicle::in_the_air();
         vehicle.load(&script(body)).unwrap();
         let happened = vehicle.hears(event);
-        let report = happened.iter().find(|event| event.kind() == SCRIPT).unwrap();
-        assert_eq!((report.text("name"), report.text("state")), (Some("test"), Some(ENDED)));
+        let report = happened.iter().find_map(ScriptNews::read).unwrap();
+        assert_eq!((&*report.name, report.state), ("test", ScriptState::Ended));
         assert_eq!(vehicle.scripts.running().count(), 0);
         assert!(vehicle.program.bid(&Runner::bthread_name("test")).is_none());
-        report.text("why").unwrap().to_owned()
+        report.why.to_string()
     };
-    let arrived = || mine(ARRIVED).with("leg", 7_i64);
+    let arrived = || Arrived { leg: 7 }.at(ME);
     assert_eq!(
         ended(json!([{"sync": {"wait": {"any_data": "uav/1/arrived"}}}]), arrived()),
         "it has come to its end"
@@ -265,8 +276,8 @@ fn scripts_that_go_round_by_themselves_stop_nobody() {
         vehicle.load(&Assignment { called: Some(name.to_owned()), ..script(body) }).unwrap();
     }
     let happened = vehicle.hears(mine("script/a"));
-    let report = happened.iter().find(|event| event.kind() == SCRIPT).unwrap();
-    assert!(report.text("why").unwrap().contains("it did not come to rest"), "{report}");
+    let report = happened.iter().find_map(ScriptNews::read).unwrap();
+    assert!(report.why.contains("it did not come to rest"), "{report:?}");
     assert_eq!(vehicle.scripts.running().count(), 1);
     assert!(vehicle.moves());
 }
@@ -283,14 +294,16 @@ fn no_more_scripts_run_than_a_state_can_name() {
 #[test]
 fn facts_are_told_only_to_those_who_listen() {
     let mut vehicle = Vehicle::in_the_air();
-    let listened =
-        |vehicle: &Vehicle| [AT, AHEAD, NEIGHBOUR, BATTERY].map(|fact| vehicle.scripts.listen_to(fact));
+    let listened = |vehicle: &Vehicle| {
+        [At::NAME, Ahead::NAME, NeighbourAt::NAME, BatteryLevel::NAME]
+            .map(|fact| vehicle.scripts.listen_to(fact))
+    };
     assert_eq!(listened(&vehicle), [false; 4]);
     vehicle.load(&shipped("patrol", json!({"route": [[0, 0, 3]]}))).unwrap();
     assert_eq!(listened(&vehicle), [true, false, false, true]);
     vehicle.load(&shipped("curfew", json!({"min": [0, 0, 0], "max": [1, 1, 1], "for_s": 9}))).unwrap();
     assert_eq!(listened(&vehicle), [true, true, false, true]);
-    vehicle.hears(order(ME, "resume"));
+    vehicle.hears(OrderTaken::plain(What::Resume).at(ME));
     assert_eq!(listened(&vehicle), [true, true, false, false], "the patrol has ended");
 }
 
@@ -306,7 +319,7 @@ fn a_script_that_was_sent_is_kept_until_it_is_withdrawn() {
     vehicle.scripts.keep_in(Box::new(store.clone()));
     vehicle.load(&stay()).unwrap();
     assert_eq!(store.kept(), [KeptScript { from: SENDER.to_owned(), assignment: stay() }]);
-    vehicle.hears(mine(UNLOAD).with("name", "test"));
+    vehicle.hears(mine(Unload::NAME).with("name", "test"));
     assert_eq!(store.kept(), []);
 }
 
@@ -332,7 +345,7 @@ fn a_script_that_cannot_be_kept_is_refused_and_one_that_cannot_be_forgotten_is_t
     disk.0.store(true, Ordering::Relaxed);
     vehicle.load(&stay()).unwrap();
     disk.0.store(false, Ordering::Relaxed);
-    vehicle.hears(mine(UNLOAD).with("name", "test"));
+    vehicle.hears(mine(Unload::NAME).with("name", "test"));
     assert!(vehicle.moves(), "it is withdrawn all the same");
     assert_eq!(vehicle.scripts.unsaved(), Some("no space left"));
     vehicle.scripts.catch_up(Duration::ZERO);
@@ -353,16 +366,16 @@ fn a_script_of_a_former_life_begins_when_the_vehicle_is_let_go_on() {
         vehicle.scripts.load(&mut vehicle.program, &stay(), SENDER, Begins::WhenReleased).unwrap();
         vehicle.happens();
         let blocks = |vehicle: &Vehicle| {
-            let explained = vehicle.program.explain(mine(ADVANCE));
+            let explained = vehicle.program.explain(mine(Advance::NAME));
             explained.blocked.iter().any(|(bthread, _)| &**bthread == "script/test")
         };
         assert!(!blocks(&vehicle));
         vehicle.hears(release);
         blocks(&vehicle)
     };
-    assert!(begins_with(Vehicle::on_the_ground(), mine(READY)));
-    assert!(begins_with(Vehicle::in_the_air(), mine(ORDER).with("what", "resume")));
-    assert!(!begins_with(Vehicle::in_the_air(), mine(ORDER).with("what", "hold")));
+    assert!(begins_with(Vehicle::on_the_ground(), mine(Ready::NAME)));
+    assert!(begins_with(Vehicle::in_the_air(), OrderTaken::plain(What::Resume).at(ME)));
+    assert!(!begins_with(Vehicle::in_the_air(), OrderTaken::plain(What::Hold).at(ME)));
 }
 
 #[test]
@@ -371,29 +384,33 @@ fn a_script_that_is_there_from_the_start_does_not_end_the_hold_of_a_vehicle_foun
         {"sync": {"request": {"name": "uav/1/order", "data": {"what": "resume", "by": "script/test"}}}},
         {"sync": {"wait": "uav/1/landed"}},
     ]));
-    let by_script = |events: &[Event]| events.iter().any(|event| event.text("by") == Some("script/test"));
+    let by_script = |events: &[Event]| {
+        events.iter().any(|event| {
+            OrderTaken::read(event).is_some_and(|order| order.by.as_deref() == Some("script/test"))
+        })
+    };
     let found = |begins| {
         let mut vehicle = Vehicle::on_the_ground();
         vehicle.scripts.load(&mut vehicle.program, &onward, SENDER, begins).unwrap();
-        let events = vehicle.hears(mine(FOUND_AIRBORNE));
+        let events = vehicle.hears(mine(FoundAirborne::NAME));
         (vehicle, by_script(&events))
     };
     assert!(found(Begins::AtOnce).1, "one that is sent then may");
     let (mut vehicle, orders) = found(Begins::WhenReleased);
     assert!(!orders);
-    assert!(by_script(&vehicle.hears(mine(HAND_BACK))), "whoever hands it back lets it go on");
+    assert!(by_script(&vehicle.hears(mine(HandBack::NAME))), "whoever hands it back lets it go on");
 
     let (mut vehicle, _) = found(Begins::WhenReleased);
-    let events = vehicle.hears(mine(UNLOAD).with("name", "test"));
-    assert_eq!(events.iter().filter_map(|event| event.text("state")).collect::<Vec<_>>(), [WITHDRAWN]);
-    assert!(!by_script(&vehicle.hears(mine(ORDER).with("what", "resume"))), "withdrawn before it began");
+    let events = vehicle.hears(mine(Unload::NAME).with("name", "test"));
+    assert_eq!(states(&events), [ScriptState::Withdrawn]);
+    assert!(!by_script(&vehicle.hears(OrderTaken::plain(What::Resume).at(ME))), "withdrawn before it began");
 
     // So are those of the configuration.
     let mut core = AgentCore::new(AgentConfig { scripts: vec![onward], ..config() }).unwrap();
     let mut link = Network::new(NetworkConfig::default(), 1).join(core.name());
     core.tick(Duration::ZERO, &mut link);
     let bid = core.node().node().program().bid(&Runner::bthread_name("test")).unwrap();
-    assert!(bid.waits().contains(&mine(READY)), "{bid:?}");
+    assert!(bid.waits().contains(&mine(Ready::NAME)), "{bid:?}");
 }
 
 #[test]
@@ -427,16 +444,16 @@ fn patrol_flies_round_and_goes_on_with_the_mission_at_its_level() {
     let mut vehicle = Vehicle::in_the_air();
     vehicle.load(&shipped("patrol", json!({"route": [[1, 2, 3], [4, 5, 6]], "min_percent": 30}))).unwrap();
     let goto = |events: &[Event]| {
-        let goto = events.iter().find(|event| event.kind() == GOTO)?;
-        Some([goto.real("x")?, goto.real("y")?, goto.real("z")?])
+        let goto = events.iter().find_map(Goto::read)?;
+        Some([goto.x, goto.y, goto.z])
     };
-    assert_eq!(goto(&vehicle.hears(at(AT, [0.0; 3]))), Some([1.0, 2.0, 3.0]));
-    let arrived = mine(ARRIVED).with("leg", bthreads::OPERATOR_LEG);
+    assert_eq!(goto(&vehicle.hears(at(At::NAME, [0.0; 3]))), Some([1.0, 2.0, 3.0]));
+    let arrived = Arrived { leg: bthreads::OPERATOR_LEG }.at(ME);
     for place in [[4.0, 5.0, 6.0], [1.0, 2.0, 3.0], [4.0, 5.0, 6.0]] {
         assert_eq!(goto(&vehicle.hears(arrived.clone())), Some(place));
     }
-    assert_eq!(goto(&vehicle.hears(mine(BATTERY).with("percent", 35_i64))), None);
-    assert_eq!(goto(&vehicle.hears(mine(BATTERY).with("percent", 30_i64))), Some([50.0, 0.0, 3.0]));
+    assert_eq!(goto(&vehicle.hears(BatteryLevel { percent: 35 }.at(ME))), None);
+    assert_eq!(goto(&vehicle.hears(BatteryLevel { percent: 30 }.at(ME))), Some([50.0, 0.0, 3.0]));
     assert_eq!(vehicle.scripts.running().count(), 0);
 }
 
@@ -444,13 +461,13 @@ fn patrol_flies_round_and_goes_on_with_the_mission_at_its_level() {
 fn patrol_gives_way_to_an_operator_and_passes_over_points_out_of_bounds() {
     let mut vehicle = Vehicle::in_the_air();
     vehicle.load(&shipped("patrol", json!({"route": [[900, 0, 3], [4, 5, 6]]}))).unwrap();
-    assert_eq!(vehicle.verbs_after(at(AT, [0.0; 3])), ["at", "order"]);
+    assert_eq!(vehicle.verbs_after(at(At::NAME, [0.0; 3])), ["at", "order"]);
     vehicle.now += Duration::from_secs(3);
     let happened = vehicle.happens();
-    assert!(happened.iter().any(|event| event.kind() == DECLINED));
-    assert_eq!(happened.iter().find(|event| event.kind() == GOTO).and_then(|goto| goto.real("x")), Some(4.0));
-    let point = order(ME, "goto").with("x", 7.0).with("y", 7.0).with("z", 3.0);
-    assert_eq!(vehicle.hears(point).iter().find(|event| event.kind() == GOTO).unwrap().real("x"), Some(7.0));
+    assert!(happened.iter().any(|event| event.kind() == Declined::NAME));
+    assert_eq!(happened.iter().find_map(Goto::read).map(|goto| goto.x), Some(4.0));
+    let point = OrderTaken::go_to([7.0, 7.0, 3.0]).at(ME);
+    assert_eq!(vehicle.hears(point).iter().find_map(Goto::read).map(|goto| goto.x), Some(7.0));
     assert_eq!(vehicle.scripts.running().count(), 0);
 }
 
@@ -461,15 +478,15 @@ fn curfew_keeps_a_vehicle_out_while_it_lasts_and_lets_one_inside_leave() {
     for begins_inside in [false, true] {
         let mut vehicle = Vehicle::in_the_air();
         vehicle.load(&shipped("curfew", region.clone())).unwrap();
-        vehicle.hears(at(AHEAD, inside));
+        vehicle.hears(at(Ahead::NAME, inside));
         assert!(vehicle.moves(), "it has not begun");
         vehicle.now += Duration::from_secs(5);
-        vehicle.hears(at(AT, if begins_inside { inside } else { outside }));
+        vehicle.hears(at(At::NAME, if begins_inside { inside } else { outside }));
         assert_eq!(vehicle.moves(), begins_inside);
-        vehicle.hears(at(AT, outside));
-        vehicle.hears(at(AHEAD, outside));
+        vehicle.hears(at(At::NAME, outside));
+        vehicle.hears(at(Ahead::NAME, outside));
         assert!(vehicle.moves(), "outside");
-        vehicle.hears(at(AHEAD, inside));
+        vehicle.hears(at(Ahead::NAME, inside));
         assert!(!vehicle.moves(), "about to fly in");
         vehicle.now += Duration::from_secs(61);
         assert!(vehicle.moves(), "it is over");
@@ -481,24 +498,24 @@ fn alternate_waits_for_the_other_and_does_not_wait_for_ever() {
     let with =
         |first: i64| json!({"other": "uav/2", "min": [10, -5, 0], "max": [20, 5, 10], "goes_first": first});
     let (inside, outside) = ([15.0, 0.0, 3.0], [2.0, 0.0, 3.0]);
-    let other = |place| at(NEIGHBOUR, place).with("node", "uav/2").with("distance_m", 9.0);
+    let other = |place| at(NeighbourAt::NAME, place).with("node", "uav/2").with("distance_m", 9.0);
     let mut first = Vehicle::in_the_air();
     first.load(&shipped("alternate", with(1))).unwrap();
     let mut second = Vehicle::in_the_air();
     second.load(&shipped("alternate", with(0))).unwrap();
     for vehicle in [&mut first, &mut second] {
-        vehicle.hears(at(AHEAD, inside));
+        vehicle.hears(at(Ahead::NAME, inside));
     }
     assert!(first.moves() && !second.moves());
-    [inside, outside].into_iter().for_each(|place| drop(first.hears(at(AT, place))));
+    [inside, outside].into_iter().for_each(|place| drop(first.hears(at(At::NAME, place))));
     assert!(!first.moves(), "it is not its turn again");
     [inside, outside].into_iter().for_each(|place| drop(second.hears(other(place))));
     assert!(second.moves());
     first.now += Duration::from_secs(121);
     assert!(first.moves(), "its patience is at an end");
-    [inside, outside].into_iter().for_each(|place| drop(second.hears(at(AT, place))));
+    [inside, outside].into_iter().for_each(|place| drop(second.hears(at(At::NAME, place))));
     assert!(!second.moves());
-    second.program.occurred(vocabulary::event("uav/2", LANDED));
+    second.program.occurred(Landed.at("uav/2"));
     assert!(second.moves(), "there is nobody to take turns with");
 }
 
@@ -507,20 +524,19 @@ fn follow_keeps_its_distance_and_goes_on_when_the_leader_lands() {
     let mut vehicle = Vehicle::in_the_air();
     vehicle.load(&shipped("follow", json!({"leader": "uav/2", "distance_m": 8}))).unwrap();
     let leader = |x: f64, distance_m: f64| {
-        at(NEIGHBOUR, [x, 0.0, 3.0]).with("node", "uav/2").with("distance_m", distance_m)
+        at(NeighbourAt::NAME, [x, 0.0, 3.0]).with("node", "uav/2").with("distance_m", distance_m)
     };
-    let goto =
-        |events: Vec<Event>| events.iter().find(|event| event.kind() == GOTO).and_then(|goto| goto.real("x"));
+    let goto = |events: Vec<Event>| events.iter().find_map(Goto::read).map(|goto| goto.x);
     assert_eq!(goto(vehicle.hears(leader(20.0, 12.0))), Some(20.0));
     assert_eq!(goto(vehicle.hears(leader(21.0, 11.0))), Some(21.0));
-    vehicle.hears(mine(PLANNED).with("leg", bthreads::OPERATOR_LEG));
+    vehicle.hears(Planned { leg: bthreads::OPERATOR_LEG, length_m: 5.0 }.at(ME));
     assert!(vehicle.moves());
     vehicle.hears(leader(21.0, 7.5));
     assert!(!vehicle.moves(), "near enough");
     vehicle.hears(leader(24.0, 9.0));
     assert!(vehicle.moves());
     assert_eq!(goto(vehicle.hears(leader(25.0, 10.0))), Some(25.0));
-    vehicle.program.occurred(vocabulary::event("uav/2", LAND).with("why", "mission complete"));
+    vehicle.program.occurred(Land { why: "mission complete".into() }.at("uav/2"));
     assert_eq!(goto(vehicle.happens()), Some(50.0));
 }
 

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use skein_bp::script::{Assignment, ScriptFileError, TrialFault};
 use skein_bp::{Event, EventSet};
 use skein_dbp::NodeName;
-use skein_wire::vocabulary::{self, LOAD, UNLOAD};
+use skein_wire::event::{Declared as _, Events as _, OrderGiven, What};
 
 /// Whom an order is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -98,21 +98,39 @@ const SPREAD_M: f64 = 3.0;
 const LEAST_HEIGHT_M: f64 = 1.0;
 
 impl Order {
-    /// The order as one word: `launch`, `launch_together`, `abort`, `hold`, `resume`, `land`, `return`, `goto`, `hand_back`, `load` or `unload`.
+    /// The order that needs no more than whom it is for; none if it needs more, or is for all and `who` are some.
     #[must_use]
-    pub fn what(&self) -> &'static str {
+    pub fn plain(what: What, who: Who) -> Option<Self> {
+        if what.is_for_all() && who != Who::All {
+            return None;
+        }
+        Some(match what {
+            What::Launch => Self::Launch,
+            What::LaunchTogether => Self::LaunchTogether,
+            What::Abort => Self::Abort,
+            What::Hold => Self::Hold(who),
+            What::Resume => Self::Resume(who),
+            What::Land => Self::Land(who),
+            What::Return => Self::Return(who),
+            What::HandBack => Self::HandBack(who),
+            What::GoTo | What::Load | What::Unload => return None,
+        })
+    }
+
+    #[must_use]
+    pub fn what(&self) -> What {
         match self {
-            Self::Launch => "launch",
-            Self::LaunchTogether => "launch_together",
-            Self::Abort => "abort",
-            Self::Hold(_) => "hold",
-            Self::Resume(_) => "resume",
-            Self::Land(_) => "land",
-            Self::Return(_) => "return",
-            Self::GoTo(..) => "goto",
-            Self::HandBack(_) => "hand_back",
-            Self::Load(..) => LOAD,
-            Self::Unload(..) => UNLOAD,
+            Self::Launch => What::Launch,
+            Self::LaunchTogether => What::LaunchTogether,
+            Self::Abort => What::Abort,
+            Self::Hold(_) => What::Hold,
+            Self::Resume(_) => What::Resume,
+            Self::Land(_) => What::Land,
+            Self::Return(_) => What::Return,
+            Self::GoTo(..) => What::GoTo,
+            Self::HandBack(_) => What::HandBack,
+            Self::Load(..) => What::Load,
+            Self::Unload(..) => What::Unload,
         }
     }
 
@@ -149,24 +167,23 @@ impl Order {
         ground: &NodeName,
         positions: &[(NodeName, Option<Vector3<f64>>)],
     ) -> Vec<Event> {
-        let event = |who: &str| {
-            let order = ordered_event(ground, self.what(), who);
-            let order = self.script().into_iter().fold(order, |order, name| order.with("name", name));
-            match self {
-                Self::Load(_, script) => order.with("script", script.text.clone()),
-                _ => order,
-            }
+        let given = |who: &str| OrderGiven {
+            name: self.script().map(Into::into),
+            script: match self {
+                Self::Load(_, script) => Some(script.text.clone()),
+                _ => None,
+            },
+            ..OrderGiven::plain(self.what(), who)
         };
-        match (self, self.who()) {
+        let orders: Vec<_> = match (self, self.who()) {
             (Self::GoTo(_, destination), _) => places(*destination, positions)
                 .into_iter()
-                .map(|(vehicle, place)| {
-                    event(vehicle.as_str()).with("x", place.x).with("y", place.y).with("z", place.z)
-                })
+                .map(|(vehicle, place)| given(vehicle.as_str()).to(place.into()))
                 .collect(),
-            (_, Who::All) => vec![event(ALL)],
-            (_, Who::These(vehicles)) => vehicles.iter().map(|vehicle| event(vehicle.as_str())).collect(),
-        }
+            (_, Who::All) => vec![given(OrderGiven::ALL)],
+            (_, Who::These(vehicles)) => vehicles.iter().map(|vehicle| given(vehicle.as_str())).collect(),
+        };
+        orders.into_iter().map(|order| order.at(ground)).collect()
     }
 }
 
@@ -195,46 +212,24 @@ fn places(
     placed
 }
 
-/// Whether an order says nothing against what other orders have set going.
-pub(crate) fn is_beside_flight(what: &str) -> bool {
-    matches!(what, "launch" | "launch_together" | LOAD | UNLOAD)
-}
-
-/// What the operator has ordered becomes an event of this name.
-pub(crate) const ORDERED: &str = "ordered";
-
-/// The event of the ground station by which `what` is ordered, for a vehicle or for [`ALL`].
-pub(crate) fn ordered_event(ground: impl fmt::Display, what: &str, who: &str) -> Event {
-    vocabulary::event(ground, ORDERED).with("what", what).with("who", who)
-}
-
-/// The events of the ground station by which `what` is ordered, for anyone.
-#[must_use]
-pub fn ordered(ground: &NodeName, what: &str) -> EventSet {
-    EventSet::named(ground.event_name(ORDERED)).and(EventSet::field_is("what", what))
+/// The events of the station `ground` by which one of these is ordered, for anyone.
+pub fn ordered(ground: &NodeName, what: impl IntoIterator<Item = What>) -> EventSet {
+    let ordered = |what| OrderGiven::any_at(ground).and(OrderGiven::what(what));
+    EventSet::any_of(what.into_iter().map(ordered))
 }
 
 /// Those among them that are for the whole swarm.
-#[must_use]
-pub fn ordered_for_all(ground: &NodeName, what: &str) -> EventSet {
-    ordered(ground, what).and(EventSet::field_is("who", ALL))
+pub(crate) fn ordered_for_all(ground: &NodeName, what: impl IntoIterator<Item = What>) -> EventSet {
+    let for_all = |what| ordered(ground, [what]).and(OrderGiven::who(OrderGiven::ALL));
+    EventSet::any_of(what.into_iter().map(for_all))
 }
 
 /// Everything that is ordered for `vehicle`, alone or with all.
 #[must_use]
 pub fn ordered_for(ground: &NodeName, vehicle: &NodeName) -> EventSet {
-    let who = EventSet::field_is("who", ALL).or(EventSet::field_is("who", vehicle.as_str()));
-    EventSet::named(ground.event_name(ORDERED)).and(who)
+    let who = OrderGiven::who(OrderGiven::ALL).or(OrderGiven::who(vehicle.as_str()));
+    OrderGiven::any_at(ground).and(who)
 }
-
-/// Whether an `ordered` event is for `vehicle`.
-#[must_use]
-pub fn is_for(event: &Event, vehicle: &NodeName) -> bool {
-    event.text("who").is_some_and(|who| who == ALL || who == vehicle.as_str())
-}
-
-/// How an event names all vehicles.
-pub(crate) const ALL: &str = "all";
 
 impl Who {
     #[must_use]
@@ -255,7 +250,7 @@ impl Who {
 impl fmt::Display for Who {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::All => f.write_str(ALL),
+            Self::All => f.write_str(OrderGiven::ALL),
             Self::These(vehicles) => {
                 let names: Vec<&str> = vehicles.iter().map(NodeName::as_str).collect();
                 f.write_str(&names.join(", "))

@@ -4,11 +4,10 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use skein_dbp::{Happened, Node, NodeName};
-use skein_wire::vocabulary::{ACCEPTED, DECLINED, ENDED, HEEDED, ORDER, REFUSED, SCRIPT, TAKEOFF, WITHDRAWN};
+use skein_wire::event::{Declared as _, Declined, Heeded, OrderTaken, ScriptNews, ScriptState, Takeoff};
 
-use crate::bthreads::{GOING, GOING_LASTS, Hold, LAUNCH_LASTS};
-use crate::order::is_beside_flight;
-use crate::{Order, Who};
+use crate::bthreads::{GOING_LASTS, Hold, LAUNCH_LASTS};
+use crate::order::{Order, Who};
 
 /// How many orders are remembered.
 const KEPT: usize = 10;
@@ -101,7 +100,7 @@ impl OrderLog {
         for record in &mut self.records {
             let lasts = match &record.order {
                 Order::LaunchTogether => Some(LAUNCH_LASTS),
-                order if GOING.contains(&order.what()) || order.script().is_some() => Some(GOING_LASTS),
+                order if order.what().sets_going() || order.script().is_some() => Some(GOING_LASTS),
                 _ => None,
             };
             let late = lasts.is_some_and(|lasts| now > record.at + lasts);
@@ -124,7 +123,7 @@ impl OrderLog {
     fn look_at_holds(&mut self, now: Duration, node: &Node) {
         for (vehicle, kept) in node.kept_by(Hold::NAME) {
             let newest = self.records.iter_mut().rev().find(|record| {
-                !is_beside_flight(record.order.what()) && record.answers.contains_key(vehicle)
+                !record.order.what().is_beside_flight() && record.answers.contains_key(vehicle)
             });
             let Some(record) = newest.filter(|record| matches!(record.order, Order::Hold(_))) else {
                 continue;
@@ -149,18 +148,14 @@ impl OrderLog {
     }
 }
 
-fn is_launch(order: &Order) -> bool {
-    matches!(order, Order::Launch | Order::LaunchTogether)
-}
-
 /// Whether whoever has not taken in the `old` order need not any more. A launch is about those on the ground: it takes the
 /// place of no order, and only who calls all down calls it off. Scripts are beside all that.
 fn supersedes(new: &Order, old: &Order) -> bool {
     match (new, old) {
-        (new, _) if is_launch(new) => false,
+        (new, _) if new.what().is_launch() => false,
         _ if new.script().is_some() || old.script().is_some() => false,
         (Order::Abort | Order::Land(Who::All) | Order::Return(Who::All), _) => true,
-        (_, old) if is_launch(old) => false,
+        (_, old) if old.what().is_launch() => false,
         _ => true,
     }
 }
@@ -168,22 +163,26 @@ fn supersedes(new: &Order, old: &Order) -> bool {
 /// What an event at a vehicle says to an order.
 fn answer_in(order: &Order, happened: &Happened, after: Duration) -> Option<Answer> {
     let event = &happened.event;
-    // What a script has ordered its own vehicle is nobody's answer.
-    let about_it = event.text("what") == Some(order.what()) && event.text("by").is_none();
-    let about_script = order.script().is_some() && event.text("name") == order.script();
-    match event.kind() {
-        TAKEOFF if is_launch(order) => Some(Answer::Acknowledged(after)),
-        ORDER | HEEDED if about_it => Some(Answer::Acknowledged(after)),
-        DECLINED if about_it => {
-            Some(Answer::Refused(event.text("why").unwrap_or("it says no more").to_owned()))
-        }
-        SCRIPT if about_script => match (order, event.text("state")?) {
-            (_, REFUSED) => Some(Answer::Refused(event.text("why").unwrap_or("it says no more").to_owned())),
-            (Order::Load(..), ACCEPTED) | (Order::Unload(..), WITHDRAWN | ENDED) => {
-                Some(Answer::Acknowledged(after))
-            }
-            _ => None,
-        },
+    let acknowledged = || Some(Answer::Acknowledged(after));
+    let refused = |why: &str| Some(Answer::Refused(why.to_owned()));
+    if order.what().is_launch() && event.kind() == Takeoff::NAME {
+        return acknowledged();
+    }
+    if let Some(taken) = OrderTaken::read(event) {
+        // What a script has ordered its own vehicle is nobody's answer.
+        return if taken.what == order.what() && taken.by.is_none() { acknowledged() } else { None };
+    }
+    if let Some(heeded) = Heeded::read(event) {
+        return if heeded.what == order.what() { acknowledged() } else { None };
+    }
+    if let Some(declined) = Declined::read(event) {
+        return if declined.what == order.what() { refused(&declined.why) } else { None };
+    }
+    let news = ScriptNews::read(event).filter(|news| order.script() == Some(&*news.name))?;
+    match (order, news.state) {
+        (_, ScriptState::Refused) => refused(&news.why),
+        (Order::Load(..), ScriptState::Accepted)
+        | (Order::Unload(..), ScriptState::Withdrawn | ScriptState::Ended) => acknowledged(),
         _ => None,
     }
 }

@@ -9,6 +9,7 @@ use skein_dbp::{Board, BoardLease, BoardRow, Happened, NodeName};
 use skein_ground::bthreads::Hold;
 use skein_ground::explain::{Evidence, Explanation, Recorded, RecordedError, explain};
 use skein_ground::recorder::Recorder;
+use skein_wire::event::{Events as _, OrderGiven, What};
 use skein_wire::{MissionState, State};
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -72,8 +73,8 @@ fn request(event: &str) -> Bid {
 }
 
 fn held_by_ground() -> Vec<Board> {
-    let ordered = |what| EventSet::named("ground/main/ordered").and(EventSet::field_is("what", what));
-    let orders = ["hold", "resume", "land", "return", "goto"].map(ordered);
+    let ordered = |what: What| OrderGiven::any_at("ground/main").and(OrderGiven::what(what));
+    let orders = [What::Hold, What::Resume, What::Land, What::Return, What::GoTo].map(ordered);
     let hold = Bid::new().block("uav/*/advance").wait_for(EventSet::any_of(orders));
     vec![
         board(

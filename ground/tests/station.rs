@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use serde::Serialize;
-use skein_bp::{BThread, Bid, Context, Event, EventSet, Program, ProgramConfig};
+use skein_bp::{BThread, Bid, Context, Event, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_ground::{GroundConfig, GroundCore, Order, Who};
-use skein_wire::vocabulary::{ADVANCE, AIRBORNE, COMPLETE, FAILED, LANDED, ORDER, TAKEOFF};
-use skein_wire::{Fleet, MemoryLink, Network, NetworkConfig, NodeLink, State, vocabulary};
+use skein_wire::event::{
+    Advance, Airborne, Complete, Declared as _, Failed, Landed, OrderTaken, Takeoff, What, of,
+};
+use skein_wire::{Fleet, MemoryLink, Network, NetworkConfig, NodeLink, State};
 
 const TICK: Duration = Duration::from_millis(20);
 const LEGS: i64 = 50;
@@ -39,18 +41,16 @@ enum Stage {
 impl BThread for Vehicle {
     fn bid(&self) -> Option<Bid> {
         let name = &self.name;
-        let resume = EventSet::field_is("what", "resume");
-        let bid = Bid::new().wait_for(vocabulary::of(name, ORDER).and(resume.not()));
+        let resume = OrderTaken::what(What::Resume);
+        let bid = Bid::new().wait_for(of::<OrderTaken>(name).and(resume.not()));
         Some(match self.stage {
-            Stage::Parked => Bid::new().wait_for(vocabulary::of(name, TAKEOFF)),
+            Stage::Parked => Bid::new().wait_for(of::<Takeoff>(name)),
             Stage::Climbing | Stage::Resting => bid.deadline(self.timer),
-            Stage::Airborne => bid.request(vocabulary::event(name, AIRBORNE)),
-            Stage::Flying => bid.request(vocabulary::event(name, ADVANCE)),
-            Stage::Done => bid.request(vocabulary::event(name, COMPLETE)),
-            Stage::Ordered => {
-                Bid::new().request(vocabulary::event(name, FAILED).with("why", "ordered to land"))
-            }
-            Stage::Landing => Bid::new().request(vocabulary::event(name, LANDED)),
+            Stage::Airborne => bid.request(Airborne.at(name)),
+            Stage::Flying => bid.request(Advance::ANYWHERE.at(name)),
+            Stage::Done => bid.request(Complete.at(name)),
+            Stage::Ordered => Bid::new().request(Failed { why: "ordered to land".into() }.at(name)),
+            Stage::Landing => Bid::new().request(Landed.at(name)),
             Stage::Down => return None,
         })
     }
@@ -58,7 +58,7 @@ impl BThread for Vehicle {
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         self.timer = cx.now() + Duration::from_millis(if self.stage == Stage::Parked { 500 } else { 100 });
         self.stage = match (self.stage, event.kind()) {
-            (_, ORDER) => Stage::Ordered,
+            (_, OrderTaken::NAME) => Stage::Ordered,
             (Stage::Parked, _) => Stage::Climbing,
             (Stage::Climbing, _) => Stage::Airborne,
             (Stage::Resting, _) => Stage::Flying,
@@ -239,9 +239,10 @@ fn everyone_can_be_called_home() {
             .happened
             .iter()
             .filter(|happened| happened.event.name() == format!("{vehicle}/order"))
-            .filter_map(|happened| happened.event.text("what"))
+            .filter_map(|happened| OrderTaken::read(&happened.event))
+            .map(|order| order.what)
             .collect();
-        assert_eq!(what, ["return"], "{vehicle}");
+        assert_eq!(what, [What::Return], "{vehicle}");
     }
 }
 

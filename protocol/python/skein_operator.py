@@ -59,8 +59,25 @@ PATIENCE_S = 3.0
 LISTEN_S = 1.0
 TICK_S = 0.02
 
+# Words of the catalogue of events:
+ORDER = "order"
+LOAD = "load"
+UNLOAD = "unload"
+SCRIPT = "script"
+ADVANCE = "advance"
+HOMEWARD = "homeward"
+ROSTER = "roster"
+TO_HOLD = "hold"
+TO_LAND = "land"
+TO_RETURN = "return"
+TO_RESUME = "resume"
+ACCEPTED = "accepted"
+REFUSED = "refused"
+WITHDRAWN = "withdrawn"
+# End of the words.
+
 # Leave to move, ten times a second for each vehicle in flight: too much for people to read.
-LEAVE = ("advance", "homeward")
+LEAVE = (ADVANCE, HOMEWARD)
 
 CHUNK = r"[A-Za-z0-9_.-]+"
 
@@ -299,7 +316,7 @@ def watch(options, output, interrupted):
 
 def hold(options, output, interrupted):
     """`hold`: blocks `uav/*/advance` at every vehicle, which each requests before it moves on."""
-    block = wire.RemoteBid(bthread="hold", sync=1, block=wire.EventSet(named="uav/*/advance"))
+    block = wire.RemoteBid(bthread="hold", sync=1, block=wire.EventSet(named=f"uav/*/{ADVANCE}"))
     wanted = named(options)
     outboxes, said, faults = {}, {}, set()
 
@@ -375,9 +392,9 @@ def order(options, output, interrupted):
     occurrences. Both are learnt from the answer to an empty record.
     """
     what, wanted = options.command, named(options)
-    if what == "roster" and options.coordinator not in wanted:
+    if what == ROSTER and options.coordinator not in wanted:
         wanted.append(options.coordinator)
-    verb, data = ("order", {"what": what}) if what not in ("load", "unload") else (what, script_data(options))
+    verb, data = (ORDER, {"what": what}) if what not in (LOAD, UNLOAD) else (what, script_data(options))
     outboxes, taken, unwilling = {}, set(), {}
 
     with Swarm(options.fleet, options.connect, ["state/*/*", "occ/*/*", f"occ/*/*/{NODE}", f"ack/*/*/{NODE}"]) as swarm:
@@ -408,21 +425,21 @@ def order(options, output, interrupted):
             is_new = occurrence.incarnation == outbox.home_incarnation and occurrence.seq > outbox.applied
             if not is_new:
                 return
-            if verb == "order":
+            if verb == ORDER:
                 is_taken = occurrence.event == event(node)
             else:
                 told = {key: value.text for key, value in occurrence.event.data.items()}
-                if occurrence.event.name != f"{node}/script" or told.get("name") != script_name(options):
+                if occurrence.event.name != f"{node}/{SCRIPT}" or told.get("name") != script_name(options):
                     return
-                if told.get("state") == "refused":
+                if told.get("state") == REFUSED:
                     unwilling[node] = told.get("why", "")
-                is_taken = told.get("state") == {"load": "accepted", "unload": "withdrawn"}[verb]
+                is_taken = told.get("state") == {LOAD: ACCEPTED, UNLOAD: WITHDRAWN}[verb]
             if is_taken:
                 taken.add(node)
                 output.tell(f"{node} takes the order: {what}", vehicle=node, order=what, taken=True)
 
         def event(node):
-            if what != "roster":
+            if what != ROSTER:
                 return wire.Event(
                     name=f"{node}/{verb}", data={key: wire.Value(text=text) for key, text in data.items()}
                 )
@@ -431,7 +448,7 @@ def order(options, output, interrupted):
                 "coordinator": wire.Value(text=options.coordinator),
                 "members": wire.Value(text=" ".join(ordered(wanted))),
             }
-            return wire.Event(name=f"{node}/roster", data=roster)
+            return wire.Event(name=f"{node}/{ROSTER}", data=roster)
 
         def is_complete():
             # Not named, the vehicles are those that are heard within a second.
@@ -467,7 +484,7 @@ def order(options, output, interrupted):
 
 def script_data(options):
     """What a request of `load` or `unload` carries."""
-    if options.command == "unload":
+    if options.command == UNLOAD:
         return {"name": options.name}
     assignment = {"script": options.script, "with": dict(options.values)}
     if options.called:
@@ -477,7 +494,7 @@ def script_data(options):
 
 def script_name(options):
     """The name that the script runs under."""
-    return options.name if options.command == "unload" else options.called or options.script.get("name")
+    return options.name if options.command == UNLOAD else options.called or options.script.get("name")
 
 
 def script_file(path):
@@ -590,27 +607,27 @@ def read_arguments(arguments):
     command("list", list_vehicles, "the vehicles, and what they do")
     watching = command("watch", watch, "what happens, until Ctrl-C")
     watching.add_argument("--all", action="store_true", help="also each leave to move, ten a second for each vehicle")
-    holding = command("hold", hold, "nobody moves on, until Ctrl-C")
+    holding = command(TO_HOLD, hold, "nobody moves on, until Ctrl-C")
     holding.add_argument("--seconds", type=duration, default=math.inf, metavar="S", help="end by itself after so long")
     holding.add_argument("vehicles", type=vehicle, nargs="*", default=["all"], metavar="uav/N", help="only these")
     for what, about in (
-        ("land", "land where they are"),
-        ("return", "fly home and land there"),
-        ("resume", "go on after an order to hold"),
+        (TO_LAND, "land where they are"),
+        (TO_RETURN, "fly home and land there"),
+        (TO_RESUME, "go on after an order to hold"),
     ):
         added = command(what, order, about)
         added.add_argument("vehicles", type=vehicle, nargs="+", metavar="uav/N", help="these, or `all`")
-    electing = command("roster", order, "who decides on joint events from now on, and who coordinates them")
+    electing = command(ROSTER, order, "who decides on joint events from now on, and who coordinates them")
     electing.add_argument("--term", type=term, required=True, help="the new term: above the present one, which is 1 at first")
     electing.add_argument("--coordinator", type=node, required=True, metavar="NODE", help="where joint events are decided")
     electing.add_argument("vehicles", type=node, nargs="+", metavar="NODE", help="without whom nothing is decided")
-    loading = command("load", order, "run a script")
+    loading = command(LOAD, order, "run a script")
     loading.add_argument("script", type=script_file, metavar="FILE", help="TOML or JSON, such as agent/scripts/curfew.toml")
     loading.add_argument(
         "--with", type=script_value, action="append", default=[], dest="values", metavar="NAME=VALUE", help="a parameter"
     )
     loading.add_argument("--as", dest="called", metavar="NAME", help="run it under another name")
-    unloading = command("unload", order, "run a script no more")
+    unloading = command(UNLOAD, order, "run a script no more")
     unloading.add_argument("name", metavar="NAME", help="the name it runs under")
     for added in (loading, unloading):
         added.add_argument("vehicles", type=vehicle, nargs="+", metavar="uav/N", help="these, or `all`")

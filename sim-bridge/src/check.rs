@@ -47,8 +47,7 @@ pub fn check(file: &Path, known: &Behaviours) -> Result<Findings, ScenarioError>
             ("mission", missions(&set), set.warnings.iter().map(ToString::to_string).collect())
         }
         _ => {
-            let scenario =
-                Scenario::open_with(&file.to_string_lossy(), &Overrides::default(), 1, known)?;
+            let scenario = Scenario::open_with(&file.to_string_lossy(), &Overrides::default(), 1, known)?;
             let holds = format!("{} vehicles, {}", scenario.vehicles.len(), world(&scenario.scene));
             ("scenario", holds, scenario.notes)
         }

@@ -11,10 +11,10 @@ use skein_agent::bthreads::{escape, mission, navigation, path_planning, return_h
 use skein_agent::{AgentConfig, Me, Mind};
 use skein_bp::{Event, Origin, Program};
 use skein_dbp::{Happened, Node};
-use skein_wire::vocabulary::{
-    ADVANCE, AIRBORNE, ARRIVED, BATTERY_CRITICAL, BATTERY_LOW, CLEAR, COMMAND_FAILED, COMPLETE, FAILED,
-    FENCE_BREACHED, FOUND_AIRBORNE, HOLD, HOMEWARD, LAND, LANDED, PATH_BLOCKED, PILOT, PLAN, PLANNED, READY,
-    SLEPT, STUCK, TAKEOFF, TOO_CLOSE, UNPLANNABLE, UNREADY,
+use skein_wire::event::{
+    self, Advance, Airborne, Arrived, BatteryCritical, BatteryLow, Clear, CommandFailed, Complete,
+    Declared as _, Failed, FenceBreached, FoundAirborne, Hold, Homeward, Land, Landed, PathBlocked,
+    PilotTook, Plan, PlanReason, Planned, Ready, Slept, Stuck, Takeoff, TooClose, Unplannable, Unready,
 };
 
 /// Who requested what the navigator does, in the trace.
@@ -62,7 +62,7 @@ enum Stage {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
     None,
-    Wanted { why: &'static str, attempt: u8, due: Duration },
+    Wanted { why: PlanReason, attempt: u8, due: Duration },
     Asked { attempt: u8 },
     Known { leave_due: Duration },
 }
@@ -87,43 +87,44 @@ impl Sequential {
 
     /// Takes in a report of the vehicle's body.
     fn take_in(&mut self, now: Duration, report: &Event) {
-        let why = || report.text("why").unwrap_or("no reason given").to_owned();
+        let why = || event::why(report).unwrap_or("no reason given").to_owned();
+        let arrived_at = Arrived::read(report).map(|arrived| arrived.leg);
         let is_under_way = matches!(self.stage, Stage::Flying { .. } | Stage::Returning { .. });
         match (self.me.verb(report).unwrap_or_default(), &self.stage) {
-            (verb @ (READY | UNREADY), _) => self.ready = verb == READY,
-            (verb @ (TOO_CLOSE | CLEAR), _) => self.too_close = verb == TOO_CLOSE,
-            (AIRBORNE, Stage::Climbing) => self.fly(now, 0),
-            (ARRIVED, Stage::Flying { leg }) if report.int("leg") == i64::try_from(*leg).ok() => {
+            (verb @ (Ready::NAME | Unready::NAME), _) => self.ready = verb == Ready::NAME,
+            (verb @ (TooClose::NAME | Clear::NAME), _) => self.too_close = verb == TooClose::NAME,
+            (Airborne::NAME, Stage::Climbing) => self.fly(now, 0),
+            (Arrived::NAME, Stage::Flying { leg }) if arrived_at == i64::try_from(*leg).ok() => {
                 self.fly(now, leg + 1);
             }
-            (ARRIVED, Stage::Returning { why }) if report.int("leg") == Some(return_home::HOME_LEG) => {
+            (Arrived::NAME, Stage::Returning { why }) if arrived_at == Some(return_home::HOME_LEG) => {
                 self.land(Some(why.clone()));
             }
-            (PLANNED, _) if is_under_way => self.way = Way::Known { leave_due: now },
-            (UNPLANNABLE, _) if is_under_way => self.plan_again(now, why()),
-            (PATH_BLOCKED, _) if is_under_way => self.plan("obstacle", now),
-            (STUCK, _) if is_under_way && self.escapes < escape::ATTEMPTS => {
+            (Planned::NAME, _) if is_under_way => self.way = Way::Known { leave_due: now },
+            (Unplannable::NAME, _) if is_under_way => self.plan_again(now, why()),
+            (PathBlocked::NAME, _) if is_under_way => self.plan(PlanReason::Obstacle, now),
+            (Stuck::NAME, _) if is_under_way && self.escapes < escape::ATTEMPTS => {
                 self.escapes += 1;
-                self.plan("stuck", now);
+                self.plan(PlanReason::Stuck, now);
             }
-            (STUCK, _) if is_under_way => {
+            (Stuck::NAME, _) if is_under_way => {
                 self.land(Some("stuck: no way past what stands around".to_owned()));
             }
-            (BATTERY_LOW, Stage::Climbing | Stage::Flying { .. }) => self.go_home(now, "battery low"),
-            (FENCE_BREACHED, Stage::Flying { .. }) => self.go_home(now, "outside the geofence"),
-            (BATTERY_CRITICAL, Stage::Climbing | Stage::Flying { .. } | Stage::Returning { .. }) => {
+            (BatteryLow::NAME, Stage::Climbing | Stage::Flying { .. }) => self.go_home(now, "battery low"),
+            (FenceBreached::NAME, Stage::Flying { .. }) => self.go_home(now, "outside the geofence"),
+            (BatteryCritical::NAME, Stage::Climbing | Stage::Flying { .. } | Stage::Returning { .. }) => {
                 self.land(Some("battery nearly empty".to_owned()));
             }
-            (verb @ (PILOT | SLEPT | FOUND_AIRBORNE), _) => {
-                if verb == FOUND_AIRBORNE {
-                    self.acts.push(self.me.because(HOLD, "the agent started in the air"));
+            (verb @ (PilotTook::NAME | Slept::NAME | FoundAirborne::NAME), _) => {
+                if verb == FoundAirborne::NAME {
+                    self.acts.push(self.me.event(Hold { why: "the agent started in the air".into() }));
                 }
                 (self.stage, self.way) = (Stage::Taken, Way::None);
             }
-            (COMMAND_FAILED, Stage::Climbing) => self.end(Some(why())),
-            (LANDED, Stage::Landing { failure }) => self.end(failure.clone()),
-            (LANDED, Stage::Taken) => self.end(Some("somebody else flew it".to_owned())),
-            (LANDED, Stage::Climbing | Stage::Flying { .. } | Stage::Returning { .. }) => {
+            (CommandFailed::NAME, Stage::Climbing) => self.end(Some(why())),
+            (Landed::NAME, Stage::Landing { failure }) => self.end(failure.clone()),
+            (Landed::NAME, Stage::Taken) => self.end(Some("somebody else flew it".to_owned())),
+            (Landed::NAME, Stage::Climbing | Stage::Flying { .. } | Stage::Returning { .. }) => {
                 self.end(Some("the autopilot landed by itself".to_owned()));
             }
             _ => {}
@@ -134,17 +135,21 @@ impl Sequential {
     fn step(&mut self, now: Duration) -> Vec<Event> {
         if self.stage == Stage::Grounded && self.ready {
             self.stage = Stage::Climbing;
-            self.acts.push(self.me.event(TAKEOFF));
+            self.acts.push(self.me.event(Takeoff));
         }
         match self.way {
             Way::Wanted { why, attempt, due } if now >= due => {
                 self.way = Way::Asked { attempt };
-                self.acts.push(self.me.because(PLAN, why));
+                self.acts.push(self.me.event(Plan { why }));
             }
             Way::Known { leave_due } if now >= leave_due && !self.too_close => {
                 self.way = Way::Known { leave_due: now + navigation::CYCLE };
                 let homeward = matches!(self.stage, Stage::Returning { .. });
-                self.acts.push(self.me.event(if homeward { HOMEWARD } else { ADVANCE }));
+                self.acts.push(if homeward {
+                    self.me.event(Homeward)
+                } else {
+                    self.me.event(Advance::ANYWHERE)
+                });
             }
             _ => {}
         }
@@ -167,10 +172,10 @@ impl Sequential {
         self.stage = stage;
         self.escapes = 0;
         self.acts.push(goto);
-        self.plan("waypoint", now);
+        self.plan(PlanReason::Waypoint, now);
     }
 
-    fn plan(&mut self, why: &'static str, now: Duration) {
+    fn plan(&mut self, why: PlanReason, now: Duration) {
         self.way = Way::Wanted { why, attempt: 1, due: now };
     }
 
@@ -178,7 +183,7 @@ impl Sequential {
         match self.way {
             Way::Asked { attempt } if attempt < path_planning::ATTEMPTS => {
                 let due = now + path_planning::PAUSE;
-                self.way = Way::Wanted { why: "waypoint", attempt: attempt + 1, due };
+                self.way = Way::Wanted { why: PlanReason::Waypoint, attempt: attempt + 1, due };
             }
             _ => self.land(Some(why)),
         }
@@ -186,15 +191,15 @@ impl Sequential {
 
     fn land(&mut self, failure: Option<String>) {
         self.way = Way::None;
-        self.acts.push(self.me.because(LAND, failure.as_deref().unwrap_or("mission complete")));
+        self.acts.push(self.me.event(Land { why: failure.as_deref().unwrap_or("mission complete").into() }));
         self.stage = Stage::Landing { failure };
     }
 
     fn end(&mut self, failure: Option<String>) {
         (self.stage, self.way) = (Stage::Over, Way::None);
         self.acts.push(match failure {
-            None => self.me.event(COMPLETE),
-            Some(why) => self.me.because(FAILED, &why),
+            None => self.me.event(Complete),
+            Some(why) => self.me.event(Failed { why: why.into() }),
         });
     }
 }
@@ -249,8 +254,8 @@ mod tests {
         /// On its way to the first waypoint, with a path.
         fn under_way() -> Self {
             let mut vehicle = Self::new();
-            for verb in [READY, AIRBORNE, PLANNED] {
-                vehicle.after(vehicle.me.event(verb));
+            for verb in [Ready::NAME, Airborne::NAME, Planned::NAME] {
+                vehicle.after(Event::new(vehicle.me.event_name(verb)));
             }
             vehicle
         }
@@ -267,11 +272,11 @@ mod tests {
         }
 
         fn hears(&mut self, verb: &str) -> Vec<String> {
-            self.after(self.me.event(verb))
+            self.after(Event::new(self.me.event_name(verb)))
         }
 
         fn arrives(&mut self, leg: i64) -> Vec<String> {
-            self.after(self.me.event(ARRIVED).with("leg", leg))
+            self.after(self.me.event(Arrived { leg }))
         }
     }
 
@@ -279,72 +284,72 @@ mod tests {
     fn it_flies_its_waypoints_in_turn_and_lands() {
         let mut vehicle = Loop::new();
         assert!(vehicle.wait(1000).is_empty(), "the checks have not passed");
-        assert_eq!(vehicle.hears(READY), [TAKEOFF]);
-        assert_eq!(vehicle.hears(AIRBORNE), ["goto", PLAN]);
-        assert_eq!(vehicle.hears(PLANNED), [ADVANCE]);
+        assert_eq!(vehicle.hears(Ready::NAME), [Takeoff::NAME]);
+        assert_eq!(vehicle.hears(Airborne::NAME), ["goto", Plan::NAME]);
+        assert_eq!(vehicle.hears(Planned::NAME), [Advance::NAME]);
         assert!(vehicle.wait(80).is_empty());
-        assert_eq!(vehicle.wait(20), [ADVANCE]);
+        assert_eq!(vehicle.wait(20), [Advance::NAME]);
         assert!(vehicle.arrives(1).is_empty(), "that is not where it is going");
-        assert_eq!(vehicle.arrives(0), ["goto", PLAN]);
-        assert_eq!(vehicle.hears(PLANNED), [ADVANCE]);
-        assert_eq!(vehicle.arrives(1), [LAND]);
-        assert_eq!(vehicle.hears(LANDED), [COMPLETE]);
-        assert!(vehicle.hears(READY).is_empty(), "there is nothing left to fly for");
+        assert_eq!(vehicle.arrives(0), ["goto", Plan::NAME]);
+        assert_eq!(vehicle.hears(Planned::NAME), [Advance::NAME]);
+        assert_eq!(vehicle.arrives(1), [Land::NAME]);
+        assert_eq!(vehicle.hears(Landed::NAME), [Complete::NAME]);
+        assert!(vehicle.hears(Ready::NAME).is_empty(), "there is nothing left to fly for");
     }
 
     #[test]
     fn it_does_not_move_along_a_blocked_path() {
         let mut vehicle = Loop::under_way();
-        assert_eq!(vehicle.hears(PATH_BLOCKED), [PLAN]);
+        assert_eq!(vehicle.hears(PathBlocked::NAME), [Plan::NAME]);
         assert!(vehicle.wait(500).is_empty());
-        assert_eq!(vehicle.hears(PLANNED), [ADVANCE]);
+        assert_eq!(vehicle.hears(Planned::NAME), [Advance::NAME]);
     }
 
     #[test]
     fn a_waypoint_without_a_path_is_tried_three_times() {
         let mut vehicle = Loop::under_way();
-        vehicle.hears(PATH_BLOCKED);
+        vehicle.hears(PathBlocked::NAME);
         for _ in 0..2 {
-            assert!(vehicle.hears(UNPLANNABLE).is_empty());
-            assert_eq!(vehicle.wait(1000), [PLAN]);
+            assert!(vehicle.hears(Unplannable::NAME).is_empty());
+            assert_eq!(vehicle.wait(1000), [Plan::NAME]);
         }
-        assert_eq!(vehicle.hears(UNPLANNABLE), [LAND]);
-        assert_eq!(vehicle.hears(LANDED), [FAILED]);
+        assert_eq!(vehicle.hears(Unplannable::NAME), [Land::NAME]);
+        assert_eq!(vehicle.hears(Landed::NAME), [Failed::NAME]);
     }
 
     #[test]
     fn it_gives_up_a_waypoint_that_it_is_stuck_before() {
         let mut vehicle = Loop::under_way();
         for _ in 0..escape::ATTEMPTS {
-            assert_eq!(vehicle.hears(STUCK), [PLAN]);
-            vehicle.hears(PLANNED);
+            assert_eq!(vehicle.hears(Stuck::NAME), [Plan::NAME]);
+            vehicle.hears(Planned::NAME);
         }
-        assert_eq!(vehicle.hears(STUCK), [LAND]);
+        assert_eq!(vehicle.hears(Stuck::NAME), [Land::NAME]);
     }
 
     #[test]
     fn a_low_battery_brings_it_home() {
         let mut vehicle = Loop::under_way();
-        assert_eq!(vehicle.hears(BATTERY_LOW), ["goto", PLAN]);
-        assert_eq!(vehicle.hears(PLANNED), [HOMEWARD]);
-        assert_eq!(vehicle.arrives(return_home::HOME_LEG), [LAND]);
-        assert_eq!(vehicle.hears(LANDED), [FAILED]);
+        assert_eq!(vehicle.hears(BatteryLow::NAME), ["goto", Plan::NAME]);
+        assert_eq!(vehicle.hears(Planned::NAME), [Homeward::NAME]);
+        assert_eq!(vehicle.arrives(return_home::HOME_LEG), [Land::NAME]);
+        assert_eq!(vehicle.hears(Landed::NAME), [Failed::NAME]);
     }
 
     #[test]
     fn it_waits_while_a_neighbour_is_too_close() {
         let mut vehicle = Loop::under_way();
-        assert!(vehicle.hears(TOO_CLOSE).is_empty());
+        assert!(vehicle.hears(TooClose::NAME).is_empty());
         assert!(vehicle.wait(500).is_empty());
-        assert_eq!(vehicle.hears(CLEAR), [ADVANCE]);
+        assert_eq!(vehicle.hears(Clear::NAME), [Advance::NAME]);
     }
 
     #[test]
     fn what_a_pilot_has_taken_it_leaves_alone() {
         let mut vehicle = Loop::under_way();
-        assert!(vehicle.hears(PILOT).is_empty());
+        assert!(vehicle.hears(PilotTook::NAME).is_empty());
         assert!(vehicle.wait(10_000).is_empty());
-        assert!(vehicle.hears(PATH_BLOCKED).is_empty());
-        assert_eq!(vehicle.hears(LANDED), [FAILED]);
+        assert!(vehicle.hears(PathBlocked::NAME).is_empty());
+        assert_eq!(vehicle.hears(Landed::NAME), [Failed::NAME]);
     }
 }

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 use skein_agent::{GlobalPlanner, LocalPlanner};
-use skein_sim::scenario::{Order, OrderKind, Overrides, Scenario, ScenarioError, Who};
+use skein_sim::scenario::{Order, Overrides, Scenario, ScenarioError, Who};
+use skein_wire::event::What;
 
 const YARD: &str = r#"
 name = "yard"
@@ -83,8 +84,8 @@ fn a_scenario_file_sets_vehicles_obstacles_orders_and_conditions() -> Result<(),
     assert_eq!((yard.network.latency_ms, yard.network.loss), (20.0, 0.1));
     assert_eq!((yard.wind.mean, yard.wind.gust_sigma_m_s), (Vector3::new(2.0, 0.0, 0.0), 0.5));
     let orders = [
-        Order { at_s: 4.0, order: OrderKind::Hold, who: Who::All },
-        Order { at_s: 9.0, order: OrderKind::Land, who: Who::Vehicle(2) },
+        Order { at_s: 4.0, order: What::Hold, who: Who::All },
+        Order { at_s: 9.0, order: What::Land, who: Who::Vehicle(2) },
     ];
     assert_eq!(yard.orders, orders);
     let [first, second] = &yard.vehicles[..] else { panic!("two vehicles") };

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{BATTERY_CRITICAL, BATTERY_LOW, GOTO, HAND_BACK, LAND, LANDED, RETURN};
+use skein_wire::event::{BatteryCritical, BatteryLow, Declared as _, Goto, HandBack, Land, Landed, Return};
 
 use crate::{me::Me, precedence};
 
@@ -33,27 +33,27 @@ impl Battery {
 impl BThread for Battery {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let critical = me.any_of(&[BATTERY_CRITICAL, LANDED]);
+        let critical = me.any::<(BatteryCritical, Landed)>();
         let low = Bid::new().priority(precedence::BATTERY_LOW);
-        let emergency = Bid::new().priority(precedence::BATTERY_EMERGENCY).block(me.any_of(&[RETURN, GOTO]));
+        let emergency = Bid::new().priority(precedence::BATTERY_EMERGENCY).block(me.any::<(Return, Goto)>());
         Some(match self.phase {
-            Phase::Good => low.wait_for(me.any(BATTERY_LOW)).wait_for(critical),
-            Phase::Low => low.request(me.because(RETURN, "battery low")).wait_for(critical),
+            Phase::Good => low.wait_for(me.any::<BatteryLow>()).wait_for(critical),
+            Phase::Low => low.request(me.event(Return { why: "battery low".into() })).wait_for(critical),
             Phase::GoingHome => low.wait_for(critical),
-            Phase::Critical => {
-                emergency.request(me.because(LAND, "battery nearly empty")).wait_for(me.any(LANDED))
-            }
+            Phase::Critical => emergency
+                .request(me.event(Land { why: "battery nearly empty".into() }))
+                .wait_for(me.any::<Landed>()),
             // Given back by a pilot, it still has to land.
-            Phase::GoingDown => emergency.wait_for(me.any_of(&[LANDED, HAND_BACK])),
+            Phase::GoingDown => emergency.wait_for(me.any::<(Landed, HandBack)>()),
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         self.phase = match self.me.verb(event) {
-            Some(BATTERY_LOW) => Phase::Low,
-            Some(RETURN) => Phase::GoingHome,
-            Some(BATTERY_CRITICAL | HAND_BACK) => Phase::Critical,
-            Some(LAND) => Phase::GoingDown,
+            Some(BatteryLow::NAME) => Phase::Low,
+            Some(Return::NAME) => Phase::GoingHome,
+            Some(BatteryCritical::NAME | HandBack::NAME) => Phase::Critical,
+            Some(Land::NAME) => Phase::GoingDown,
             _ => Phase::Good,
         };
     }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ARRIVED, GOTO, LAND, PLAN, STUCK};
+use skein_wire::event::{Arrived, Declared as _, Goto, Land, Plan, PlanReason, Stuck};
 
 use crate::{me::Me, precedence};
 
@@ -29,18 +29,20 @@ impl Escape {
 impl BThread for Escape {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::MISSION).wait_for(me.any_of(&[GOTO, ARRIVED, LAND]));
+        let bid = Bid::new().priority(precedence::MISSION).wait_for(me.any::<(Goto, Arrived, Land)>());
         Some(match (self.stuck, self.attempts) {
-            (false, _) => bid.wait_for(me.any(STUCK)),
-            (true, ATTEMPTS..) => bid.request(me.because(LAND, "stuck: no way past what stands around")),
-            (true, _) => bid.request(me.because(PLAN, "stuck")),
+            (false, _) => bid.wait_for(me.any::<Stuck>()),
+            (true, ATTEMPTS..) => {
+                bid.request(me.event(Land { why: "stuck: no way past what stands around".into() }))
+            }
+            (true, _) => bid.request(me.event(Plan { why: PlanReason::Stuck })),
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         match self.me.verb(event) {
-            Some(STUCK) => self.stuck = true,
-            Some(PLAN) => {
+            Some(Stuck::NAME) => self.stuck = true,
+            Some(Plan::NAME) => {
                 self.stuck = false;
                 self.attempts += 1;
             }

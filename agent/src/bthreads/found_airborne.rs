@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ADVANCE, FOUND_AIRBORNE, GOTO, HOLD, HOMEWARD, LANDED, ORDER, TAKEOFF};
+use skein_wire::event::{self, Advance, Declared as _, Goto, Hold, Homeward, Landed, OrderTaken, Takeoff};
 
 use crate::{me::Me, precedence};
 
@@ -32,19 +32,23 @@ impl BThread for FoundAirborne {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
         let bid = Bid::new().priority(precedence::COLLISION);
-        let mission = me.any_of(&[TAKEOFF, GOTO, ADVANCE, HOMEWARD]);
+        let mission = me.any::<(Takeoff, Goto, Advance, Homeward)>();
         Some(match self.phase {
-            Phase::Unaware => bid.wait_for(me.any(FOUND_AIRBORNE)),
-            Phase::Stopping => bid.request(me.because(HOLD, "the agent started in the air")).block(mission),
-            Phase::Holding => bid.wait_for(me.any_of(&[ORDER, LANDED])).block(mission),
+            Phase::Unaware => bid.wait_for(me.any::<event::FoundAirborne>()),
+            Phase::Stopping => {
+                bid.request(me.event(Hold { why: "the agent started in the air".into() })).block(mission)
+            }
+            Phase::Holding => bid.wait_for(me.any::<(OrderTaken, Landed)>()).block(mission),
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         self.phase = match self.me.verb(event) {
-            Some(FOUND_AIRBORNE) => Phase::Stopping,
-            Some(ORDER) if !matches!(event.text("what"), Some("resume" | "return")) => Phase::Holding,
-            Some(HOLD) => Phase::Holding,
+            Some(event::FoundAirborne::NAME) => Phase::Stopping,
+            Some(OrderTaken::NAME) if !OrderTaken::read(event).is_some_and(|order| order.what.releases()) => {
+                Phase::Holding
+            }
+            Some(Hold::NAME) => Phase::Holding,
             _ => Phase::Unaware,
         };
     }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_wire::vocabulary::{FENCE_BREACHED, GOTO, LANDED, RETURN};
+use skein_wire::event::{Declared as _, FenceBreached, Goto, Landed, Return};
 
 use crate::{me::Me, precedence};
 
@@ -25,7 +25,7 @@ impl Geofence {
     /// A fence over the box from `min` to `max`, metres ENU.
     #[must_use]
     pub fn new(me: Me, min: [f64; 3], max: [f64; 3]) -> Self {
-        let outside = EventSet::And(vec![me.any(GOTO), EventSet::Not(Box::new(EventSet::region(min, max)))]);
+        let outside = me.any::<Goto>().and(EventSet::region(min, max).not());
         Self { me, outside, phase: Phase::Inside }
     }
 }
@@ -34,18 +34,18 @@ impl BThread for Geofence {
     fn bid(&self) -> Option<Bid> {
         let bid = Bid::new().priority(precedence::FENCE).block(self.outside.clone());
         Some(match self.phase {
-            Phase::Inside => bid.wait_for(self.me.any(FENCE_BREACHED)),
-            Phase::Breached => {
-                bid.request(self.me.because(RETURN, "outside the geofence")).wait_for(self.me.any(LANDED))
-            }
-            Phase::Returning => bid.wait_for(self.me.any(LANDED)),
+            Phase::Inside => bid.wait_for(self.me.any::<FenceBreached>()),
+            Phase::Breached => bid
+                .request(self.me.event(Return { why: "outside the geofence".into() }))
+                .wait_for(self.me.any::<Landed>()),
+            Phase::Returning => bid.wait_for(self.me.any::<Landed>()),
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         self.phase = match self.me.verb(event) {
-            Some(FENCE_BREACHED) => Phase::Breached,
-            Some(RETURN) => Phase::Returning,
+            Some(FenceBreached::NAME) => Phase::Breached,
+            Some(Return::NAME) => Phase::Returning,
             _ => Phase::Inside,
         };
     }

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_dbp::facts::{PEER_JOINED, PEER_LOST};
-use skein_wire::vocabulary::{AIRBORNE, LAND, LANDED, RETURN};
+use skein_dbp::facts::{PeerJoined, PeerLost};
+use skein_wire::event::{Airborne, Declared as _, Land, Landed, Return};
 
 use crate::{me::Me, precedence};
 
@@ -54,32 +54,32 @@ impl LinkLoss {
 impl BThread for LinkLoss {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let verb = match self.policy {
+        let why = "ground station lost".into();
+        let act = match self.policy {
             LinkLossPolicy::Continue => return None,
-            LinkLossPolicy::Return => RETURN,
-            LinkLossPolicy::Land => LAND,
+            LinkLossPolicy::Return => me.event(Return { why }),
+            LinkLossPolicy::Land => me.event(Land { why }),
         };
         let bid = Bid::new().priority(precedence::LINK);
         Some(match self.phase {
-            Phase::Grounded => bid.wait_for(me.any(AIRBORNE)),
-            Phase::Linked => bid.wait_for(me.any_of(&[PEER_LOST, LANDED])),
-            Phase::Alone { until } => bid.wait_for(me.any_of(&[PEER_JOINED, LANDED])).deadline(until),
-            Phase::Acting => {
-                bid.request(me.because(verb, "ground station lost")).wait_for(me.any(PEER_JOINED))
-            }
-            Phase::Acted => bid.wait_for(me.any_of(&[LANDED, PEER_JOINED])),
+            Phase::Grounded => bid.wait_for(me.any::<Airborne>()),
+            Phase::Linked => bid.wait_for(me.any::<(PeerLost, Landed)>()),
+            Phase::Alone { until } => bid.wait_for(me.any::<(PeerJoined, Landed)>()).deadline(until),
+            Phase::Acting => bid.request(act).wait_for(me.any::<PeerJoined>()),
+            Phase::Acted => bid.wait_for(me.any::<(Landed, PeerJoined)>()),
         })
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        let about_ground = event.text("node") == Some(self.ground.as_str());
+        let joined = PeerJoined::read(event).is_some_and(|joined| joined.node.as_str() == self.ground);
+        let lost = PeerLost::read(event).is_some_and(|lost| lost.node.as_str() == self.ground);
         self.phase = match (&self.phase, self.me.verb(event)) {
-            (Phase::Linked, Some(PEER_LOST)) if about_ground => Phase::Alone { until: cx.now() + PATIENCE },
-            (_, Some(LANDED)) => Phase::Grounded,
+            (Phase::Linked, _) if lost => Phase::Alone { until: cx.now() + PATIENCE },
+            (_, Some(Landed::NAME)) => Phase::Grounded,
             (Phase::Grounded, _) => Phase::Linked,
-            (_, Some(PEER_JOINED)) if about_ground => Phase::Linked,
+            _ if joined => Phase::Linked,
             (Phase::Alone { .. }, None) => Phase::Acting,
-            (Phase::Acting, Some(RETURN | LAND)) => Phase::Acted,
+            (Phase::Acting, Some(Return::NAME | Land::NAME)) => Phase::Acted,
             (phase, _) => phase.clone(),
         };
     }

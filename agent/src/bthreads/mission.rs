@@ -1,10 +1,10 @@
 //! Mission: take off when told, fly the waypoints in turn, land.
 
 use serde::Serialize;
-use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_wire::vocabulary::{
-    AIRBORNE, ARRIVED, COMMAND_FAILED, COMPLETE, FAILED, FOUND_AIRBORNE, GOTO, HAND_BACK, LAND, LANDED,
-    ORDER, RETURN, TAKEOFF,
+use skein_bp::{BThread, Bid, Context, Event};
+use skein_wire::event::{
+    self, Airborne, Arrived, CommandFailed, Complete, Declared as _, Failed, FoundAirborne, Goto, HandBack,
+    Land, Landed, OrderTaken, Return, Takeoff, What,
 };
 
 use crate::bthreads::OPERATOR_LEG;
@@ -63,45 +63,49 @@ impl Mission {
 /// The `goto` of each waypoint, in order; the vehicle lands at the last.
 pub fn gotos(me: &Me, waypoints: &[[f64; 3]]) -> Vec<Event> {
     let last = waypoints.len().saturating_sub(1);
-    let goto = |(leg, &[x, y, z]): (usize, &[f64; 3])| {
-        let number = i64::try_from(leg).unwrap_or(i64::MAX);
-        me.event(GOTO).with("leg", number).with("lands", leg == last).with("x", x).with("y", y).with("z", z)
+    let goto = |(index, &[x, y, z]): (usize, &[f64; 3])| {
+        let leg = i64::try_from(index).unwrap_or(i64::MAX);
+        me.event(Goto { leg, lands: index == last, x, y, z })
     };
     waypoints.iter().enumerate().map(goto).collect()
 }
 
+fn is_resume(event: &Event) -> bool {
+    OrderTaken::read(event).is_some_and(|order| order.what == What::Resume)
+}
+
 /// Why the vehicle is on its way down, as the event that sent it says.
 fn reason(event: &Event) -> String {
-    event.text("why").unwrap_or("no reason given").to_owned()
+    event::why(event).unwrap_or("no reason given").to_owned()
 }
 
 impl BThread for Mission {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let ended_by_others = me.any_of(&[LAND, RETURN, LANDED]);
-        let diverted = me.any(GOTO).and(EventSet::field_is("leg", OPERATOR_LEG));
+        let ended_by_others = me.any::<(Land, Return, Landed)>();
+        let diverted = me.any::<Goto>().and(Goto::leg(OPERATOR_LEG));
         let bid = Bid::new().priority(precedence::MISSION);
         Some(match &self.phase {
-            Phase::Grounded => bid.wait_for(me.any_of(&[TAKEOFF, FOUND_AIRBORNE])),
-            Phase::Found => bid.wait_for(me.any(ORDER)).wait_for(ended_by_others),
-            Phase::Climbing => bid.wait_for(me.any_of(&[AIRBORNE, COMMAND_FAILED])).wait_for(ended_by_others),
+            Phase::Grounded => bid.wait_for(me.any::<(Takeoff, FoundAirborne)>()),
+            Phase::Found => bid.wait_for(me.any::<OrderTaken>()).wait_for(ended_by_others),
+            Phase::Climbing => bid.wait_for(me.any::<(Airborne, CommandFailed)>()).wait_for(ended_by_others),
             Phase::Heading { leg } => {
                 bid.request(self.waypoints.get(*leg)?.clone()).wait_for(diverted).wait_for(ended_by_others)
             }
             Phase::Flying { .. } => {
-                bid.wait_for(me.any(ARRIVED)).wait_for(diverted).wait_for(ended_by_others)
+                bid.wait_for(me.any::<Arrived>()).wait_for(diverted).wait_for(ended_by_others)
             }
-            Phase::Diverted { .. } => bid.wait_for(me.any(ORDER)).wait_for(ended_by_others),
+            Phase::Diverted { .. } => bid.wait_for(me.any::<OrderTaken>()).wait_for(ended_by_others),
             Phase::Descending { failure } => {
                 let why = failure.as_deref().unwrap_or("mission complete");
-                bid.request(me.because(LAND, why)).wait_for(ended_by_others)
+                bid.request(me.event(Land { why: why.into() })).wait_for(ended_by_others)
             }
             // A pilot may interrupt a landing; given the vehicle back, it still has to land.
-            Phase::Landing { .. } => bid.wait_for(me.any_of(&[LANDED, HAND_BACK])),
-            Phase::Down { failure: None } => bid.request(me.event(COMPLETE)),
-            Phase::Down { failure: Some(why) } => bid.request(me.because(FAILED, why)),
+            Phase::Landing { .. } => bid.wait_for(me.any::<(Landed, HandBack)>()),
+            Phase::Down { failure: None } => bid.request(me.event(Complete)),
+            Phase::Down { failure: Some(why) } => bid.request(me.event(Failed { why: why.as_str().into() })),
             // There is nothing left to take off for.
-            Phase::Over => bid.block(me.any(TAKEOFF)),
+            Phase::Over => bid.block(me.any::<Takeoff>()),
         })
     }
 
@@ -109,24 +113,28 @@ impl BThread for Mission {
         let verb = self.me.verb(event).unwrap_or_default();
         self.phase = match (&self.phase, verb) {
             (Phase::Down { .. }, _) => Phase::Over,
-            (Phase::Landing { failure }, HAND_BACK) => Phase::Descending { failure: failure.clone() },
+            (Phase::Landing { failure }, HandBack::NAME) => Phase::Descending { failure: failure.clone() },
             (Phase::Landing { failure }, _) => Phase::Down { failure: failure.clone() },
-            (Phase::Descending { failure }, LAND | RETURN) => Phase::Landing { failure: failure.clone() },
-            (Phase::Grounded, TAKEOFF) => Phase::Climbing,
-            (Phase::Grounded, FOUND_AIRBORNE) => Phase::Found,
-            (Phase::Found, ORDER) if event.text("what") == Some("resume") => self.towards(0),
-            (Phase::Climbing, AIRBORNE) => self.towards(0),
-            (Phase::Climbing, COMMAND_FAILED) => Phase::Down { failure: Some(reason(event)) },
-            (_, LAND | RETURN) => Phase::Landing { failure: Some(reason(event)) },
-            (_, LANDED) => Phase::Down { failure: Some("the autopilot landed by itself".to_owned()) },
-            (Phase::Heading { leg } | Phase::Flying { leg }, GOTO)
-                if event.int("leg") == Some(OPERATOR_LEG) =>
+            (Phase::Descending { failure }, Land::NAME | Return::NAME) => {
+                Phase::Landing { failure: failure.clone() }
+            }
+            (Phase::Grounded, Takeoff::NAME) => Phase::Climbing,
+            (Phase::Grounded, FoundAirborne::NAME) => Phase::Found,
+            (Phase::Found, OrderTaken::NAME) if is_resume(event) => self.towards(0),
+            (Phase::Climbing, Airborne::NAME) => self.towards(0),
+            (Phase::Climbing, CommandFailed::NAME) => Phase::Down { failure: Some(reason(event)) },
+            (_, Land::NAME | Return::NAME) => Phase::Landing { failure: Some(reason(event)) },
+            (_, Landed::NAME) => Phase::Down { failure: Some("the autopilot landed by itself".to_owned()) },
+            (Phase::Heading { leg } | Phase::Flying { leg }, Goto::NAME)
+                if Goto::read(event).is_some_and(|goto| goto.leg == OPERATOR_LEG) =>
             {
                 Phase::Diverted { leg: *leg }
             }
-            (Phase::Diverted { leg }, ORDER) if event.text("what") == Some("resume") => self.towards(*leg),
-            (Phase::Heading { leg }, GOTO) => Phase::Flying { leg: *leg },
-            (Phase::Flying { leg }, ARRIVED) if event.int("leg") == i64::try_from(*leg).ok() => {
+            (Phase::Diverted { leg }, OrderTaken::NAME) if is_resume(event) => self.towards(*leg),
+            (Phase::Heading { leg }, Goto::NAME) => Phase::Flying { leg: *leg },
+            (Phase::Flying { leg }, Arrived::NAME)
+                if Arrived::read(event).map(|arrived| arrived.leg) == i64::try_from(*leg).ok() =>
+            {
                 self.towards(leg + 1)
             }
             (phase, _) => phase.clone(),

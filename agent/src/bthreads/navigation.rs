@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ADVANCE, AHEAD, ARRIVED, GOTO, HOMEWARD, LAND, LANDED, PLANNED};
+use skein_wire::event::{Advance, Ahead, Arrived, Declared as _, Goto, Homeward, Land, Landed, Planned};
 
 use crate::bthreads::HOME_LEG;
 use crate::{me::Me, precedence};
@@ -41,20 +41,22 @@ impl Navigation {
     /// The leave that is asked for: with the place where it leads, so that whoever minds only some places can say so.
     fn leave(&self) -> Event {
         if self.homeward {
-            return self.me.event(HOMEWARD);
+            return self.me.event(Homeward);
         }
         let place = self.ahead.iter().flat_map(Event::data);
-        place.fold(self.me.event(ADVANCE), |leave, (axis, coordinate)| leave.with(axis, coordinate.clone()))
+        place.fold(self.me.event(Advance::ANYWHERE), |leave, (axis, coordinate)| {
+            leave.with(axis, coordinate.clone())
+        })
     }
 }
 
 impl BThread for Navigation {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::MISSION).wait_for(me.any(AHEAD));
-        let no_path_left = me.any_of(&[ARRIVED, GOTO, LAND, LANDED]);
+        let bid = Bid::new().priority(precedence::MISSION).wait_for(me.any::<Ahead>());
+        let no_path_left = me.any::<(Arrived, Goto, Land, Landed)>();
         Some(match self.phase {
-            Phase::Idle => bid.wait_for(me.any(PLANNED)),
+            Phase::Idle => bid.wait_for(me.any::<Planned>()),
             Phase::Asking => bid.request(self.leave()).wait_for(no_path_left),
             Phase::Moving { until } => bid.wait_for(no_path_left).deadline(until),
         })
@@ -62,19 +64,19 @@ impl BThread for Navigation {
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         match self.me.verb(event) {
-            Some(AHEAD) => {
+            Some(Ahead::NAME) => {
                 self.ahead = Some(event.clone());
                 return;
             }
-            Some(PLANNED) => {
-                self.homeward = event.int("leg") == Some(HOME_LEG);
+            Some(Planned::NAME) => {
+                self.homeward = Planned::read(event).is_some_and(|path| path.leg == HOME_LEG);
                 self.ahead = None;
             }
             _ => {}
         }
         self.phase = match self.me.verb(event) {
-            Some(PLANNED) | None => Phase::Asking,
-            Some(ADVANCE | HOMEWARD) => Phase::Moving { until: cx.now() + CYCLE },
+            Some(Planned::NAME) | None => Phase::Asking,
+            Some(Advance::NAME | Homeward::NAME) => Phase::Moving { until: cx.now() + CYCLE },
             _ => Phase::Idle,
         };
     }

@@ -2,7 +2,9 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ADVANCE, GOTO, HOMEWARD, LAND, PATH_BLOCKED, PLAN, PLANNED};
+use skein_wire::event::{
+    Advance, Declared as _, Goto, Homeward, Land, PathBlocked, Plan, PlanReason, Planned,
+};
 
 use crate::{me::Me, precedence};
 
@@ -32,21 +34,21 @@ impl BThread for ObstacleAvoidance {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
         let bid = Bid::new().priority(precedence::COLLISION);
-        let over = me.any_of(&[PLANNED, GOTO, LAND]);
+        let over = me.any::<(Planned, Goto, Land)>();
         Some(match self.phase {
-            Phase::Free => bid.wait_for(me.any(PATH_BLOCKED)),
+            Phase::Free => bid.wait_for(me.any::<PathBlocked>()),
             Phase::Asking => bid
-                .request(me.because(PLAN, "obstacle"))
-                .block(me.any_of(&[ADVANCE, HOMEWARD]))
+                .request(me.event(Plan { why: PlanReason::Obstacle }))
+                .block(me.any::<(Advance, Homeward)>())
                 .wait_for(over),
-            Phase::Waiting => bid.block(me.any_of(&[ADVANCE, HOMEWARD])).wait_for(over),
+            Phase::Waiting => bid.block(me.any::<(Advance, Homeward)>()).wait_for(over),
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         self.phase = match self.me.verb(event) {
-            Some(PATH_BLOCKED) => Phase::Asking,
-            Some(PLAN) => Phase::Waiting,
+            Some(PathBlocked::NAME) => Phase::Asking,
+            Some(Plan::NAME) => Phase::Waiting,
             _ => Phase::Free,
         };
     }

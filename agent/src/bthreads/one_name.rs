@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_dbp::facts::DUPLICATE_NAME;
-use skein_wire::vocabulary::{ADVANCE, ENTER, HOLD, ORDER, TAKEOFF};
+use skein_dbp::facts::DuplicateName;
+use skein_wire::event::{Advance, Declared as _, Enter, Hold, OrderTaken, Takeoff, What};
 
 use crate::{me::Me, precedence};
 
@@ -35,22 +35,24 @@ impl BThread for OneName {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
         let bid = Bid::new().priority(precedence::COLLISION);
-        let moves = me.any_of(&[TAKEOFF, ADVANCE, ENTER]);
+        let moves = me.any::<(Takeoff, Advance, Enter)>();
         Some(match self.phase {
-            Phase::Unique => bid.wait_for(me.any(DUPLICATE_NAME)),
+            Phase::Unique => bid.wait_for(me.any::<DuplicateName>()),
             Phase::Stopping => bid
-                .request(
-                    me.because(HOLD, "another process has this vehicle's name; end one of them, then resume"),
-                )
+                .request(me.event(Hold {
+                    why: "another process has this vehicle's name; end one of them, then resume".into(),
+                }))
                 .block(moves),
-            Phase::Holding => bid.wait_for(me.any(ORDER)).block(moves),
+            Phase::Holding => bid.wait_for(me.any::<OrderTaken>()).block(moves),
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         self.phase = match self.phase {
             Phase::Unique => Phase::Stopping,
-            Phase::Holding if event.text("what") == Some("resume") => Phase::Unique,
+            Phase::Holding if OrderTaken::read(event).is_some_and(|order| order.what == What::Resume) => {
+                Phase::Unique
+            }
             Phase::Stopping | Phase::Holding => Phase::Holding,
         };
     }

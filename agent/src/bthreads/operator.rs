@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ADVANCE, HAND_BACK, HOLD, LAND, ORDER, RETURN};
+use skein_wire::event::{Advance, Declared as _, HandBack, Hold, Land, OrderTaken, Return, What};
 
 use crate::{me::Me, precedence};
 
@@ -26,33 +26,34 @@ impl Operator {
 impl BThread for Operator {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let mut bid = Bid::new().priority(precedence::LINK).wait_for(me.any(ORDER));
+        let mut bid = Bid::new().priority(precedence::LINK).wait_for(me.any::<OrderTaken>());
         if self.holding {
             // Whoever sends the vehicle home or down, it is no longer held.
-            bid = bid.block(me.any(ADVANCE)).wait_for(me.any_of(&[RETURN, LAND]));
+            bid = bid.block(me.any::<Advance>()).wait_for(me.any::<(Return, Land)>());
         }
         Some(self.pending.iter().fold(bid, |bid, event| bid.request(event.clone())))
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
-        if !self.me.heard(event, ORDER) {
+        if !self.me.heard::<OrderTaken>(event) {
             self.pending.retain(|pending| pending != event);
-            self.holding &= self.me.heard(event, HOLD);
+            self.holding &= self.me.heard::<Hold>(event);
             return;
         }
-        let what = event.text("what").unwrap_or_default();
-        let why = "ordered by the operator";
+        let what = OrderTaken::read(event).map(|order| order.what);
+        let why = || "ordered by the operator".into();
         let event = match what {
-            "hold" => Some(self.me.because(HOLD, why)),
-            "land" => Some(self.me.because(LAND, why)),
-            "return" => Some(self.me.because(RETURN, why)),
-            "hand_back" => Some(self.me.event(HAND_BACK)),
+            Some(What::Hold) => Some(self.me.event(Hold { why: why() })),
+            Some(What::Land) => Some(self.me.event(Land { why: why() })),
+            Some(What::Return) => Some(self.me.event(Return { why: why() })),
+            Some(What::HandBack) => Some(self.me.event(HandBack)),
             _ => None,
         };
-        if what != "hand_back" {
+        if what != Some(What::HandBack) {
             self.pending.clear();
         }
         self.pending.extend(event);
-        self.holding = (self.holding && !matches!(what, "resume" | "goto")) || what == "hold";
+        self.holding =
+            (self.holding && !matches!(what, Some(What::Resume | What::GoTo))) || what == Some(What::Hold);
     }
 }

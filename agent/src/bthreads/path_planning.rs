@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ARRIVED, DECLINED, GOTO, LAND, PLAN, PLANNED, UNPLANNABLE};
+use skein_wire::event::{
+    self, Arrived, Declared as _, Declined, Goto, Land, Plan, PlanReason, Planned, Unplannable, What,
+};
 
 use crate::bthreads::OPERATOR_LEG;
 use crate::{me::Me, precedence};
@@ -42,14 +44,16 @@ impl PathPlanning {
 impl BThread for PathPlanning {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::MISSION).wait_for(me.any_of(&[GOTO, LAND]));
+        let bid = Bid::new().priority(precedence::MISSION).wait_for(me.any::<(Goto, Land)>());
         Some(match &self.phase {
-            Phase::Idle => bid.wait_for(me.any(UNPLANNABLE)),
-            Phase::Asking { .. } => bid.request(me.because(PLAN, "waypoint")),
-            Phase::Computing { .. } => bid.wait_for(me.any_of(&[PLANNED, UNPLANNABLE, ARRIVED])),
-            Phase::Pausing { until, .. } => bid.wait_for(me.any(PLANNED)).deadline(*until),
-            Phase::GivingUp { why } => bid.request(me.because(LAND, why)),
-            Phase::Declining { why } => bid.request(me.because(DECLINED, why).with("what", "goto")),
+            Phase::Idle => bid.wait_for(me.any::<Unplannable>()),
+            Phase::Asking { .. } => bid.request(me.event(Plan { why: PlanReason::Waypoint })),
+            Phase::Computing { .. } => bid.wait_for(me.any::<(Planned, Unplannable, Arrived)>()),
+            Phase::Pausing { until, .. } => bid.wait_for(me.any::<Planned>()).deadline(*until),
+            Phase::GivingUp { why } => bid.request(me.event(Land { why: why.as_str().into() })),
+            Phase::Declining { why } => {
+                bid.request(me.event(Declined { what: What::GoTo, why: why.as_str().into() }))
+            }
         })
     }
 
@@ -61,13 +65,15 @@ impl BThread for PathPlanning {
             Phase::Idle | Phase::GivingUp { .. } | Phase::Declining { .. } => 1,
         };
         self.phase = match self.me.verb(event) {
-            Some(GOTO) => Phase::Asking { attempt: 1 },
-            Some(PLAN) => Phase::Computing { attempt },
-            Some(UNPLANNABLE) if attempt < ATTEMPTS => Phase::Pausing { attempt, until: cx.now() + PAUSE },
-            Some(UNPLANNABLE) => {
-                let why = event.text("why").unwrap_or("no path to the waypoint").to_owned();
-                let ordered = event.int("leg") == Some(OPERATOR_LEG);
-                if ordered { Phase::Declining { why } } else { Phase::GivingUp { why } }
+            Some(Goto::NAME) => Phase::Asking { attempt: 1 },
+            Some(Plan::NAME) => Phase::Computing { attempt },
+            Some(Unplannable::NAME) if attempt < ATTEMPTS => {
+                Phase::Pausing { attempt, until: cx.now() + PAUSE }
+            }
+            Some(Unplannable::NAME) => {
+                let why = event::why(event).unwrap_or("no path to the waypoint").to_owned();
+                let leg = Unplannable::read(event).map(|told| told.leg);
+                if leg == Some(OPERATOR_LEG) { Phase::Declining { why } } else { Phase::GivingUp { why } }
             }
             None => Phase::Asking { attempt: attempt + 1 },
             Some(_) => Phase::Idle,

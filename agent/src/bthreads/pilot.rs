@@ -2,14 +2,9 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{
-    ADVANCE, ENTER, GOTO, HAND_BACK, HOLD, HOMEWARD, LAND, PILOT, PLAN, RETURN, SLEPT, TAKEOFF,
-};
+use skein_wire::event::{HandBack, MOTION, PilotTook, Slept};
 
 use crate::{me::Me, precedence};
-
-/// Everything that would move the vehicle.
-const MOVES: [&str; 9] = [TAKEOFF, GOTO, PLAN, ADVANCE, HOMEWARD, ENTER, HOLD, LAND, RETURN];
 
 /// Blocks every movement, from a pilot's mode change or from waking up with a vehicle that somebody else had to look
 /// after meanwhile, until an operator hands the vehicle back.
@@ -31,13 +26,13 @@ impl BThread for Pilot {
     fn bid(&self) -> Option<Bid> {
         let bid = Bid::new().priority(precedence::PILOT);
         Some(if self.has_control {
-            bid.wait_for(self.me.any(HAND_BACK)).block(self.me.any_of(&MOVES))
+            bid.wait_for(self.me.any::<HandBack>()).block(self.me.any_in(MOTION))
         } else {
-            bid.wait_for(self.me.any_of(&[PILOT, SLEPT]))
+            bid.wait_for(self.me.any::<(PilotTook, Slept)>())
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
-        self.has_control = !self.me.heard(event, HAND_BACK);
+        self.has_control = !self.me.heard::<HandBack>(event);
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{COMMAND_FAILED, LANDED, READY, TAKEOFF, UNREADY};
+use skein_wire::event::{CommandFailed, Declared as _, Landed, Ready, Takeoff, Unready};
 
 use crate::{me::Me, precedence};
 
@@ -26,19 +26,19 @@ impl Preflight {
 impl BThread for Preflight {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::COLLISION).wait_for(me.any_of(&[READY, UNREADY]));
+        let bid = Bid::new().priority(precedence::COLLISION).wait_for(me.any::<(Ready, Unready)>());
         Some(match (self.off, self.ready) {
-            (true, _) => bid.wait_for(me.any_of(&[LANDED, COMMAND_FAILED])).block(me.any(TAKEOFF)),
-            (false, true) => bid.wait_for(me.any(TAKEOFF)),
-            (false, false) => bid.block(me.any(TAKEOFF)),
+            (true, _) => bid.wait_for(me.any::<(Landed, CommandFailed)>()).block(me.any::<Takeoff>()),
+            (false, true) => bid.wait_for(me.any::<Takeoff>()),
+            (false, false) => bid.block(me.any::<Takeoff>()),
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         match self.me.verb(event) {
-            Some(TAKEOFF) => self.off = true,
-            Some(LANDED | COMMAND_FAILED) => self.off = false,
-            verb => self.ready = verb == Some(READY),
+            Some(Takeoff::NAME) => self.off = true,
+            Some(Landed::NAME | CommandFailed::NAME) => self.off = false,
+            verb => self.ready = verb == Some(Ready::NAME),
         }
     }
 }

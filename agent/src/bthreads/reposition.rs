@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{
-    AIRBORNE, DECLINED, FOUND_AIRBORNE, GOTO, LAND, LANDED, ORDER, RETURN, TAKEOFF,
+use skein_wire::event::{
+    Airborne, Declared as _, Declined, FoundAirborne, Goto, Land, Landed, OrderTaken, Return, Takeoff, What,
 };
 
 use crate::{me::Me, precedence};
@@ -46,13 +46,12 @@ impl Reposition {
     }
 
     /// The `goto` that an order asks for.
-    fn goto(&self, order: &Event) -> Option<Event> {
-        let [x, y, z] = ["x", "y", "z"].map(|axis| order.real(axis));
-        let goto = self.me.event(GOTO).with("leg", OPERATOR_LEG).with("lands", false);
-        Some(goto.with("x", x?).with("y", y?).with("z", z?))
+    fn goto(&self, order: &OrderTaken) -> Option<Event> {
+        let [x, y, z] = order.place()?;
+        Some(self.me.event(Goto { leg: OPERATOR_LEG, lands: false, x, y, z }))
     }
 
-    fn answer(&self, order: &Event, now: Duration) -> Task {
+    fn answer(&self, order: &OrderTaken, now: Duration) -> Task {
         let declining = |why: &str| Task::Declining { why: why.to_owned() };
         match (self.standing, self.goto(order)) {
             (Standing::Free, Some(to)) => Task::Turning { to, until: now + PATIENCE },
@@ -65,33 +64,35 @@ impl Reposition {
 impl BThread for Reposition {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::LINK).wait_for(me.any_of(match self.standing {
-            Standing::Grounded => &[ORDER, AIRBORNE, LAND, RETURN],
-            Standing::Free => &[ORDER, LAND, RETURN, LANDED],
-            Standing::Bound => &[ORDER, LANDED, TAKEOFF, FOUND_AIRBORNE],
-        }));
+        let bid = Bid::new().priority(precedence::LINK).wait_for(match self.standing {
+            Standing::Grounded => me.any::<(OrderTaken, Airborne, Land, Return)>(),
+            Standing::Free => me.any::<(OrderTaken, Land, Return, Landed)>(),
+            Standing::Bound => me.any::<(OrderTaken, Landed, Takeoff, FoundAirborne)>(),
+        });
         Some(match &self.task {
             Task::Nothing => bid,
             Task::Turning { to, until } => bid.request(to.clone()).deadline(*until),
-            Task::Declining { why } => bid.request(me.because(DECLINED, why).with("what", "goto")),
+            Task::Declining { why } => {
+                bid.request(me.event(Declined { what: What::GoTo, why: why.as_str().into() }))
+            }
         })
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        let is_goto = event.text("what") == Some("goto");
-        self.task = match (&self.task, self.me.verb(event)) {
-            (_, Some(ORDER)) if is_goto => self.answer(event, cx.now()),
+        let goto = self.me.read::<OrderTaken>(event).filter(|order| order.what == What::GoTo);
+        self.task = match (goto, &self.task, self.me.verb(event)) {
+            (Some(order), ..) => self.answer(&order, cx.now()),
             // Another order takes the place of this one.
-            (Task::Declining { why }, Some(ORDER)) => Task::Declining { why: why.clone() },
-            (Task::Turning { .. }, None) => {
+            (None, Task::Declining { why }, Some(OrderTaken::NAME)) => Task::Declining { why: why.clone() },
+            (None, Task::Turning { .. }, None) => {
                 Task::Declining { why: "the vehicle blocks it: outside the geofence, or held".into() }
             }
             _ => Task::Nothing,
         };
         self.standing = match self.me.verb(event) {
-            Some(AIRBORNE) => Standing::Free,
-            Some(LAND | RETURN) => Standing::Bound,
-            Some(LANDED | TAKEOFF | FOUND_AIRBORNE) => Standing::Grounded,
+            Some(Airborne::NAME) => Standing::Free,
+            Some(Land::NAME | Return::NAME) => Standing::Bound,
+            Some(Landed::NAME | Takeoff::NAME | FoundAirborne::NAME) => Standing::Grounded,
             _ => self.standing,
         };
     }

@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{
-    AIRBORNE, ARRIVED, COMMAND_FAILED, FOUND_AIRBORNE, GOTO, HAND_BACK, LAND, LANDED, RETURN, TAKEOFF,
+use skein_wire::event::{
+    self, Airborne, Arrived, CommandFailed, Declared as _, FoundAirborne, Goto, HandBack, Land, Landed,
+    Return, Takeoff,
 };
 
 use crate::{me::Me, precedence};
@@ -47,34 +48,40 @@ impl ReturnHome {
 
 /// The `goto` to the point above the take-off place.
 pub fn goto(me: &Me, [x, y, z]: [f64; 3]) -> Event {
-    me.event(GOTO).with("leg", HOME_LEG).with("lands", true).with("x", x).with("y", y).with("z", z)
+    me.event(Goto { leg: HOME_LEG, lands: true, x, y, z })
 }
 
 impl BThread for ReturnHome {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
         // Whatever was ordered on the ground is over then.
-        let bid = Bid::new().priority(precedence::BATTERY_LOW).wait_for(me.any(TAKEOFF));
-        let grounded = me.any_of(&[LANDED, COMMAND_FAILED]);
-        let over = grounded.clone().or(me.any(LAND));
+        let bid = Bid::new().priority(precedence::BATTERY_LOW).wait_for(me.any::<Takeoff>());
+        let grounded = me.any::<(Landed, CommandFailed)>();
+        let over = grounded.clone().or(me.any::<Land>());
         Some(match &self.phase {
-            Phase::Grounded => bid.wait_for(me.any_of(&[AIRBORNE, FOUND_AIRBORNE, HAND_BACK])),
-            Phase::Away => bid.wait_for(me.any(RETURN)).wait_for(over),
+            Phase::Grounded => bid.wait_for(me.any::<(Airborne, FoundAirborne, HandBack)>()),
+            Phase::Away => bid.wait_for(me.any::<Return>()).wait_for(over),
             Phase::Turning { .. } => bid.request(self.home.clone()).wait_for(over),
-            Phase::Returning { .. } => bid.wait_for(me.any(ARRIVED)).wait_for(over),
-            Phase::Landing { why } => bid.request(me.because(LAND, why)).wait_for(grounded),
-            Phase::Down => bid.wait_for(me.any(HAND_BACK)).wait_for(grounded),
+            Phase::Returning { .. } => bid.wait_for(me.any::<Arrived>()).wait_for(over),
+            Phase::Landing { why } => {
+                bid.request(me.event(Land { why: why.as_str().into() })).wait_for(grounded)
+            }
+            Phase::Down => bid.wait_for(me.any::<HandBack>()).wait_for(grounded),
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         self.phase = match (self.phase.clone(), self.me.verb(event)) {
-            (_, Some(TAKEOFF)) => Phase::Away,
-            (_, Some(LAND)) => Phase::Down,
-            (_, Some(LANDED | COMMAND_FAILED)) => Phase::Grounded,
-            (Phase::Away, _) => Phase::Turning { why: event.text("why").unwrap_or("return").to_owned() },
+            (_, Some(Takeoff::NAME)) => Phase::Away,
+            (_, Some(Land::NAME)) => Phase::Down,
+            (_, Some(Landed::NAME | CommandFailed::NAME)) => Phase::Grounded,
+            (Phase::Away, _) => Phase::Turning { why: event::why(event).unwrap_or("return").to_owned() },
             (Phase::Turning { why }, _) => Phase::Returning { why },
-            (Phase::Returning { why }, _) if event.int("leg") == Some(HOME_LEG) => Phase::Landing { why },
+            (Phase::Returning { why }, _)
+                if Arrived::read(event).is_some_and(|arrived| arrived.leg == HOME_LEG) =>
+            {
+                Phase::Landing { why }
+            }
             (Phase::Returning { why }, _) => Phase::Returning { why },
             _ => Phase::Away,
         };

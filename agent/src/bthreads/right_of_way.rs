@@ -15,8 +15,10 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, PEER_JOINED, PEER_LOST, STALLED};
-use skein_wire::vocabulary::{ADVANCE, ENTER, HOMEWARD, LANDED, LEAVE, PASSAGE, of, of_every_vehicle};
+use skein_dbp::facts::{BlockLapsed, Confirmed, PeerJoined, PeerLost, Stalled};
+use skein_wire::event::{
+    Advance, Declared as _, Enter, Homeward, Landed, Leave, Passage, of, of_every_vehicle,
+};
 
 use crate::{me::Me, precedence};
 
@@ -76,7 +78,7 @@ impl RightOfWay {
 
     /// `enter` into the same passage, of everyone else.
     fn others_enter(&self, passage: &Event) -> EventSet {
-        of_every_vehicle(ENTER).and(self.me.any(ENTER).not()).and(around(passage))
+        of_every_vehicle::<Enter>().and(self.me.any::<Enter>().not()).and(around(passage))
     }
 
     /// The same, without those whose confirmation is not needed.
@@ -87,7 +89,7 @@ impl RightOfWay {
         }
         let needed =
             self.others.iter().filter(|(_, other)| matches!(other, Other::Alive | Other::LostClaiming));
-        EventSet::any_of(needed.map(|(node, _)| of(node, ENTER))).and(around(passage))
+        EventSet::any_of(needed.map(|(node, _)| of::<Enter>(node))).and(around(passage))
     }
 
     /// Whether the vehicle `other` goes first when both claim: the lower number does.
@@ -100,15 +102,17 @@ impl RightOfWay {
 
     /// Takes in that another node is heard or lost.
     fn note(&mut self, event: &Event, now: Duration) {
-        let joined = self.me.heard(event, PEER_JOINED);
-        let Some(other) = event.text("node").and_then(|node| self.others.get_mut(node)) else { return };
-        let claiming = event.text("released").is_some_and(|bthreads| bthreads.split(' ').any(|b| b == NAME));
-        *other = match (joined, claiming) {
-            (true, _) => Other::Alive,
-            (false, true) => Other::LostClaiming,
-            (false, false) => Other::Lost,
+        let (node, now_it_is) = if let Some(joined) = PeerJoined::read(event) {
+            (joined.node, Other::Alive)
+        } else if let Some(lost) = PeerLost::read(event) {
+            let claimed = lost.released.split(' ').any(|bthread| bthread == NAME);
+            (lost.node, if claimed { Other::LostClaiming } else { Other::Lost })
+        } else {
+            return;
         };
-        if joined {
+        let Some(other) = self.others.get_mut(node.as_str()) else { return };
+        *other = now_it_is;
+        if now_it_is == Other::Alive {
             self.met = now + self.meeting;
         }
     }
@@ -133,34 +137,34 @@ pub fn around(passage: &Event) -> EventSet {
 /// `enter` into a passage.
 pub fn entering(me: &Me, passage: &Event) -> Event {
     let [x, y, z] = centre(passage);
-    me.event(ENTER).with("x", x).with("y", y).with("z", z)
+    me.event(Enter { x, y, z })
 }
 
 fn centre(passage: &Event) -> [f64; 3] {
-    ["x", "y", "z"].map(|axis| passage.real(axis).unwrap_or_default())
+    Passage::read(passage).map_or([0.0; 3], |Passage { x, y, z }| [x, y, z])
 }
 
 impl BThread for RightOfWay {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::COLLISION).wait_for(me.any_of(&[PEER_JOINED, PEER_LOST]));
-        let gone = me.any_of(&[LEAVE, LANDED]);
+        let bid = Bid::new().priority(precedence::COLLISION).wait_for(me.any::<(PeerJoined, PeerLost)>());
+        let gone = me.any::<(Leave, Landed)>();
         Some(match &self.phase {
-            Phase::Clear => bid.wait_for(me.any(PASSAGE)),
+            Phase::Clear => bid.wait_for(me.any::<Passage>()),
             Phase::Claiming { passage } => bid
                 .block(self.claim(passage))
-                .block(me.any_of(&[ADVANCE, HOMEWARD]))
-                .wait_for(me.any(CONFIRMED))
+                .block(me.any::<(Advance, Homeward)>())
+                .wait_for(me.any::<Confirmed>())
                 .wait_for(gone),
             Phase::Entering { passage } => bid
                 .request(entering(me, passage))
                 .block(self.claim(passage))
-                .block(me.any_of(&[ADVANCE, HOMEWARD]))
-                .wait_for(me.any_of(&[STALLED, BLOCK_LAPSED]))
+                .block(me.any::<(Advance, Homeward)>())
+                .wait_for(me.any::<(Stalled, BlockLapsed)>())
                 .wait_for(gone),
             Phase::Yielding { until, .. } => bid
-                .block(me.any_of(&[ADVANCE, HOMEWARD]))
-                .wait_for(of_every_vehicle(LEAVE))
+                .block(me.any::<(Advance, Homeward)>())
+                .wait_for(of_every_vehicle::<Leave>())
                 .deadline(*until)
                 .wait_for(gone),
             // Whoever comes back meanwhile stays out too.
@@ -170,27 +174,26 @@ impl BThread for RightOfWay {
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         let (now, verb) = (cx.now(), self.me.verb(event));
-        let fleet_changed = matches!(verb, Some(PEER_JOINED | PEER_LOST));
+        let fleet_changed = matches!(verb, Some(PeerJoined::NAME | PeerLost::NAME));
         if fleet_changed {
             self.note(event, now);
         }
+        let confirmed = Confirmed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
+        let lapsed = BlockLapsed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
         self.phase = match (self.phase.clone(), verb) {
-            (_, Some(LEAVE | LANDED)) => Phase::Clear,
+            (_, Some(Leave::NAME | Landed::NAME)) => Phase::Clear,
             (Phase::Claiming { passage } | Phase::Entering { passage }, _) if fleet_changed => {
                 self.claim_again(passage, now)
             }
             (phase, _) if fleet_changed => phase,
             (Phase::Clear, _) => self.claim_again(event.clone(), now),
-            (Phase::Claiming { passage }, Some(CONFIRMED)) if event.text("bthread") == Some(NAME) => {
-                Phase::Entering { passage }
-            }
-            (Phase::Entering { passage }, Some(ENTER)) => Phase::Inside { passage },
-            (Phase::Entering { passage }, Some(BLOCK_LAPSED)) if event.text("bthread") == Some(NAME) => {
-                Phase::Claiming { passage }
-            }
-            (Phase::Entering { passage }, Some(STALLED))
-                if event.text("event").is_some_and(|stalled| stalled.ends_with(ENTER))
-                    && self.goes_before_me(event.text("by").unwrap_or_default()) =>
+            (Phase::Claiming { passage }, _) if confirmed => Phase::Entering { passage },
+            (Phase::Entering { passage }, Some(Enter::NAME)) => Phase::Inside { passage },
+            (Phase::Entering { passage }, _) if lapsed => Phase::Claiming { passage },
+            (Phase::Entering { passage }, _)
+                if Stalled::read(event).is_some_and(|stalled| {
+                    stalled.event.ends_with(Enter::NAME) && self.goes_before_me(&stalled.by)
+                }) =>
             {
                 Phase::Yielding { passage, until: now + PATIENCE }
             }

@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::vocabulary::{ADVANCE, CLEAR, HOMEWARD, TOO_CLOSE};
+use skein_wire::event::{Advance, Clear, Homeward, TooClose};
 
 use crate::{me::Me, precedence};
 
@@ -27,13 +27,13 @@ impl BThread for Separation {
     fn bid(&self) -> Option<Bid> {
         let bid = Bid::new().priority(precedence::COLLISION);
         Some(if self.too_close {
-            bid.wait_for(self.me.any(CLEAR)).block(self.me.any_of(&[ADVANCE, HOMEWARD]))
+            bid.wait_for(self.me.any::<Clear>()).block(self.me.any::<(Advance, Homeward)>())
         } else {
-            bid.wait_for(self.me.any(TOO_CLOSE))
+            bid.wait_for(self.me.any::<TooClose>())
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
-        self.too_close = self.me.heard(event, TOO_CLOSE);
+        self.too_close = self.me.heard::<TooClose>(event);
     }
 }

@@ -1,10 +1,11 @@
 //! Together: the swarm's joint launch and joint abort, which the whole roster learns of before anything else is decided.
 
 use serde::Serialize;
-use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_dbp::facts::{IN_STEP, PEER_LOST};
-use skein_wire::vocabulary::{
-    ABORT, AIRBORNE, HEEDED, LAND, LANDED, LAUNCH, READY, SWARM, TAKEOFF, UNREADY, event, of,
+use skein_bp::{BThread, Bid, Context, Event};
+use skein_dbp::NodeName;
+use skein_dbp::facts::{InStep, PeerLost};
+use skein_wire::event::{
+    Abort, Airborne, Declared as _, Heeded, Land, Landed, Launch, Ready, SWARM, Takeoff, Unready, What, of,
 };
 
 use crate::{me::Me, precedence};
@@ -19,7 +20,7 @@ pub struct Together {
     ready: bool,
     flying: bool,
     /// The coordinator, while all decisions so far are known.
-    in_step_with: Option<String>,
+    in_step_with: Option<NodeName>,
     /// Whether the last of the decisions heard late was to abort.
     aborted_meanwhile: bool,
     task: Task,
@@ -44,8 +45,8 @@ impl Together {
 
     fn decided(&mut self, verb: &str) {
         if self.in_step_with.is_none() {
-            self.aborted_meanwhile = verb == ABORT;
-        } else if verb == ABORT {
+            self.aborted_meanwhile = verb == Abort::NAME;
+        } else if verb == Abort::NAME {
             self.task = Task::Answer;
         } else if !self.flying {
             self.task = Task::TakeOff;
@@ -56,36 +57,48 @@ impl Together {
 impl BThread for Together {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new()
-            .wait_for(EventSet::any_of([of(SWARM, LAUNCH), of(SWARM, ABORT)]))
-            .wait_for(me.any_of(&[READY, UNREADY, TAKEOFF, AIRBORNE, LAND, LANDED, IN_STEP, PEER_LOST]));
-        let bid = if self.ready || self.flying { bid } else { bid.block(event(SWARM, LAUNCH)) };
+        let bid = Bid::new().wait_for(of::<(Launch, Abort)>(SWARM)).wait_for(me.any::<(
+            Ready,
+            Unready,
+            Takeoff,
+            Airborne,
+            Land,
+            Landed,
+            InStep,
+            PeerLost,
+        )>());
+        let bid = if self.ready || self.flying { bid } else { bid.block(Launch.at(SWARM)) };
         Some(match self.task {
             Task::Nothing => bid,
-            Task::TakeOff => bid.request(me.event(TAKEOFF)).priority(precedence::MISSION),
-            Task::Answer => bid.request(me.event(HEEDED).with("what", ABORT)).priority(precedence::LINK),
-            Task::Land => bid.request(me.because(LAND, "called off together")).priority(precedence::LINK),
+            Task::TakeOff => bid.request(me.event(Takeoff)).priority(precedence::MISSION),
+            Task::Answer => bid.request(me.event(Heeded { what: What::Abort })).priority(precedence::LINK),
+            Task::Land => {
+                bid.request(me.event(Land { why: "called off together".into() })).priority(precedence::LINK)
+            }
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         let Some(verb) = self.me.verb(event) else { return self.decided(event.kind()) };
         match verb {
-            READY | UNREADY => self.ready = verb == READY,
-            TAKEOFF | AIRBORNE => {
+            Ready::NAME | Unready::NAME => self.ready = verb == Ready::NAME,
+            Takeoff::NAME | Airborne::NAME => {
                 self.flying = true;
                 if self.task == Task::TakeOff {
                     self.task = Task::Nothing;
                 }
             }
-            HEEDED => self.task = if self.flying { Task::Land } else { Task::Nothing },
-            LAND => self.task = Task::Nothing,
-            LANDED => (self.flying, self.task) = (false, Task::Nothing),
-            PEER_LOST if event.text("node") == self.in_step_with.as_deref() => self.in_step_with = None,
-            IN_STEP => {
-                self.in_step_with = event.text("coordinator").map(str::to_owned);
+            Heeded::NAME => self.task = if self.flying { Task::Land } else { Task::Nothing },
+            Land::NAME => self.task = Task::Nothing,
+            Landed::NAME => (self.flying, self.task) = (false, Task::Nothing),
+            PeerLost::NAME => {
+                let lost = PeerLost::read(event).map(|lost| lost.node);
+                self.in_step_with.take_if(|coordinator| lost.as_ref() == Some(coordinator));
+            }
+            InStep::NAME => {
+                self.in_step_with = InStep::read(event).map(|told| told.coordinator);
                 if std::mem::take(&mut self.aborted_meanwhile) {
-                    self.decided(ABORT);
+                    self.decided(Abort::NAME);
                 }
             }
             _ => {}

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::Context as _;
 use skein_disk::{PromiseStore, ScriptStore, next_incarnation};
-use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
+use skein_wire::event::{Advance, Declared as _, Homeward, What};
 use skein_wire::{Fleet, Key, Link as _, Payload, Scan};
 use skein_zenoh::{Bell, Complaints, ZenohConfig, ZenohLink, ZenohSession};
 
@@ -42,7 +42,7 @@ pub fn run(config: Config) -> anyhow::Result<()> {
             1 if driver.core.is_committed() => {
                 if !std::mem::replace(&mut landing, true) {
                     tracing::warn!("landing, then ending; Ctrl-C again ends at once");
-                    driver.core.order("land");
+                    driver.core.order(What::Land);
                 }
             }
             _ => return Ok(()),
@@ -174,7 +174,7 @@ impl Driver {
     /// Writes down what the vehicle itself has decided or met.
     fn tell(&mut self) {
         for happened in self.core.take_selections() {
-            let repeated = matches!(happened.event.kind(), ADVANCE | HOMEWARD);
+            let repeated = matches!(happened.event.kind(), Advance::NAME | Homeward::NAME);
             if happened.home == *self.core.name() && !repeated {
                 tracing::info!("{}", happened.event);
             }

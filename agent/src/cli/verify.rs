@@ -14,10 +14,10 @@ use skein_bp::verify::{Progress, Report, Violation};
 use skein_dbp::verify::programs::{self, Network};
 use skein_dbp::verify::{Faults, MoveCounts};
 
+use crate::agent_error::AgentError;
 use crate::bthreads::LinkLossPolicy;
 use crate::config::AgentConfig;
 use crate::config_file::Config;
-use crate::agent_error::AgentError;
 use crate::verify::{NotCovered, Scene, SceneReport, VehicleVerifier};
 
 /// States of a scene that are looked at unless told otherwise.

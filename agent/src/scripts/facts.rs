@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use skein_bp::Event;
 use skein_wire::NodeName;
-use skein_wire::vocabulary::{AHEAD, AT, BATTERY, NEIGHBOUR};
+use skein_wire::event::{Ahead, At, BatteryLevel, Declared as _, NeighbourAt};
 
 use super::Scripts;
 use crate::{me::Me, neighbours::Neighbour};
@@ -51,39 +51,39 @@ impl ScriptFacts {
     /// What has changed since it was told last, as far as a script listens.
     pub fn tell(&mut self, me: &Me, scripts: &Scripts, now: &Circumstances<'_>) -> Vec<Event> {
         let mut events = Vec::new();
-        if scripts.listen_to(BATTERY)
+        if scripts.listen_to(BatteryLevel::NAME)
             && let Some(fraction) = now.battery
         {
             // Rounded up, so that 40 is told at 40 % and not at 44 %.
             let percent = (fraction * 100.0).round() as i64;
             let step = (percent + STEP_PERCENT - 1) / STEP_PERCENT * STEP_PERCENT;
             if self.percent.replace(step) != Some(step) {
-                events.push(me.event(BATTERY).with("percent", step));
+                events.push(me.event(BatteryLevel { percent: step }));
             }
         }
         for neighbour in
             now.neighbours.iter().filter(|neighbour| neighbour.armed && neighbour.track.cooperative)
         {
-            if !scripts.listen_to(NEIGHBOUR) {
+            if !scripts.listen_to(NeighbourAt::NAME) {
                 break;
             }
             let place = neighbour.position();
             let told = self.neighbours.get(&neighbour.node);
             if told.is_none_or(|(there, here)| moved(there, &place) || moved(here, &now.position)) {
                 self.neighbours.insert(neighbour.node.clone(), (place, now.position));
-                let event = me.event(NEIGHBOUR).with("node", neighbour.node.as_str());
-                events.push(at(event, place).with("distance_m", (place - now.position).norm()));
+                let (node, distance_m) = (neighbour.node.as_str().into(), (place - now.position).norm());
+                events.push(me.event(NeighbourAt { node, x: place.x, y: place.y, z: place.z, distance_m }));
             }
         }
-        if scripts.listen_to(AT) && self.at.is_none_or(|told| moved(&told, &now.position)) {
+        if scripts.listen_to(At::NAME) && self.at.is_none_or(|told| moved(&told, &now.position)) {
             self.at = Some(now.position);
-            events.push(at(me.event(AT), now.position));
+            events.push(me.event(At { x: now.position.x, y: now.position.y, z: now.position.z }));
         }
-        if let (true, Some(ahead)) = (scripts.listen_to(AHEAD), now.ahead)
+        if let (true, Some(ahead)) = (scripts.listen_to(Ahead::NAME), now.ahead)
             && self.ahead.is_none_or(|told| moved(&told, &ahead))
         {
             self.ahead = Some(ahead);
-            events.push(at(me.event(AHEAD), ahead));
+            events.push(me.event(Ahead { x: ahead.x, y: ahead.y, z: ahead.z }));
         }
         events
     }
@@ -91,8 +91,4 @@ impl ScriptFacts {
 
 fn moved(from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
     (to - from).norm() >= STEP_M
-}
-
-fn at(event: Event, place: Vector3<f64>) -> Event {
-    event.with("x", place.x).with("y", place.y).with("z", place.z)
 }

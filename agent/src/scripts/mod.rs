@@ -7,14 +7,13 @@
 mod facts;
 mod rights;
 mod runner;
+mod vocabulary;
 
 use std::{collections::BTreeMap, time::Duration};
 
 use skein_bp::script::{Argument, Assignment, BoundScript};
 use skein_bp::{Event, EventSet, Program};
-use skein_wire::vocabulary::{
-    ACCEPTED, ADVANCE, AHEAD, AT, BATTERY, ENDED, NEIGHBOUR, REFUSED, SCRIPT, WITHDRAWN,
-};
+use skein_wire::event::{Advance, Ahead, Catalogue, Declared as _, SCRIPT_FACTS, ScriptNews, ScriptState};
 use skein_wire::{KeptScript, Store};
 
 pub use self::{
@@ -72,15 +71,12 @@ pub struct Scripts {
 /// many more before it sends one, and nothing that is for the vehicle's safety hangs on it.
 const STATES_TRIED: usize = 200;
 
-/// The facts that are told only while a script listens.
-const FACTS: [&str; 4] = [AT, AHEAD, NEIGHBOUR, BATTERY];
-
 impl Scripts {
-    /// No scripts yet, on a vehicle whose fleet is `roster`.
+    /// No scripts yet, on a vehicle whose fleet is `roster` and knows these events.
     #[must_use]
-    pub fn new(me: Me, roster: &[String]) -> Self {
+    pub fn new(me: Me, roster: &[String], events: &Catalogue) -> Self {
         Self {
-            rights: ScriptRights::usual(&me, roster),
+            rights: ScriptRights::usual(&me, roster, events),
             me,
             running: BTreeMap::new(),
             store: None,
@@ -122,7 +118,8 @@ impl Scripts {
             Begins::WhenReleased => self.runner(&script).asleep(),
         };
         let BoundScript { name, about, with, bthread } = script;
-        let listens = FACTS.into_iter().filter(|fact| self.listens(&bthread, fact)).collect();
+        let listens =
+            SCRIPT_FACTS.iter().map(|fact| fact.name).filter(|fact| self.listens(&bthread, fact)).collect();
         let bthread = Runner::bthread_name(&name);
         let from = from.to_owned();
         let running = RunningScript { about, with, from, assignment: assignment.clone(), listens };
@@ -156,21 +153,20 @@ impl Scripts {
 
     /// Whether a script asks about a fact. Whoever blocks some leave to move, and not all, must know where it leads.
     fn listens(&self, script: &skein_bp::script::Script, fact: &str) -> bool {
-        let [name, advance] = [fact, ADVANCE].map(|verb| format!("{}/{verb}", self.me.name()));
+        let [name, advance] = [fact, Advance::NAME].map(|verb| self.me.event_name(verb));
         let asks = |set: &EventSet| set.may_hold_named(&name);
         script.bids().any(|bid| {
             let partly = bid.blocks().may_hold_named(&advance) && !bid.blocks().holds_all_named(&advance);
-            asks(bid.waits()) || asks(bid.interrupts()) || fact == AHEAD && partly
+            asks(bid.waits()) || asks(bid.interrupts()) || fact == Ahead::NAME && partly
         })
     }
 
     /// Takes in what has become of a script.
     pub fn hear(&mut self, event: &Event) {
-        if self.me.heard(event, SCRIPT)
-            && matches!(event.text("state"), Some(WITHDRAWN | ENDED))
-            && let Some(name) = event.text("name")
+        if let Some(news) = self.me.read::<ScriptNews>(event)
+            && matches!(news.state, ScriptState::Withdrawn | ScriptState::Ended)
         {
-            self.running.remove(name);
+            self.running.remove(&*news.name);
             self.note_unsaved();
         }
     }
@@ -209,8 +205,8 @@ impl Scripts {
     #[must_use]
     pub fn verdict(&self, name: &str, outcome: Result<(), String>) -> Event {
         match outcome {
-            Ok(()) => report(&self.me, name, ACCEPTED, ""),
-            Err(why) => report(&self.me, name, REFUSED, &why),
+            Ok(()) => report(&self.me, name, ScriptState::Accepted, ""),
+            Err(why) => report(&self.me, name, ScriptState::Refused, &why),
         }
     }
 
@@ -233,6 +229,6 @@ impl Scripts {
 }
 
 /// `uav/3/script{name, state, why}`.
-fn report(me: &Me, name: &str, state: &str, why: &str) -> Event {
-    me.because(SCRIPT, why).with("name", name).with("state", state)
+fn report(me: &Me, name: &str, state: ScriptState, why: &str) -> Event {
+    me.event(ScriptNews { name: name.into(), state, why: why.into() })
 }

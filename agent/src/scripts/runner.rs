@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::Serialize;
 use skein_bp::script::Script;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_wire::vocabulary::{ENDED, HAND_BACK, ORDER, READY, UNLOAD, WITHDRAWN};
+use skein_wire::event::{HandBack, OrderTaken, Ready, ScriptState, Unload, What};
 
 use super::report;
 use crate::{me::Me, precedence};
@@ -55,13 +55,13 @@ impl Runner {
     }
 
     fn withdrawal(&self) -> EventSet {
-        self.me.any(UNLOAD).and(EventSet::field_is("name", self.name.as_str()))
+        self.me.any::<Unload>().and(Unload::name(self.name.as_str()))
     }
 
     /// What ends the hold of a vehicle whose agent has started in the air, and what is told of one on the ground.
     fn release(&self) -> EventSet {
-        let onward = EventSet::any_of(["resume", "return"].map(|what| EventSet::field_is("what", what)));
-        self.me.any_of(&[READY, HAND_BACK]).or(self.me.any(ORDER).and(onward))
+        let onward = EventSet::any_of(What::those(What::releases).map(OrderTaken::what));
+        self.me.any::<(Ready, HandBack)>().or(self.me.any::<OrderTaken>().and(onward))
     }
 
     fn begin(&mut self, cx: &mut Context) {
@@ -71,14 +71,14 @@ impl Runner {
         self.note_end(cx);
     }
 
-    fn end(&mut self, state: &str, why: &str, cx: &mut Context) {
+    fn end(&mut self, state: ScriptState, why: &str, cx: &mut Context) {
         self.over = true;
         cx.enqueue(report(&self.me, &self.name, state, why));
     }
 
     fn note_end(&mut self, cx: &mut Context) {
         if self.script.bid().is_none() {
-            self.end(ENDED, "it has come to its end", cx);
+            self.end(ScriptState::Ended, "it has come to its end", cx);
         }
     }
 
@@ -121,20 +121,20 @@ impl BThread for Runner {
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         if self.withdrawal().contains(event) {
-            return self.end(WITHDRAWN, "it was taken back", cx);
+            return self.end(ScriptState::Withdrawn, "it was taken back", cx);
         }
         if self.asleep {
             return self.begin(cx);
         }
         if self.spins(cx.now()) {
             let why = format!("it did not come to rest: it was resumed {MOST_AT_ONCE} times at once");
-            return self.end(ENDED, &why, cx);
+            return self.end(ScriptState::Ended, &why, cx);
         }
         self.script.resume(event, &mut Context::at(cx.now()));
         self.note_end(cx);
     }
 
     fn interrupted(&mut self, event: &Event, cx: &mut Context) {
-        self.end(ENDED, &format!("it was ended by {event}"), cx);
+        self.end(ScriptState::Ended, &format!("it was ended by {event}"), cx);
     }
 }

@@ -17,19 +17,19 @@ use std::sync::Arc;
 use skein_bp::behaviour::{Model, WORLD};
 use skein_bp::script::{Assignment, Script};
 use skein_bp::verify::{Coverage, Inspection, Progress, Report, Timers, Verifier, View};
-use skein_bp::{BThread, Bid, Event, EventSet, Program, ProgramConfig};
-use skein_dbp::facts;
-use skein_wire::vocabulary::{
-    self, AHEAD, AT, BATTERY, GOTO, HOLD, HOMEWARD, LAND, NEIGHBOUR, OWN, PLAN, RETURN,
-};
+use skein_bp::{BThread, Bid, Event, Program, ProgramConfig};
+use skein_wire::NodeName;
+use skein_wire::event::{Declaration, Declared as _, Goto, Hold, Homeward, Land, Plan, Return, SCRIPT_FACTS};
 
 pub use self::part::{Part, Place};
 pub use self::requirement::{Requirement, requirements};
 pub use self::scene::Scene;
 use self::scene::World;
+use crate::agent_error::AgentError;
 use crate::bthreads::{self, HOME_LEG, RIGHT_OF_WAY};
+use crate::config::AgentConfig;
+use crate::me::Me;
 use crate::scripts::{Runner, Scripts};
-use crate::{agent_error::AgentError, config::AgentConfig, me::Me};
 
 /// How many waypoints of a mission are flown: the first and the last, between which all others are alike.
 const MOST_WAYPOINTS: usize = 2;
@@ -43,13 +43,13 @@ const SAFETY_RULE: &str = "nobody blocks a safety event but who goes before it";
 /// Which b-threads may block an event that is for the vehicle's safety; nobody may block those that are not named. `goto` is
 /// that to home.
 const MAY_BLOCK: [(&str, &[&str]); 6] = [
-    (HOLD, &["pilot"]),
-    (LAND, &["pilot"]),
+    (Hold::NAME, &["pilot"]),
+    (Land::NAME, &["pilot"]),
     // An empty battery does not carry it home.
-    (RETURN, &["pilot", "battery"]),
-    (GOTO, &["pilot", "battery", "found_airborne"]),
-    (PLAN, &["pilot"]),
-    (HOMEWARD, &["pilot", "separation", "obstacle_avoidance", RIGHT_OF_WAY, "found_airborne"]),
+    (Return::NAME, &["pilot", "battery"]),
+    (Goto::NAME, &["pilot", "battery", "found_airborne"]),
+    (Plan::NAME, &["pilot"]),
+    (Homeward::NAME, &["pilot", "separation", "obstacle_avoidance", RIGHT_OF_WAY, "found_airborne"]),
 ];
 
 /// A vehicle's program under verification.
@@ -117,7 +117,7 @@ impl VehicleVerifier {
         // The world waits for the program to rest, which it must within `LONGEST_BURST`.
         let mut program = Program::new(ProgramConfig { externals_after: None, ..ProgramConfig::vehicle(0) });
         bthreads::load(&mut program, &config);
-        let examiner = Scripts::new(me.clone(), &config.roster);
+        let examiner = Scripts::new(me.clone(), &config.roster, &config.events());
         let mut scripts = Vec::new();
         for assignment in &config.scripts {
             let refused = |why| AgentError::Script { name: assignment.name().to_owned(), why };
@@ -197,10 +197,13 @@ impl VehicleVerifier {
         let facts = self.script_facts();
         let me = self.me.name();
         let other = self.config.roster.iter().find(|node| node.starts_with("uav/") && *node != me);
+        let name = |node: &String| NodeName::new(node).ok();
+        let (other, ground) = (other.and_then(name), name(&self.config.ground));
         let world = World {
             me: &self.me,
             config: &self.config,
-            other: other.map(String::as_str),
+            other: other.as_ref(),
+            ground: ground.as_ref(),
             script_facts: &facts,
         };
         for (name, part) in scene.parts(&world) {
@@ -210,14 +213,15 @@ impl VehicleVerifier {
             }
         }
         let (me, [x, y, _]) = (self.me.clone(), self.config.home);
-        let home = self.me.event(GOTO).with("leg", HOME_LEG).with("lands", true);
-        let home = home.with("x", x).with("y", y).with("z", self.config.return_altitude_m);
+        let z = self.config.return_altitude_m;
+        let home = me.event(Goto { leg: HOME_LEG, lands: true, x, y, z });
+        let own: Vec<_> = self.config.events().own().collect();
         let mut verifier = Verifier::new(program)
             .inspect(Inspection::USUAL.into_iter().chain([Inspection::Unsettled]))
             .timers(Timers::AtRest)
             .most_states(self.most_states)
             .world(outside)
-            .every_bid(SAFETY_RULE, move |bthread, bid| blocks_safety(&me, &home, bthread, bid))
+            .every_bid(SAFETY_RULE, move |bthread, bid| blocks_safety(&me, &own, &home, bthread, bid))
             .always_within_reach("the ground", is_down);
         for (name, event) in self.held_by_scripts() {
             let goal = goal_of_script(&name, &event);
@@ -233,9 +237,8 @@ impl VehicleVerifier {
         scenes.iter().for_each(|scene| coverage.join(scene.coverage.clone()));
         let own = |name: &&Arc<str>| !name.starts_with(WORLD) && !name.contains('#');
         let threads: Vec<_> = coverage.bthreads.iter().filter(|(name, _)| own(name)).collect();
-        let verbs = vocabulary::verbs().chain(facts::names());
-        let brought = self.config.behaviours.event_names(self.me.name());
-        let names = verbs.map(|verb| self.me.event(verb).name().to_owned()).chain(brought);
+        let events = self.config.events();
+        let names = events.at_vehicle().map(|event| self.me.event_name(event.name));
         let untold = names.filter(|name| !coverage.happened.iter().any(|event| event.name() == name));
         let never_told = untold.filter_map(|name| {
             let waits =
@@ -266,10 +269,8 @@ impl VehicleVerifier {
 
     /// What scripts listen to and nobody else.
     fn script_facts(&self) -> BTreeSet<Event> {
-        let told = [AT, AHEAD, NEIGHBOUR, BATTERY].map(|fact| self.me.event(fact).name().to_owned());
-        let is_told = |event: &Event| {
-            told.iter().any(|name| event.name() == name) || !event.name().starts_with(self.me.name())
-        };
+        let told = self.me.any_in(SCRIPT_FACTS);
+        let is_told = |event: &Event| told.contains(event) || !event.name().starts_with(self.me.name());
         self.scripts.iter().flat_map(|(_, script)| script.listened_to()).filter(is_told).collect()
     }
 
@@ -321,18 +322,24 @@ fn is_blocked_by(view: &View<'_>, bthread: &str, event: &Event) -> bool {
 }
 
 /// Whether a b-thread of the vehicle blocks what it must not.
-fn blocks_safety(me: &Me, home: &Event, bthread: &str, bid: &Bid) -> Result<(), String> {
+fn blocks_safety(
+    me: &Me,
+    own: &[&Declaration],
+    home: &Event,
+    bthread: &str,
+    bid: &Bid,
+) -> Result<(), String> {
     if bthread.starts_with(WORLD) || bid.blocks().is_none() {
         return Ok(());
     }
     let may =
         |verb: &str| MAY_BLOCK.iter().any(|(named, bthreads)| *named == verb && bthreads.contains(&bthread));
-    if bid.blocks().contains(home) && !may(GOTO) {
+    if bid.blocks().contains(home) && !may(Goto::NAME) {
         return Err(format!("`{bthread}` blocks the way home, {home}"));
     }
-    let blocked = |set: &EventSet, verb: &str| set.may_hold_named(me.event(verb).name());
-    match OWN.into_iter().find(|verb| blocked(bid.blocks(), verb) && !may(verb)) {
-        Some(verb) => Err(format!("`{bthread}` blocks `{}`", me.event(verb))),
+    let blocked = |verb: &str| bid.blocks().may_hold_named(&me.event_name(verb));
+    match own.iter().map(|event| event.name).find(|verb| blocked(verb) && !may(verb)) {
+        Some(verb) => Err(format!("`{bthread}` blocks `{}`", me.event_name(verb))),
         None => Ok(()),
     }
 }

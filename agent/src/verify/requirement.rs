@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, DUPLICATE_NAME, PEER_JOINED, PEER_LOST, STALLED};
-use skein_wire::vocabulary::{
-    ADVANCE, AIRBORNE, BATTERY_CRITICAL, BATTERY_LOW, CLEAR, COMMAND_FAILED, COMPLETE, ENTER, FAILED,
-    FENCE_BREACHED, FOUND_AIRBORNE, GOTO, HAND_BACK, HOLD, HOMEWARD, LAND, LANDED, LEAVE, ORDER, PASSAGE,
-    PATH_BLOCKED, PILOT, PLAN, PLANNED, READY, RETURN, SLEPT, STUCK, TAKEOFF, TOO_CLOSE, UNREADY,
+use skein_dbp::facts::{BlockLapsed, Confirmed, DuplicateName, PeerJoined, PeerLost, Stalled};
+use skein_wire::event::{
+    Advance, Airborne, BatteryCritical, BatteryLow, Clear, CommandFailed, Complete, Enter, Failed,
+    FenceBreached, FoundAirborne, Goto, HandBack, Homeward, Land, Landed, Leave, MOTION, OrderTaken, Passage,
+    PathBlocked, PilotTook, Plan, Planned, Ready, Return, Slept, Stuck, Takeoff, TooClose, Unready, What,
 };
 
 use crate::bthreads::{HOME_LEG, OPERATOR_LEG, RIGHT_OF_WAY};
@@ -76,17 +76,17 @@ impl Requirement {
     pub fn response_in_flight(
         name: &str,
         me: &Me,
-        begins: &[&str],
+        begins: EventSet,
         from: EventSet,
         answer: EventSet,
     ) -> Self {
-        let flight =
-            Flight { begins: me.any_of(begins), ends: me.any_of(&[LANDED, COMMAND_FAILED]), is_on: false };
+        let flight = Flight { begins, ends: me.any::<(Landed, CommandFailed)>(), is_on: false };
         Self::answered(name, me, from, answer, Some(flight))
     }
 
     fn answered(name: &str, me: &Me, from: EventSet, answer: EventSet, flight: Option<Flight>) -> Self {
-        let pilot = Pilot { takes: me.any_of(&[PILOT, SLEPT]), gives_back: me.any(HAND_BACK), has_it: false };
+        let pilot =
+            Pilot { takes: me.any::<(PilotTook, Slept)>(), gives_back: me.any::<HandBack>(), has_it: false };
         let rule = Rule::Response { from, answer, flight, pilot, is_due: false, is_answered: false };
         Self { name: name.to_owned(), rule }
     }
@@ -155,88 +155,92 @@ impl BThread for Requirement {
 }
 
 /// What a flight begins with.
-const IN_THE_AIR: [&str; 2] = [TAKEOFF, FOUND_AIRBORNE];
+type InTheAir = (Takeoff, FoundAirborne);
 
 /// What must hold of every vehicle, whatever its mission.
 #[must_use]
 pub fn requirements(me: &Me, fence: &Fence) -> Vec<Requirement> {
-    let order = |what: &[&str]| {
-        me.any(ORDER).and(EventSet::any_of(what.iter().map(|what| EventSet::field_is("what", *what))))
+    let order = |what: &[What]| {
+        me.any::<OrderTaken>().and(EventSet::any_of(what.iter().copied().map(OrderTaken::what)))
     };
-    let leg = |number: i64| EventSet::field_is("leg", number);
-    let about_claim = |fact: &str| me.any(fact).and(EventSet::field_is("bthread", RIGHT_OF_WAY));
-    let moves = me.any_of(&[TAKEOFF, GOTO, PLAN, ADVANCE, HOMEWARD, ENTER, HOLD, LAND, RETURN]);
-    let leave = me.any_of(&[ADVANCE, HOMEWARD]);
-    let away = me.any(GOTO).and(leg(HOME_LEG).not());
-    let outside = me.any(GOTO).and(EventSet::region(fence.min, fence.max).not());
-    let down = me.any_of(&[LAND, LANDED]);
-    let home_or_down = me.any_of(&[RETURN, LAND, LANDED]);
+    let (home, elsewhere) = (Goto::leg(HOME_LEG), Goto::leg(HOME_LEG).not());
+    let leave = me.any::<(Advance, Homeward)>();
+    let away = me.any::<Goto>().and(elsewhere.clone());
+    let outside = me.any::<Goto>().and(EventSet::region(fence.min, fence.max).not());
+    let down = me.any::<(Land, Landed)>();
+    let home_or_down = me.any::<(Return, Land, Landed)>();
     vec![
         Requirement::absence(
             "from a pilot's mode change until it is handed back, the agent moves nothing",
-            moves,
-            me.any_of(&[PILOT, SLEPT]),
-            me.any(HAND_BACK),
+            me.any_in(MOTION),
+            me.any::<(PilotTook, Slept)>(),
+            me.any::<HandBack>(),
         ),
         Requirement::absence(
             "with a neighbour inside the emergency distance there is no leave to move",
             leave.clone(),
-            me.any(TOO_CLOSE),
-            me.any(CLEAR),
+            me.any::<TooClose>(),
+            me.any::<Clear>(),
         ),
         Requirement::absence(
             "along a path that is known to be blocked there is no leave to move",
             leave.clone(),
-            me.any(PATH_BLOCKED),
-            me.any_of(&[PLANNED, GOTO, LAND]),
+            me.any::<PathBlocked>(),
+            me.any::<(Planned, Goto, Land)>(),
         ),
         Requirement::absence(
             "before a narrow passage there is no leave to move until it is entered",
             leave,
-            me.any(PASSAGE),
-            me.any_of(&[ENTER, LEAVE, LANDED]),
+            me.any::<Passage>(),
+            me.any::<(Enter, Leave, Landed)>(),
         ),
         Requirement::absence_from_start(
             "no passage is entered without a confirmed claim",
-            me.any(ENTER),
-            about_claim(BLOCK_LAPSED).or(me.any_of(&[LEAVE, LANDED, PEER_JOINED, PEER_LOST, STALLED])),
-            about_claim(CONFIRMED),
+            me.any::<Enter>(),
+            me.any::<BlockLapsed>().and(BlockLapsed::bthread(RIGHT_OF_WAY)).or(me.any::<(
+                Leave,
+                Landed,
+                PeerJoined,
+                PeerLost,
+                Stalled,
+            )>()),
+            me.any::<Confirmed>().and(Confirmed::bthread(RIGHT_OF_WAY)),
         ),
         Requirement::absence_from_start(
             "no take-off unless the checks pass",
-            me.any(TAKEOFF),
-            me.any(UNREADY),
-            me.any(READY),
+            me.any::<Takeoff>(),
+            me.any::<Unready>(),
+            me.any::<Ready>(),
         ),
         Requirement::absence(
             "no take-off in the air",
-            me.any(TAKEOFF),
-            me.any_of(&[TAKEOFF, AIRBORNE, FOUND_AIRBORNE]),
-            me.any_of(&[LANDED, COMMAND_FAILED]),
+            me.any::<Takeoff>(),
+            me.any::<(Takeoff, Airborne, FoundAirborne)>(),
+            me.any::<(Landed, CommandFailed)>(),
         ),
         Requirement::absence(
             "no take-off after the mission's end",
-            me.any(TAKEOFF),
-            me.any_of(&[COMPLETE, FAILED]),
+            me.any::<Takeoff>(),
+            me.any::<(Complete, Failed)>(),
             EventSet::None,
         ),
         Requirement::absence(
             "found in the air, it flies no mission before it is ordered to",
-            me.any_of(&[TAKEOFF, GOTO, ADVANCE, HOMEWARD]),
-            me.any(FOUND_AIRBORNE),
-            order(&["resume", "return"]).or(me.any(LANDED)),
+            me.any::<(Takeoff, Goto, Advance, Homeward)>(),
+            me.any::<FoundAirborne>(),
+            order(&[What::Resume, What::Return]).or(me.any::<Landed>()),
         ),
         Requirement::absence(
             "while another process has its name, it neither takes off nor goes on",
-            me.any_of(&[TAKEOFF, ADVANCE, ENTER]),
-            me.any(DUPLICATE_NAME),
-            order(&["resume"]),
+            me.any::<(Takeoff, Advance, Enter)>(),
+            me.any::<DuplicateName>(),
+            order(&[What::Resume]),
         ),
         Requirement::absence(
             "held by an order, it has no leave to move",
-            me.any(ADVANCE),
-            order(&["hold"]),
-            order(&["resume", "goto"]).or(me.any_of(&[RETURN, LAND])),
+            me.any::<Advance>(),
+            order(&[What::Hold]),
+            order(&[What::Resume, What::GoTo]).or(me.any::<(Return, Land)>()),
         ),
         Requirement::absence_from_start(
             "no waypoint outside the fence",
@@ -246,82 +250,87 @@ pub fn requirements(me: &Me, fence: &Fence) -> Vec<Requirement> {
         ),
         Requirement::absence(
             "battery emergency goes before fence, battery low, link and mission",
-            me.any_of(&[RETURN, GOTO]),
-            me.any(BATTERY_CRITICAL),
-            me.any(LANDED),
+            me.any::<(Return, Goto)>(),
+            me.any::<BatteryCritical>(),
+            me.any::<Landed>(),
         ),
         Requirement::absence(
             "a fence breach goes before orders and mission",
             away.clone(),
-            me.any(FENCE_BREACHED),
+            me.any::<FenceBreached>(),
             home_or_down.clone(),
         ),
         Requirement::absence(
             "a low battery goes before orders and mission",
             away.clone(),
-            me.any(BATTERY_LOW),
+            me.any::<BatteryLow>(),
             home_or_down.clone(),
         ),
         Requirement::absence(
             "on the way home or down, nothing leads elsewhere",
             away,
-            me.any_of(&[RETURN, LAND]),
+            me.any::<(Return, Land)>(),
             // What was ordered on the ground has no meaning in the air.
-            me.any_of(&[LANDED, TAKEOFF, FOUND_AIRBORNE]),
+            me.any::<(Landed, Takeoff, FoundAirborne)>(),
         ),
         Requirement::absence(
             "on the way down, nothing leads up again",
-            me.any(GOTO),
-            me.any(LAND),
-            me.any_of(&[LANDED, TAKEOFF, FOUND_AIRBORNE, HAND_BACK]),
+            me.any::<Goto>(),
+            me.any::<Land>(),
+            me.any::<(Landed, Takeoff, FoundAirborne, HandBack)>(),
         ),
         Requirement::response_in_flight(
             "whoever returns heads for home or lands",
             me,
             // One that was found in the air waits for an order.
-            &[TAKEOFF],
-            me.any(RETURN),
-            me.any(GOTO).and(leg(HOME_LEG)).or(me.any_of(&[LAND, LANDED])),
+            me.any::<Takeoff>(),
+            me.any::<Return>(),
+            me.any::<Goto>().and(home).or(me.any::<(Land, Landed)>()),
         ),
         Requirement::response_in_flight(
             "an empty battery lands the vehicle",
             me,
-            &IN_THE_AIR,
-            me.any(BATTERY_CRITICAL),
+            me.any::<InTheAir>(),
+            me.any::<BatteryCritical>(),
             down.clone(),
         ),
         Requirement::response_in_flight(
             "a low battery sends it home",
             me,
-            &IN_THE_AIR,
-            me.any(BATTERY_LOW),
+            me.any::<InTheAir>(),
+            me.any::<BatteryLow>(),
             home_or_down.clone(),
         ),
         Requirement::response_in_flight(
             "outside the fence it turns home",
             me,
-            &IN_THE_AIR,
-            me.any(FENCE_BREACHED),
+            me.any::<InTheAir>(),
+            me.any::<FenceBreached>(),
             home_or_down.clone(),
         ),
-        Requirement::response("ordered to land, it lands", me, order(&["land"]), down.or(me.any(ORDER))),
+        Requirement::response(
+            "ordered to land, it lands",
+            me,
+            order(&[What::Land]),
+            down.or(me.any::<OrderTaken>()),
+        ),
         Requirement::response(
             "ordered home, it goes home",
             me,
-            order(&["return"]),
-            home_or_down.or(me.any(ORDER)),
+            order(&[What::Return]),
+            home_or_down.or(me.any::<OrderTaken>()),
         ),
         Requirement::response(
             "a vehicle that is stuck plans anew or lands",
             me,
-            me.any(STUCK),
-            me.any_of(&[PLAN, LAND, GOTO, LANDED]),
+            me.any::<Stuck>(),
+            me.any::<(Plan, Land, Goto, Landed)>(),
         ),
         Requirement::absence(
             "diverted by an operator, the mission waits to be resumed",
-            me.any(GOTO).and(leg(OPERATOR_LEG).not()).and(leg(HOME_LEG).not()),
-            me.any(GOTO).and(leg(OPERATOR_LEG)),
-            order(&["resume"]).or(me.any(LANDED)),
+            me.any::<Goto>().and(Goto::leg(OPERATOR_LEG).not()).and(elsewhere),
+            me.any::<Goto>().and(Goto::leg(OPERATOR_LEG)),
+            order(&[What::Resume]).or(me.any::<Landed>()),
         ),
     ]
 }
@@ -378,7 +387,13 @@ mod tests {
     #[test]
     fn a_response_in_flight_is_due_once_and_in_the_air_only() {
         let me = Me::new("uav/1");
-        let rule = Requirement::response_in_flight("test", &me, &IN_THE_AIR, "from".into(), "answer".into());
+        let rule = Requirement::response_in_flight(
+            "test",
+            &me,
+            me.any::<InTheAir>(),
+            "from".into(),
+            "answer".into(),
+        );
         for (events, due) in [
             (&["from"][..], false),
             (&["uav/1/takeoff", "from"], true),

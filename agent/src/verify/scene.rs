@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 
 use skein_bp::Event;
 use skein_bp::behaviour::WORLD;
+use skein_wire::NodeName;
+use skein_wire::event::What;
 
 use super::part::Part;
 use super::world::{self, Disturbed};
@@ -39,7 +41,8 @@ pub(super) struct World<'a> {
     pub(super) me: &'a Me,
     pub(super) config: &'a AgentConfig,
     /// Another vehicle, if there is one.
-    pub(super) other: Option<&'a str>,
+    pub(super) other: Option<&'a NodeName>,
+    pub(super) ground: Option<&'a NodeName>,
     /// What is told to scripts only.
     pub(super) script_facts: &'a BTreeSet<Event>,
 }
@@ -96,7 +99,7 @@ impl Scene {
 
     /// The parts of the world in this scene, by name, those that stand for other nodes' bids last.
     pub(super) fn parts(self, world: &World<'_>) -> Vec<(String, Part)> {
-        let World { me, config, other, script_facts } = *world;
+        let World { me, config, other, ground, script_facts } = *world;
         let legs = world::legs(config.waypoints.len());
         let everything = self == Self::Everything;
         let disturbed = Disturbed {
@@ -123,14 +126,14 @@ impl Scene {
         if is_in(&[Self::Passage]) {
             add("passage", world::passage(me, other));
         }
-        if is_in(&[Self::Launch, Self::Passage, Self::Link]) {
-            add("ground station", world::peer(me, &config.ground));
+        if let Some(ground) = ground.filter(|_| is_in(&[Self::Launch, Self::Passage, Self::Link])) {
+            add("ground station", world::peer(me, ground));
         }
         if let Some(other) = other.filter(|_| is_in(&[Self::Passage])) {
             add(&format!("vehicle {other}"), world::peer(me, other));
         }
-        if is_in(&[Self::Launch]) {
-            add("joint decisions", world::together(me, &config.ground));
+        if let Some(ground) = ground.filter(|_| is_in(&[Self::Launch])) {
+            add("joint decisions", world::together(me, ground));
         }
         if is_in(&[Self::Name]) {
             add("namesake", world::namesake(me));
@@ -144,18 +147,19 @@ impl Scene {
         }
         let mut parts: Vec<_> =
             parts.into_iter().map(|(name, part)| (format!("{WORLD}{name}"), part)).collect();
-        parts.extend(world::ground_bids(me).into_iter().filter(|(name, _)| {
+        parts.extend(world::ground_bids(me, config).into_iter().filter(|(name, _)| {
             is_in(&[Self::Launch, Self::Flight, Self::Scripts]) || name != "ground#hold"
         }));
         parts
     }
 
-    fn orders(self) -> &'static [&'static str] {
+    fn orders(self) -> &'static [What] {
+        use What::{GoTo, HandBack, Hold, Land, Resume, Return};
         match self {
-            Self::Operator => &["hold", "resume", "land", "return", "goto"],
-            Self::Pilot => &["hand_back", "resume", "return", "land"],
-            Self::Name => &["hold", "resume", "return"],
-            Self::Everything => &["hold", "resume", "land", "return", "goto", "hand_back"],
+            Self::Operator => &[Hold, Resume, Land, Return, GoTo],
+            Self::Pilot => &[HandBack, Resume, Return, Land],
+            Self::Name => &[Hold, Resume, Return],
+            Self::Everything => &[Hold, Resume, Land, Return, GoTo, HandBack],
             _ => &[],
         }
     }

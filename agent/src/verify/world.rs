@@ -5,17 +5,18 @@
 //! perhaps more, with one or two values of data that b-threads tell apart.
 
 use skein_bp::{Event, EventSet};
-use skein_dbp::facts::{BLOCK_LAPSED, CONFIRMED, DUPLICATE_NAME, IN_STEP, PEER_JOINED, PEER_LOST, STALLED};
-use skein_wire::vocabulary::{
-    self, ABORT, ADVANCE, AHEAD, AIRBORNE, ARRIVED, AT, BATTERY, BATTERY_CRITICAL, BATTERY_LOW, CLEAR,
-    COMMAND_FAILED, ENTER, FENCE_BREACHED, FOUND_AIRBORNE, GOTO, HAND_BACK, LAND, LANDED, LAUNCH, LEAVE,
-    NEIGHBOUR, ORDER, PASSAGE, PATH_BLOCKED, PILOT, PLAN, PLANNED, READY, SLEPT, STUCK, SWARM, TAKEOFF,
-    TOO_CLOSE, UNPLANNABLE, UNREADY,
+use skein_dbp::NodeName;
+use skein_dbp::facts::{BlockLapsed, Confirmed, DuplicateName, InStep, PeerJoined, PeerLost, Stalled};
+use skein_wire::event::{
+    Abort, Advance, Ahead, Airborne, Arrived, At, BatteryCritical, BatteryLevel, BatteryLow, Clear,
+    CommandFailed, Declared as _, Enter, FenceBreached, FoundAirborne, Goto, HandBack, Land, Landed, Launch,
+    Leave, NeighbourAt, OrderTaken, Passage, PathBlocked, PilotTook, Plan, Planned, Ready, SWARM, Slept,
+    Stuck, Takeoff, TooClose, Unplannable, Unready, What,
 };
 
 use super::part::{Part, Place};
 use crate::bthreads::{HOME_LEG, OPERATOR_LEG, RIGHT_OF_WAY};
-use crate::{config::AgentConfig, me::Me, precedence, safety_events::safety_events};
+use crate::{config::AgentConfig, me::Me, precedence, safety::safety_events};
 
 /// The place of the part `flight` in which the vehicle stands on the ground.
 pub(super) const ON_THE_GROUND: &str = "on the ground";
@@ -23,53 +24,53 @@ pub(super) const ON_THE_GROUND: &str = "on the ground";
 pub(super) const UNHEARD_OF: &str = "not heard of";
 
 /// What the vehicle's autopilot and guidance report only while the agent flies it.
-const ON_THE_WAY: [&str; 8] = [ARRIVED, PATH_BLOCKED, STUCK, PASSAGE, AT, AHEAD, NEIGHBOUR, BATTERY];
+type OnTheWay = (Arrived, PathBlocked, Stuck, Passage, At, Ahead, NeighbourAt, BatteryLevel);
 /// What is watched in the air only.
-const IN_THE_AIR: [&str; 5] = [BATTERY_LOW, BATTERY_CRITICAL, FENCE_BREACHED, TOO_CLOSE, CLEAR];
+type InTheAir = (BatteryLow, BatteryCritical, FenceBreached, TooClose, Clear);
 
 /// The flight as `flight.rs` conducts it with the autopilot; `disturbed`: commands may fail, and a pilot may take over.
 pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
-    let told = |verb: &str| me.event(verb);
     let grounded = |name: &str| {
         Place::new(name)
-            .hears(me.any(TAKEOFF), "taking off")
-            .rules_out(me.any_of(&IN_THE_AIR))
-            .rules_out(me.any_of(&ON_THE_WAY))
+            .hears(me.any::<Takeoff>(), "taking off")
+            .rules_out(me.any::<InTheAir>())
+            .rules_out(me.any::<OnTheWay>())
     };
-    let not_flying = |name: &str| Place::new(name).rules_out(me.any_of(&ON_THE_WAY)).rules_out(me.any(READY));
+    let not_flying =
+        |name: &str| Place::new(name).rules_out(me.any::<OnTheWay>()).rules_out(me.any::<Ready>());
     let taken = |place: Place| match disturbed.pilot {
-        true => place.offers(told(PILOT).with("mode", "posctl"), "taken"),
+        true => place.offers(me.event(PilotTook { mode: "posctl".into() }), "taken"),
         false => place,
     };
     let taken_or_asleep = |place: Place| match disturbed.pilot {
-        true => taken(place).offers(told(SLEPT).with("seconds", 2.0), "taken"),
+        true => taken(place).offers(me.event(Slept { seconds: 2.0 }), "taken"),
         false => place,
     };
-    let lands = |place: Place| place.hears(me.any(LAND), "landing");
+    let lands = |place: Place| place.hears(me.any::<Land>(), "landing");
     let unheard_of = match disturbed.pilot {
-        true => taken(grounded(UNHEARD_OF)).offers(told(FOUND_AIRBORNE), "adopted"),
+        true => taken(grounded(UNHEARD_OF)).offers(me.event(FoundAirborne), "adopted"),
         false => grounded(UNHEARD_OF),
     };
     let taking_off =
-        lands(Place::new("taking off").rules_out(me.any_of(&ON_THE_WAY)).offers(told(AIRBORNE), "flying"));
+        lands(Place::new("taking off").rules_out(me.any::<OnTheWay>()).offers(me.event(Airborne), "flying"));
     let taking_off = match disturbed.refusals {
-        true => taking_off.offers(me.because(COMMAND_FAILED, "Arm: denied"), ON_THE_GROUND),
+        true => taking_off.offers(me.event(CommandFailed { why: "Arm: denied".into() }), ON_THE_GROUND),
         false => taking_off,
     };
-    let order = |what: &str| me.any(ORDER).and(EventSet::field_is("what", what));
+    let order = |what: What| me.any::<OrderTaken>().and(OrderTaken::what(what));
     Part::new(vec![
-        unheard_of.hears(me.any(READY), ON_THE_GROUND),
+        unheard_of.hears(me.any::<Ready>(), ON_THE_GROUND),
         taken(grounded(ON_THE_GROUND)),
         taken_or_asleep(taking_off),
         taken_or_asleep(lands(
-            Place::new("flying").rules_out(me.any(READY)).offers(told(LANDED), ON_THE_GROUND),
+            Place::new("flying").rules_out(me.any::<Ready>()).offers(me.event(Landed), ON_THE_GROUND),
         )),
-        taken(Place::new("landing").rules_out(me.any(READY)).offers(told(LANDED), ON_THE_GROUND)),
-        not_flying("taken").offers(told(LANDED), ON_THE_GROUND).hears(me.any(HAND_BACK), "engaging"),
-        taken_or_asleep(lands(not_flying("engaging").offers(told(AIRBORNE), "flying"))),
+        taken(Place::new("landing").rules_out(me.any::<Ready>()).offers(me.event(Landed), ON_THE_GROUND)),
+        not_flying("taken").offers(me.event(Landed), ON_THE_GROUND).hears(me.any::<HandBack>(), "engaging"),
+        taken_or_asleep(lands(not_flying("engaging").offers(me.event(Airborne), "flying"))),
         taken(lands(not_flying("adopted")))
-            .offers(told(LANDED), ON_THE_GROUND)
-            .hears(order("resume").or(order("return")), "engaging"),
+            .offers(me.event(Landed), ON_THE_GROUND)
+            .hears(order(What::Resume).or(order(What::Return)), "engaging"),
     ])
 }
 
@@ -87,35 +88,35 @@ pub(super) struct Disturbed {
 pub(super) fn guidance(me: &Me, legs: &[i64], hard: bool) -> Part {
     let to = |leg: i64| format!("heading for {leg}");
     let new_leg = |place: Place| {
-        let goto = |leg: i64| me.any(GOTO).and(EventSet::field_is("leg", leg));
+        let goto = |leg: i64| me.any::<Goto>().and(Goto::leg(leg));
         let place = legs.iter().fold(place, |place, leg| place.hears(goto(*leg), to(*leg)));
-        place.hears(me.any(LANDED), "nowhere")
+        place.hears(me.any::<Landed>(), "nowhere")
     };
     let mut places = vec![
-        new_leg(Place::new("nowhere").hears(me.any(PLAN), "planning for nowhere")),
+        new_leg(Place::new("nowhere").hears(me.any::<Plan>(), "planning for nowhere")),
         new_leg(
             Place::new("planning for nowhere")
-                .offers(me.because(UNPLANNABLE, "there is no waypoint").with("leg", 0), "nowhere"),
+                .offers(me.event(Unplannable { leg: 0, why: "there is no waypoint".into() }), "nowhere"),
         ),
     ];
     for leg in legs {
         let [planning, following, blocked, arrived] =
             ["planning for", "following to", "blocked on the way to", "arrived at"]
                 .map(|what| format!("{what} {leg}"));
-        let place = |name: &str| new_leg(Place::new(name).hears(me.any(PLAN), planning.as_str()));
-        let arrives = |place: Place| place.offers(me.event(ARRIVED).with("leg", *leg), arrived.as_str());
+        let place = |name: &str| new_leg(Place::new(name).hears(me.any::<Plan>(), planning.as_str()));
+        let arrives = |place: Place| place.offers(me.event(Arrived { leg: *leg }), arrived.as_str());
         let plans = Place::new(planning.as_str())
-            .offers(me.event(PLANNED).with("leg", *leg).with("length_m", 20.0), following.as_str());
-        let no_path = me.because(UNPLANNABLE, "no path").with("leg", *leg);
+            .offers(me.event(Planned { leg: *leg, length_m: 20.0 }), following.as_str());
+        let no_path = me.event(Unplannable { leg: *leg, why: "no path".into() });
         let follows = arrives(place(&following));
         places.push(arrives(place(&to(*leg))));
         places.push(place(&arrived));
         if hard {
             places.push(new_leg(plans.offers(no_path, to(*leg))));
             places.push(
-                follows.offers(me.event(PATH_BLOCKED), blocked.as_str()).keeps_offering(me.event(STUCK)),
+                follows.offers(me.event(PathBlocked), blocked.as_str()).keeps_offering(me.event(Stuck)),
             );
-            places.push(arrives(place(&blocked)).keeps_offering(me.event(STUCK)));
+            places.push(arrives(place(&blocked)).keeps_offering(me.event(Stuck)));
         } else {
             places.push(new_leg(plans));
             places.push(follows);
@@ -130,91 +131,92 @@ pub(super) fn legs(waypoints: usize) -> Vec<i64> {
 }
 
 /// A narrow passage on the way, and what becomes of the claim to it.
-pub(super) fn passage(me: &Me, other: Option<&str>) -> Part {
-    let at = |event: Event| event.with("x", 5.0).with("y", 0.0).with("z", 2.0);
-    let of_claim = |fact: &str| me.event(fact).with("bthread", RIGHT_OF_WAY);
+pub(super) fn passage(me: &Me, other: Option<&NodeName>) -> Part {
+    let bthread = || RIGHT_OF_WAY.into();
+    let home = other.cloned().or_else(|| NodeName::new("uav/0").ok());
+    let lapsed = home.map(|home| me.event(BlockLapsed { bthread: bthread(), home }));
     let stalled = |by: &str| {
-        let enter = me.event(ENTER);
-        me.event(STALLED).with("event", enter.name()).with("by", format!("{by}#{RIGHT_OF_WAY}"))
+        let (event, by) = (me.event_name(Enter::NAME).into(), format!("{by}#{RIGHT_OF_WAY}").into());
+        me.event(Stalled { event, by })
     };
     // Whatever this vehicle's number, one goes before it and one after.
     let mut ahead = Place::new("ahead")
-        .offers(me.event(LEAVE), "none")
-        .hears(me.any(LANDED), "none")
-        .keeps_offering(of_claim(CONFIRMED))
-        .keeps_offering(of_claim(BLOCK_LAPSED).with("home", other.unwrap_or("uav/0")))
-        .keeps_offering(stalled("uav/0"))
-        .keeps_offering(stalled("uav/4294967295"));
+        .offers(me.event(Leave), "none")
+        .hears(me.any::<Landed>(), "none")
+        .keeps_offering(me.event(Confirmed { bthread: bthread(), sync: 1 }));
+    ahead = lapsed.into_iter().fold(ahead, Place::keeps_offering);
+    ahead = ahead.keeps_offering(stalled("uav/0")).keeps_offering(stalled("uav/4294967295"));
     if let Some(other) = other {
-        ahead = ahead.keeps_offering(vocabulary::event(other, LEAVE));
+        ahead = ahead.keeps_offering(Leave.at(other));
     }
-    Part::new(vec![Place::new("none").offers(at(me.event(PASSAGE)), "ahead"), ahead])
+    Part::new(vec![Place::new("none").offers(me.event(Passage { x: 5.0, y: 0.0, z: 2.0 }), "ahead"), ahead])
 }
 
 /// Preflight checks. Once the vehicle is up, or another has armed it, they fail in the same tick.
 pub(super) fn checks(me: &Me) -> Part {
-    let up = me.any_of(&[AIRBORNE, PILOT, FOUND_AIRBORNE, SLEPT]);
-    let up_at_once = Place::new("failing, not yet told").rules_out(me.any(TAKEOFF));
+    let up = me.any::<(Airborne, PilotTook, FoundAirborne, Slept)>();
+    let up_at_once = Place::new("failing, not yet told").rules_out(me.any::<Takeoff>());
     Part::new(vec![
-        Place::new("failing").offers(me.event(READY), "passing"),
-        Place::new("passing").offers(me.event(UNREADY), "failing").hears(up, "failing, not yet told"),
-        up_at_once.offers(me.event(UNREADY), "failing"),
+        Place::new("failing").offers(me.event(Ready), "passing"),
+        Place::new("passing").offers(me.event(Unready), "failing").hears(up, "failing, not yet told"),
+        up_at_once.offers(me.event(Unready), "failing"),
     ])
 }
 
 /// The battery. What is low may recover and be low again, as the way home gets shorter and longer.
 pub(super) fn battery(me: &Me) -> Part {
     let place = Place::new("used");
-    Part::of_one(place.keeps_offering(me.event(BATTERY_LOW)).keeps_offering(me.event(BATTERY_CRITICAL)))
+    Part::of_one(place.keeps_offering(me.event(BatteryLow)).keeps_offering(me.event(BatteryCritical)))
 }
 
 /// The vehicle's place relative to its fence.
 pub(super) fn fence(me: &Me) -> Part {
-    Part::of_one(Place::new("near").keeps_offering(me.event(FENCE_BREACHED)))
+    Part::of_one(Place::new("near").keeps_offering(me.event(FenceBreached)))
 }
 
 /// Another vehicle that comes too close.
-pub(super) fn closeness(me: &Me, other: Option<&str>) -> Part {
+pub(super) fn closeness(me: &Me, other: Option<&NodeName>) -> Part {
     Part::new(vec![
-        Place::new("far").offers(me.event(TOO_CLOSE).with("other", other.unwrap_or("uav/0")), "close"),
-        Place::new("close").offers(me.event(CLEAR), "far"),
+        Place::new("far")
+            .offers(me.event(TooClose { other: other.map_or("uav/0", NodeName::as_str).into() }), "close"),
+        Place::new("close").offers(me.event(Clear), "far"),
     ])
 }
 
 /// Another process under this vehicle's name.
 pub(super) fn namesake(me: &Me) -> Part {
-    Part::of_one(Place::new("may be").keeps_offering(me.event(DUPLICATE_NAME)))
+    Part::of_one(Place::new("may be").keeps_offering(me.event(DuplicateName { incarnation: 1 })))
 }
 
 /// Another node that is heard and lost. Lost, it may have had a claim to a passage.
-pub(super) fn peer(me: &Me, node: &str) -> Part {
-    let fact = |fact: &str| me.event(fact).with("node", node);
-    let claiming = fact(PEER_LOST).with("released", RIGHT_OF_WAY);
+pub(super) fn peer(me: &Me, node: &NodeName) -> Part {
+    let joined = || me.event(PeerJoined { node: node.clone(), incarnation: 1 });
+    let lost =
+        |released: &str| me.event(PeerLost { node: node.clone(), released: released.into(), held: None });
     Part::new(vec![
-        Place::new("unheard").offers(fact(PEER_JOINED), "heard"),
-        Place::new("heard").offers(fact(PEER_LOST), "lost").offers(claiming, "lost"),
-        Place::new("lost").offers(fact(PEER_JOINED), "heard"),
+        Place::new("unheard").offers(joined(), "heard"),
+        Place::new("heard").offers(lost(""), "lost").offers(lost(RIGHT_OF_WAY), "lost"),
+        Place::new("lost").offers(joined(), "heard"),
     ])
 }
 
 /// An operator who gives these orders.
-pub(super) fn operator(me: &Me, config: &AgentConfig, orders: &[&str]) -> Part {
-    let at = |what: &str, [x, y, z]: [f64; 3]| {
-        me.event(ORDER).with("what", what).with("x", x).with("y", y).with("z", z)
-    };
+pub(super) fn operator(me: &Me, config: &AgentConfig, orders: &[What]) -> Part {
     let [x, y, z] = config.fence.max;
-    let offers = orders.iter().fold(Place::new("there"), |place, what| match *what {
-        "goto" => place
-            .keeps_offering(at("goto", config.home))
-            .keeps_offering(at("goto", [x + 10.0, y, z]))
-            .keeps_offering(vocabulary::order(me.name(), "goto")),
-        what => place.keeps_offering(vocabulary::order(me.name(), what)),
+    let offers = orders.iter().fold(Place::new("there"), |place, what| {
+        let place = match what {
+            What::GoTo => place
+                .keeps_offering(me.event(OrderTaken::go_to(config.home)))
+                .keeps_offering(me.event(OrderTaken::go_to([x + 10.0, y, z]))),
+            _ => place,
+        };
+        place.keeps_offering(me.event(OrderTaken::plain(*what)))
     });
     Part::of_one(offers)
 }
 
 /// What the ground station's bids for this vehicle are; they change with these events.
-pub(super) fn ground_bids(me: &Me) -> [(String, Part); 3] {
+pub(super) fn ground_bids(me: &Me, config: &AgentConfig) -> [(String, Part); 3] {
     let arrives = |what: &str| Event::new(format!("ground's bids/{what}"));
     let set = |what: &str| EventSet::from(arrives(what));
     let changes = ["launch", "hold", "hold all", "lapse"]
@@ -223,13 +225,13 @@ pub(super) fn ground_bids(me: &Me) -> [(String, Part); 3] {
     let silent = |place: Place| place.hears(set("lapse"), "silent");
     let launch = Part::new(vec![
         Place::new("silent").hears(set("launch"), "asking"),
-        silent(Place::new("asking").offers(me.event(TAKEOFF), "silent")),
+        silent(Place::new("asking").offers(me.event(Takeoff), "silent")),
     ]);
     // What the home honours of it.
-    let all = me.any_of(&[TAKEOFF, GOTO, ADVANCE, ENTER]).and(safety_events(me).not());
+    let all = me.any::<(Takeoff, Goto, Advance, Enter)>().and(safety_events(me, &config.events()).not());
     let hold = Part::new(vec![
         Place::new("silent").hears(set("hold"), "holding").hears(set("hold all"), "holding all"),
-        silent(Place::new("holding").rules_out(me.any(ADVANCE))),
+        silent(Place::new("holding").rules_out(me.any::<Advance>())),
         silent(Place::new("holding all").rules_out(all)),
     ]);
     [
@@ -240,11 +242,10 @@ pub(super) fn ground_bids(me: &Me) -> [(String, Part); 3] {
 }
 
 /// The swarm's joint decisions. They are told before `in_step` when they were taken without this vehicle.
-pub(super) fn together(me: &Me, coordinator: &str) -> Part {
-    let decision = |verb: &str| vocabulary::event(SWARM, verb);
-    let lost = me.any(PEER_LOST).and(EventSet::field_is("node", coordinator));
-    let decides = |place: Place| place.keeps_offering(decision(LAUNCH)).keeps_offering(decision(ABORT));
-    let in_step = me.event(IN_STEP).with("coordinator", coordinator);
+pub(super) fn together(me: &Me, coordinator: &NodeName) -> Part {
+    let lost = me.any::<PeerLost>().and(PeerLost::node(coordinator));
+    let decides = |place: Place| place.keeps_offering(Launch.at(SWARM)).keeps_offering(Abort.at(SWARM));
+    let in_step = me.event(InStep { term: 1, decided: 0, coordinator: coordinator.clone() });
     Part::new(vec![
         decides(Place::new("out of step")).offers(in_step, "in step"),
         decides(Place::new("in step")).hears(lost, "out of step"),

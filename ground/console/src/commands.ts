@@ -6,22 +6,21 @@
 
 import { html, setText } from './dom';
 import type { Command } from './protocol';
+import { FOR_ALL, What } from './vocabulary';
 import { orderName } from './words';
 
 const BUTTONS: { what: Command; key: string; title: string }[] = [
-  { what: 'hold', key: 'H', title: 'Stop and stay there until resumed' },
-  { what: 'resume', key: 'R', title: 'Go on after a hold' },
-  { what: 'return', key: 'B', title: 'Fly back home and land there' },
-  { what: 'land', key: 'L', title: 'Land here and now' },
-  { what: 'goto', key: 'G', title: 'Fly to a place you click' },
-  { what: 'abort', key: '', title: 'Everyone lands where it is, decided together' },
-  { what: 'launch', key: '', title: 'Arm and take off; asks again first' },
+  { what: What.hold, key: 'H', title: 'Stop and stay there until resumed' },
+  { what: What.resume, key: 'R', title: 'Go on after a hold' },
+  { what: What.return, key: 'B', title: 'Fly back home and land there' },
+  { what: What.land, key: 'L', title: 'Land here and now' },
+  { what: What.goto, key: 'G', title: 'Fly to a place you click' },
+  { what: What.abort, key: '', title: 'Everyone lands where it is, decided together' },
+  { what: What.launch, key: '', title: 'Arm and take off; asks again first' },
 ];
-/** These are decided for everyone, whoever is selected. */
-const FOR_ALL: ReadonlySet<Command> = new Set(['abort', 'launch', 'launch_together']);
 
 export interface CommandEvents {
-  order(what: Exclude<Command, 'goto'>): void;
+  order(what: Exclude<Command, typeof What.goto>): void;
   placing(): void;
   everyone(): void;
 }
@@ -56,8 +55,8 @@ export class Commands {
   /** Does what pressing the button would do, if it can be pressed. */
   press(what: Command): void {
     if (this.buttons.get(what)?.disabled !== false) return;
-    if (what === 'goto') this.events.placing();
-    else if (what === 'launch') this.confirm.showModal();
+    if (what === What.goto) this.events.placing();
+    else if (what === What.launch) this.confirm.showModal();
     else this.events.order(what);
   }
 
@@ -76,7 +75,7 @@ export class Commands {
   }
 
   setPlacing(placing: boolean): void {
-    this.buttons.get('goto')?.setAttribute('aria-pressed', String(placing));
+    this.buttons.get(What.goto)?.setAttribute('aria-pressed', String(placing));
   }
 
   private showEnabled(): void {
@@ -85,7 +84,7 @@ export class Commands {
 
   private makeConfirm(): HTMLDialogElement {
     const cancel = html('button', { type: 'button', class: 'command', autofocus: true }, 'Cancel');
-    const launch = (what: 'launch' | 'launch_together', words: string) => {
+    const launch = (what: typeof What.launch | typeof What.launchTogether, words: string) => {
       const button = html('button', { type: 'button', class: 'command command-arm' }, words);
       button.addEventListener('click', () => {
         dialog.close();
@@ -101,7 +100,7 @@ export class Commands {
       html('p', { class: 'muted' }, 'In turn: each when its own checks pass and the one before it is in the air. Together: all at once, when everyone is there and ready.'),
     );
     dialog.append(
-      html('div', { class: 'dialog-buttons' }, cancel, launch('launch_together', 'Take off together'), launch('launch', 'Take off in turn')),
+      html('div', { class: 'dialog-buttons' }, cancel, launch(What.launchTogether, 'Take off together'), launch(What.launch, 'Take off in turn')),
     );
     cancel.addEventListener('click', () => dialog.close());
     return dialog;

@@ -13,10 +13,11 @@ import { listenToKeys } from './keys';
 import { Banner, Notices } from './notices';
 import { OrdersPanel } from './orders-panel';
 import { Placing } from './placing';
-import type { ClientMessage, Command, Fleet, Point, Question, Scene, Script, ServerMessage, What } from './protocol';
+import type { ClientMessage, Command, Fleet, Point, Question, Scene, Script, ServerMessage } from './protocol';
 import { addresseeWords, Selection } from './selection';
 import { Theme } from './theme';
 import { VehiclesPanel } from './vehicles-panel';
+import { What } from './vocabulary';
 import { View } from './view/view';
 import { WhyPanel } from './why-panel';
 import { showScript } from './script-dialog';
@@ -79,11 +80,11 @@ part('theme').addEventListener('click', () => theme.toggle());
 part('fit').addEventListener('click', () => view.fit());
 listenToKeys(
   {
-    h: () => commands.press('hold'),
-    r: () => commands.press('resume'),
-    b: () => commands.press('return'),
-    l: () => commands.press('land'),
-    g: () => commands.press('goto'),
+    h: () => commands.press(What.hold),
+    r: () => commands.press(What.resume),
+    b: () => commands.press(What.return),
+    l: () => commands.press(What.land),
+    g: () => commands.press(What.goto),
     0: () => selection.set(names()),
     a: () => selection.set(names()),
     f: () => view.fit(),
@@ -122,7 +123,7 @@ function receive(message: ServerMessage): void {
     case 'ordered': {
       const sent = settle(message.tag);
       if (sent?.point) view.setGoal(sent.point);
-      if (sent?.what === 'return' || sent?.what === 'land') view.setGoal(null);
+      if (sent?.what === What.return || sent?.what === What.land) view.setGoal(null);
       break;
     }
     case 'script':
@@ -187,7 +188,7 @@ function order(what: Command, point?: Point): void {
 }
 
 function withdraw(name: string, to: string[]): void {
-  send({ type: 'order', tag: newTag(), what: 'unload', name, to });
+  send({ type: 'order', tag: newTag(), what: What.unload, name, to });
 }
 
 /** Asks the station what a script's file says. */
@@ -198,7 +199,7 @@ async function readScript(file: File): Promise<void> {
 function offer(script: Script): void {
   const to = selection.addressees(names());
   showScript(script, addresseeWords(to, fleet.vehicles.length), (values) =>
-    send({ type: 'order', tag: newTag(), what: 'load', to, script: { script: script.file, with: values } }),
+    send({ type: 'order', tag: newTag(), what: What.load, to, script: { script: script.file, with: values } }),
   );
 }
 
@@ -209,7 +210,7 @@ function newTag(): string {
 
 function send(request: Exclude<ClientMessage, Question>): void {
   const { tag } = request;
-  const what = request.type === 'order' ? request.what : 'load';
+  const what = request.type === 'order' ? request.what : What.load;
   const point = 'point' in request ? request.point : undefined;
   if (!connection.send(request)) {
     notices.show(`${orderName(what)} was not sent: there is no connection to the station.`);
@@ -243,7 +244,7 @@ function goTo(place: [x: number, y: number]): void {
   const [x, y] = place.map((coordinate) => Math.round(coordinate * 100) / 100) as [number, number];
   const point: Point = [x, y, metres === null ? null : view.groundZ + metres];
   placing.set(false);
-  order('goto', point);
+  order(What.goto, point);
 }
 
 function connectionChanged(live: boolean, retryMs: number): void {

@@ -4,6 +4,8 @@
  *     SKEIN_REFRESH=1 cargo test -p skein-ground --lib typescript
  */
 
+import type { What } from './vocabulary';
+
 export type AnswerView = { "state": "pending" } | { "state": "missing" } | { "state": "acknowledged", after_ms: number, } | { "state": "refused", why: string, };
 
 /**
@@ -175,4 +177,3 @@ export type To = string | Array<string>;
 
 export type VehicleView = { name: string, heard: boolean, link: LinkView, notes: Array<string>, };
 
-export type What = "launch" | "launch_together" | "abort" | "hold" | "resume" | "return" | "land" | "goto" | "hand_back" | "load" | "unload";

@@ -7,6 +7,7 @@
  */
 
 import type * as station from './messages';
+import { What } from './vocabulary';
 
 /** The station's message of this type. */
 type Told<Type extends station.ServerMessage['type']> = Extract<station.ServerMessage, { type: Type }>;
@@ -83,10 +84,8 @@ export type ServerMessage =
   | With<Told<'script'>, { tag: string; script: Script }>
   | Told<'error'>;
 
-export type What = station.What;
-
-/** The orders that have a button of their own. */
-export type Command = Exclude<station.What, 'hand_back' | 'load' | 'unload'>;
+/** The orders that have a button. */
+export type Command = Exclude<What, typeof What.handBack | typeof What.load | typeof What.unload>;
 
 /** A go-to's place; without a height every vehicle keeps its own. */
 export type Point = [x: number, y: number, z: number | null];

@@ -3,8 +3,14 @@
  */
 
 import type { Command, Outcome } from './protocol';
+import { What } from './vocabulary';
 
-const ORDER_NAMES: Record<string, string> = { goto: 'Go to', hand_back: 'Hand back', load: 'Script', unload: 'Withdraw' };
+const ORDER_NAMES: Record<string, string> = {
+  [What.goto]: 'Go to',
+  [What.handBack]: 'Hand back',
+  [What.load]: 'Script',
+  [What.unload]: 'Withdraw',
+};
 
 /** An order's name as its button shows it: `goto` is `Go to`. */
 export function orderName(what: Command | string): string {

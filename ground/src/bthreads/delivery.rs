@@ -4,18 +4,14 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_dbp::{NodeName, facts};
-use skein_wire::vocabulary;
+use skein_dbp::NodeName;
+use skein_dbp::facts::Unknown;
+use skein_wire::event::{Declared as _, Events as _, OrderGiven, OrderTaken};
 
-use crate::order::{is_beside_flight, ordered_for};
+use crate::order::ordered_for;
 
 /// An order that sets a vehicle going is not brought any more after this long: whoever gave it does not look any more.
 pub const GOING_LASTS: Duration = Duration::from_secs(10);
-/// The orders that set a vehicle going.
-pub const GOING: [&str; 3] = ["resume", "goto", "hand_back"];
-
-/// The orders that the station carries out itself.
-const OWN: [&str; 4] = ["hold", "launch", "launch_together", "abort"];
 
 /// Waits until something is ordered for a vehicle, and requests it at the vehicle's gateway until it is taken, or until
 /// something else is ordered.
@@ -44,16 +40,14 @@ impl Delivery {
     }
 
     /// What is to be brought, if the order is not carried out by the station itself.
-    fn to_bring(&self, ordered: &Event) -> Option<Event> {
-        let what = ordered.text("what").filter(|what| !OWN.contains(what))?;
-        let order = vocabulary::order(&self.vehicle, what);
-        let place = ["x", "y", "z"].into_iter().filter_map(|axis| Some((axis, ordered.real(axis)?)));
-        Some(place.fold(order, |order, (axis, coordinate)| order.with(axis, coordinate)))
+    fn to_bring(&self, given: &OrderGiven) -> Option<Event> {
+        let OrderGiven { what, x, y, z, .. } = *given;
+        what.reaches_vehicle().then(|| OrderTaken { what, x, y, z, by: None }.at(&self.vehicle))
     }
 
     /// The vehicle has restarted and may have taken the order or not. To repeat it does no harm if it brings it down.
     fn unknown(&self, order: &Event) -> EventSet {
-        facts::of(&self.ground, facts::UNKNOWN).and(EventSet::field_is("event", order.name()))
+        Unknown::any_at(&self.ground).and(Unknown::event(order.name()))
     }
 }
 
@@ -69,12 +63,11 @@ impl BThread for Delivery {
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        if event.kind() == "ordered" {
+        if let Some(given) = OrderGiven::read(event) {
             // A launch is about others too, and a script stands beside: neither says anything against what is on its way.
-            if !event.text("what").is_some_and(is_beside_flight) {
-                self.order = self.to_bring(event);
-                let going = event.text("what").is_some_and(|what| GOING.contains(&what));
-                self.until = going.then(|| cx.now() + GOING_LASTS);
+            if !given.what.is_beside_flight() {
+                self.order = self.to_bring(&given);
+                self.until = given.what.sets_going().then(|| cx.now() + GOING_LASTS);
             }
         } else if self.order.as_ref() == Some(event) || self.until.is_some() {
             // It is taken, or has waited too long, or its vehicle begins a life of which its operator knows nothing.

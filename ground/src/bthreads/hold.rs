@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::NodeName;
-use skein_wire::vocabulary::{ADVANCE, of, of_every_vehicle};
+use skein_wire::event::{Advance, Declared as _, OrderGiven, What, of, of_every_vehicle};
 
-use crate::order::{is_for, ordered};
+use crate::order::ordered;
 
 /// Blocks `advance` of the vehicles that are to hold, from an order to hold until another order.
 ///
@@ -32,26 +32,26 @@ impl Hold {
 
     fn block(&self) -> EventSet {
         if self.held.len() == self.vehicles.len() {
-            of_every_vehicle(ADVANCE)
+            of_every_vehicle::<Advance>()
         } else {
-            EventSet::any_of(self.held.iter().map(|vehicle| of(vehicle, ADVANCE)))
+            EventSet::any_of(self.held.iter().map(|vehicle| of::<Advance>(vehicle)))
         }
     }
 }
 
 impl BThread for Hold {
     fn bid(&self) -> Option<Bid> {
-        let orders = ["hold", "resume", "land", "return", "goto"].map(|what| ordered(&self.ground, what));
-        let bid = Bid::new().wait_for(EventSet::any_of(orders));
+        let orders = What::those(|what| what == What::Hold || what.ends_hold());
+        let bid = Bid::new().wait_for(ordered(&self.ground, orders));
         Some(if self.held.is_empty() { bid } else { bid.block(self.block()) })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
-        if event.text("what") == Some("hold") {
-            self.held.extend(self.vehicles.iter().filter(|vehicle| is_for(event, vehicle)).cloned());
+        let Some(order) = OrderGiven::read(event) else { return };
+        if order.what == What::Hold {
+            self.held.extend(self.vehicles.iter().filter(|vehicle| order.is_for(vehicle)).cloned());
         } else {
-            // Whoever is ordered elsewhere, home or down must be free to move, like who is to go on.
-            self.held.retain(|vehicle| !is_for(event, vehicle));
+            self.held.retain(|vehicle| !order.is_for(vehicle));
         }
     }
 }

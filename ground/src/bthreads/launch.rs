@@ -4,17 +4,17 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_dbp::{NodeName, facts};
-use skein_wire::vocabulary::{AIRBORNE, FAILED, LANDED, TAKEOFF, event, of};
+use skein_dbp::NodeName;
+use skein_dbp::facts::PeerLost;
+use skein_wire::event::{
+    Airborne, Declared as _, Events as _, Failed, Heard, Landed, Later, OrderGiven, Situation, Takeoff, Turn,
+    What, of,
+};
 
-use super::heard::{self, Situation};
-use super::roll_call;
 use crate::order::{ordered, ordered_for_all};
 
 /// How long a vehicle may block its own take-off before the next one gets its turn.
 const PATIENCE: Duration = Duration::from_secs(15);
-/// Who orders the swarm down does not want the rest of it up.
-const CALLING_OFF: [&str; 3] = ["land", "return", "abort"];
 
 /// Requests `uav/N/takeoff` for each vehicle whose turn it is. Each vehicle's own preflight b-thread may block its
 /// take-off; one that does so for long, or falls silent, has another turn after the others.
@@ -52,51 +52,50 @@ impl Launch {
     }
 
     fn lost(&self, vehicle: &NodeName) -> EventSet {
-        facts::of(&self.ground, facts::PEER_LOST).and(EventSet::field_is("node", vehicle.as_str()))
+        PeerLost::any_at(&self.ground).and(PeerLost::node(vehicle))
     }
 
     /// The vehicle has turned out to be in the air already, or done.
     fn found_flown(&self, vehicle: &NodeName) -> EventSet {
-        let grounded = heard::is(Situation::Grounded);
-        heard::of(&self.ground).and(EventSet::field_is("vehicle", vehicle.as_str())).and(grounded.not())
+        let grounded = Heard::situation(Situation::Grounded);
+        Heard::any_at(&self.ground).and(Heard::vehicle(vehicle)).and(grounded.not())
     }
 }
 
 impl BThread for Launch {
     fn bid(&self) -> Option<Bid> {
-        let ended =
-            |vehicle| EventSet::any_of([of(vehicle, FAILED), of(vehicle, LANDED), self.lost(vehicle)]);
-        let called_off = EventSet::any_of(CALLING_OFF.map(|what| ordered_for_all(&self.ground, what)));
-        let turns = roll_call::turns(&self.ground);
+        let ended = |vehicle| of::<(Failed, Landed)>(vehicle).or(self.lost(vehicle));
+        let called_off = ordered_for_all(&self.ground, What::those(What::calls_launch_off));
+        let turns = Turn::any_at(&self.ground);
         let bid = Bid::new().wait_for(called_off);
         Some(match &self.phase {
-            Phase::Unordered => Bid::new().wait_for(ordered(&self.ground, "launch")).block(turns),
+            Phase::Unordered => Bid::new().wait_for(ordered(&self.ground, [What::Launch])).block(turns),
             Phase::Free => bid.wait_for(turns),
             Phase::Asking { vehicle, until } => bid
-                .request(event(vehicle, TAKEOFF))
+                .request(Takeoff.at(vehicle))
                 .wait_for(ended(vehicle))
                 .wait_for(self.found_flown(vehicle))
                 .deadline(*until)
                 .block(turns),
             Phase::Climbing { vehicle } => {
-                bid.wait_for(of(vehicle, AIRBORNE)).wait_for(ended(vehicle)).block(turns)
+                bid.wait_for(of::<Airborne>(vehicle)).wait_for(ended(vehicle)).block(turns)
             }
             Phase::Postponing { vehicle } => {
-                bid.request(roll_call::later(&self.ground, vehicle)).block(turns)
+                bid.request(Later { vehicle: vehicle.clone() }.at(&self.ground)).block(turns)
             }
         })
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        let called_off = event.text("what").is_some_and(|what| CALLING_OFF.contains(&what));
+        let called_off = OrderGiven::read(event).is_some_and(|order| order.what.calls_launch_off());
         self.phase = match (self.phase.clone(), event.kind()) {
             _ if called_off => Phase::Unordered,
-            (Phase::Free, _) => match roll_call::vehicle_of(event) {
-                Some(vehicle) => Phase::Asking { vehicle, until: cx.now() + PATIENCE },
+            (Phase::Free, _) => match Turn::read(event) {
+                Some(Turn { vehicle }) => Phase::Asking { vehicle, until: cx.now() + PATIENCE },
                 None => Phase::Free,
             },
-            (Phase::Asking { vehicle, .. }, TAKEOFF) => Phase::Climbing { vehicle },
-            (Phase::Asking { .. }, heard::HEARD | FAILED | LANDED) => Phase::Free,
+            (Phase::Asking { vehicle, .. }, Takeoff::NAME) => Phase::Climbing { vehicle },
+            (Phase::Asking { .. }, Heard::NAME | Failed::NAME | Landed::NAME) => Phase::Free,
             (Phase::Asking { vehicle, .. }, _) => Phase::Postponing { vehicle },
             (Phase::Unordered | Phase::Climbing { .. } | Phase::Postponing { .. }, _) => Phase::Free,
         };

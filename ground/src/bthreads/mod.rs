@@ -15,7 +15,7 @@ mod watch;
 
 use skein_bp::Program;
 
-pub use delivery::{Delivery, GOING, GOING_LASTS};
+pub use delivery::{Delivery, GOING_LASTS};
 pub use hold::Hold;
 pub use launch::Launch;
 pub use muster::Muster;

@@ -3,11 +3,13 @@
 use std::collections::BTreeSet;
 
 use serde::Serialize;
-use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_dbp::{NodeName, facts, first_two_chunks};
-use skein_wire::vocabulary::{ADVANCE, AIRBORNE, FAILED, of_every_vehicle};
+use skein_bp::{BThread, Bid, Context, Event};
+use skein_dbp::NodeName;
+use skein_dbp::facts::PeerLost;
+use skein_wire::event::{
+    Advance, Airborne, Declared as _, Events as _, Failed, Heard, Situation, What, of_every_vehicle,
+};
 
-use super::heard::{self, Situation};
 use crate::order::ordered_for_all;
 
 /// Blocks `uav/*/advance` until every vehicle is in the air, or will not be.
@@ -30,23 +32,24 @@ impl Muster {
 impl BThread for Muster {
     fn bid(&self) -> Option<Bid> {
         // Whoever is ordered home must be free to move.
-        let called_off = EventSet::any_of(["land", "return"].map(|what| ordered_for_all(&self.ground, what)));
-        let arrived = EventSet::any_of([AIRBORNE, FAILED].map(of_every_vehicle));
-        let lost = facts::of(&self.ground, facts::PEER_LOST);
+        let called_off = ordered_for_all(&self.ground, What::those(What::brings_down));
+        let arrived = of_every_vehicle::<(Airborne, Failed)>();
+        let lost = PeerLost::any_at(&self.ground);
         (!self.missing.is_empty()).then(|| {
-            let bid = Bid::new().block(of_every_vehicle(ADVANCE)).interrupt(called_off);
-            bid.wait_for(arrived).wait_for(lost).wait_for(heard::of(&self.ground))
+            let bid = Bid::new().block(of_every_vehicle::<Advance>()).interrupt(called_off);
+            bid.wait_for(arrived).wait_for(lost).wait_for(Heard::any_at(&self.ground))
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
-        let vehicle = match heard::read(event) {
-            Some((_, Situation::Grounded)) => return,
-            Some(_) => event.text("vehicle"),
-            None => event.text("node").or_else(|| first_two_chunks(event.name())),
-        };
-        if let Some(vehicle) = vehicle {
-            self.missing.remove(vehicle);
+        if let Some(heard) = Heard::read(event) {
+            if heard.situation != Situation::Grounded {
+                self.missing.remove(heard.vehicle.as_str());
+            }
+        } else if let Some(lost) = PeerLost::read(event) {
+            self.missing.remove(lost.node.as_str());
+        } else {
+            self.missing.remove(event.home());
         }
     }
 }

@@ -4,16 +4,12 @@ use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
 use serde::Serialize;
-use skein_bp::{BThread, Bid, Context, Event, EventSet};
+use skein_bp::{BThread, Bid, Context, Event};
 use skein_dbp::NodeName;
+use skein_wire::event::{Declared as _, Heard, Later, OrderGiven, Situation, Turn, What, of};
 
-use super::heard::{self, Situation};
 use crate::order::ordered;
 
-/// `<ground>/turn {vehicle}`: it is this vehicle's turn to take off.
-const TURN: &str = "turn";
-/// `<ground>/later {vehicle}`: it does not take off now; others go first.
-const LATER: &str = "later";
 /// How long those that are there wait for one that was to go before them, from the first word of any.
 const COURTESY: Duration = Duration::from_secs(2);
 
@@ -33,24 +29,6 @@ pub struct RollCall {
     begun: bool,
 }
 
-/// All turns at the station `ground`.
-#[must_use]
-pub fn turns(ground: &NodeName) -> EventSet {
-    EventSet::named(ground.event_name(TURN))
-}
-
-/// Says that `vehicle` is to have another turn, after the others.
-#[must_use]
-pub fn later(ground: &NodeName, vehicle: &NodeName) -> Event {
-    Event::new(ground.event_name(LATER)).with("vehicle", vehicle.as_str())
-}
-
-/// The vehicle that an event of the roll call is about.
-#[must_use]
-pub fn vehicle_of(event: &Event) -> Option<NodeName> {
-    event.text("vehicle").and_then(|name| NodeName::new(name).ok())
-}
-
 impl RollCall {
     /// Calls `vehicles`, in this order.
     #[must_use]
@@ -61,10 +39,12 @@ impl RollCall {
 
 impl BThread for RollCall {
     fn bid(&self) -> Option<Bid> {
-        let laters = EventSet::named(self.ground.event_name(LATER));
         // Who is ordered down by name stays down.
-        let grounded = EventSet::any_of(["land", "return"].map(|what| ordered(&self.ground, what)));
-        let bid = Bid::new().wait_for(heard::of(&self.ground)).wait_for(laters).wait_for(grounded);
+        let grounded = ordered(&self.ground, What::those(What::brings_down));
+        let bid = Bid::new()
+            .wait_for(of::<Heard>(&self.ground))
+            .wait_for(of::<Later>(&self.ground))
+            .wait_for(grounded);
         let among = if self.courtesy.is_some() { 1 } else { self.waiting.len() };
         let next = self.waiting.iter().take(among).find(|vehicle| self.present.contains(*vehicle));
         let bid = match self.courtesy {
@@ -72,29 +52,33 @@ impl BThread for RollCall {
             None => bid,
         };
         Some(match next {
-            Some(vehicle) => {
-                bid.request(Event::new(self.ground.event_name(TURN)).with("vehicle", vehicle.as_str()))
-            }
+            Some(vehicle) => bid.request(Turn { vehicle: vehicle.clone() }.at(&self.ground)),
             None => bid,
         })
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        if event.text("what").is_some() {
-            self.waiting.retain(|vehicle| event.text("who") != Some(vehicle.as_str()));
+        if let Some(order) = OrderGiven::read(event) {
+            self.waiting.retain(|vehicle| *order.who != *vehicle.as_str());
             return;
         }
-        let Some(vehicle) = vehicle_of(event) else {
+        let (heard, later, turn) = (Heard::read(event), Later::read(event), Turn::read(event));
+        let found = heard.as_ref().map(|heard| &heard.vehicle);
+        let about =
+            found.or(later.as_ref().map(|later| &later.vehicle)).or(turn.as_ref().map(|turn| &turn.vehicle));
+        let Some(vehicle) = about.cloned() else {
             self.courtesy = None;
             return;
         };
         if !std::mem::replace(&mut self.begun, true) {
             self.courtesy = Some(cx.now() + COURTESY);
         }
-        match (event.kind(), heard::read(event)) {
-            (_, Some((_, Situation::Grounded))) => drop(self.present.insert(vehicle)),
-            (LATER, _) => self.waiting.push_back(vehicle),
-            _ => self.waiting.retain(|waiting| *waiting != vehicle),
+        if heard.is_some_and(|heard| heard.situation == Situation::Grounded) {
+            self.present.insert(vehicle);
+        } else if later.is_some() {
+            self.waiting.push_back(vehicle);
+        } else {
+            self.waiting.retain(|waiting| *waiting != vehicle);
         }
     }
 }

@@ -4,9 +4,10 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use serde::Serialize;
-use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_dbp::{NodeName, facts};
-use skein_wire::vocabulary::{self, LOAD, UNLOAD};
+use skein_bp::{BThread, Bid, Context, Event};
+use skein_dbp::NodeName;
+use skein_dbp::facts::Unknown;
+use skein_wire::event::{Declared as _, Events as _, Load, OrderGiven, Unload, What};
 
 use super::GOING_LASTS;
 use crate::order::{ordered, ordered_for};
@@ -37,18 +38,21 @@ impl ScriptDelivery {
     }
 
     fn to_bring(&self, ordered: &Event) -> Option<Event> {
-        let verb = [LOAD, UNLOAD].into_iter().find(|verb| ordered.text("what") == Some(*verb))?;
-        let data = ["name", "script"].into_iter().filter_map(|key| Some((key, ordered.text(key)?)));
-        Some(data.fold(vocabulary::event(&self.vehicle, verb), |event, (key, text)| event.with(key, text)))
+        let OrderGiven { what, name, script, .. } = OrderGiven::read(ordered)?;
+        match what {
+            What::Load => Some(Load { name, script: script? }.at(&self.vehicle)),
+            What::Unload => Some(Unload { name: name? }.at(&self.vehicle)),
+            _ => None,
+        }
     }
 }
 
 impl BThread for ScriptDelivery {
     fn bid(&self) -> Option<Bid> {
-        let orders = EventSet::any_of([LOAD, UNLOAD].map(|what| ordered(&self.ground, what)));
+        let orders = ordered(&self.ground, What::those(What::is_about_script));
         let bid = Bid::new().wait_for(ordered_for(&self.ground, &self.vehicle).and(orders));
         let Some((event, until)) = self.queue.front() else { return Some(bid) };
-        let unknown = facts::of(&self.ground, facts::UNKNOWN).and(EventSet::field_is("event", event.name()));
+        let unknown = Unknown::any_at(&self.ground).and(Unknown::event(event.name()));
         Some(bid.request(event.clone()).wait_for(unknown).deadline(*until))
     }
 

@@ -5,14 +5,12 @@ use std::time::Duration;
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_dbp::NodeName;
-use skein_wire::vocabulary::{ABORT, LAUNCH, SWARM, event};
+use skein_wire::event::{Abort, Declared as _, Launch, OrderGiven, SWARM, What};
 
 use crate::order::{ordered, ordered_for_all};
 
 /// How long a joint launch is asked for: whoever ordered it does not look any more.
 pub const LAUNCH_LASTS: Duration = Duration::from_secs(60);
-/// What calls a joint launch off.
-const CALLING_OFF: [&str; 3] = ["land", "return", "abort"];
 
 /// Requests `swarm/launch` until everybody takes off, which those that are not ready keep back, or `swarm/abort`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -38,22 +36,23 @@ impl Together {
 
 impl BThread for Together {
     fn bid(&self) -> Option<Bid> {
-        let abort = ordered(&self.ground, "abort");
+        let abort = ordered(&self.ground, [What::Abort]);
         Some(match self.phase {
-            Phase::Unordered => Bid::new().wait_for(ordered(&self.ground, "launch_together")).wait_for(abort),
-            Phase::Launching { until } => CALLING_OFF
-                .iter()
-                .fold(Bid::new(), |bid, what| bid.wait_for(ordered_for_all(&self.ground, what)))
-                .request(event(SWARM, LAUNCH))
+            Phase::Unordered => {
+                Bid::new().wait_for(ordered(&self.ground, [What::LaunchTogether])).wait_for(abort)
+            }
+            Phase::Launching { until } => Bid::new()
+                .wait_for(ordered_for_all(&self.ground, What::those(What::calls_launch_off)))
+                .request(Launch.at(SWARM))
                 .deadline(until),
-            Phase::Aborting => Bid::new().request(event(SWARM, ABORT)),
+            Phase::Aborting => Bid::new().request(Abort.at(SWARM)),
         })
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        self.phase = match (&self.phase, event.text("what")) {
-            (_, Some("abort")) => Phase::Aborting,
-            (Phase::Unordered, Some("launch_together")) => {
+        self.phase = match (&self.phase, OrderGiven::read(event).map(|order| order.what)) {
+            (_, Some(What::Abort)) => Phase::Aborting,
+            (Phase::Unordered, Some(What::LaunchTogether)) => {
                 Phase::Launching { until: cx.now() + LAUNCH_LASTS }
             }
             _ => Phase::Unordered,

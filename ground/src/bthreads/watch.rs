@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use skein_bp::{BThread, Bid, Context, Event, EventSet};
+use skein_bp::{BThread, Bid, Context, Event};
 use skein_dbp::{NodeName, first_two_chunks};
-use skein_wire::vocabulary::{AIRBORNE, COMPLETE, FAILED, LANDED, of_every_vehicle};
-
-use super::heard::{self, Situation};
+use skein_wire::event::{
+    self, Airborne, Complete, Declared as _, Failed, Heard, Landed, MissionOver, Situation, of,
+    of_every_vehicle,
+};
 
 /// What each vehicle still owes: the outcome of its mission and, if it has flown, its landing.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -83,35 +84,33 @@ impl BThread for Watch {
     fn bid(&self) -> Option<Bid> {
         Some(match self.outcome() {
             None => {
-                let news = [AIRBORNE, LANDED, COMPLETE, FAILED];
-                Bid::new()
-                    .wait_for(EventSet::any_of(news.map(of_every_vehicle)))
-                    .wait_for(heard::of(&self.ground))
+                let news = of_every_vehicle::<(Airborne, Landed, Complete, Failed)>();
+                Bid::new().wait_for(news).wait_for(of::<Heard>(&self.ground))
             }
-            Some(outcome) if !self.told => Bid::new().request(
-                Event::new(self.ground.event_name("mission_over")).with("succeeded", outcome.succeeded()),
-            ),
+            Some(outcome) if !self.told => {
+                Bid::new().request(MissionOver { succeeded: outcome.succeeded() }.at(&self.ground))
+            }
             Some(_) => Bid::new(),
         })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
-        if let Some((vehicle, situation)) = heard::read(event) {
-            if let Some(progress) = self.vehicles.get_mut(vehicle.as_str()) {
-                progress.find(situation, event.text("why").unwrap_or_default());
+        if let Some(heard) = Heard::read(event) {
+            if let Some(progress) = self.vehicles.get_mut(heard.vehicle.as_str()) {
+                progress.find(heard.situation, &heard.why);
             }
             return;
         }
         let home = first_two_chunks(event.name()).unwrap_or_default();
         let Some(progress) = self.vehicles.get_mut(home) else {
-            self.told |= event.kind() == "mission_over";
+            self.told |= event.kind() == MissionOver::NAME;
             return;
         };
         match event.kind() {
-            AIRBORNE => progress.flying = true,
-            LANDED => progress.flying = false,
-            COMPLETE => progress.mission = Some(Ok(())),
-            _ => progress.mission = Some(Err(event.text("why").unwrap_or("no reason given").into())),
+            Airborne::NAME => progress.flying = true,
+            Landed::NAME => progress.flying = false,
+            Complete::NAME => progress.mission = Some(Ok(())),
+            _ => progress.mission = Some(Err(event::why(event).unwrap_or("no reason given").into())),
         }
     }
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use skein_dbp::Happened;
-use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
+use skein_wire::event::{Advance, Declared as _, Homeward};
 use skein_wire::{Scene, State};
 
 use crate::core::GroundCore;
@@ -49,7 +49,7 @@ impl Recording {
         for happened in happened {
             self.write(|recorder| recorder.trace(station.name(), happened));
             // The trace holds every leave to move; people do not need to read each.
-            if !matches!(happened.event.kind(), ADVANCE | HOMEWARD) {
+            if !matches!(happened.event.kind(), Advance::NAME | Homeward::NAME) {
                 self.note(now, Level::Info, happened.home.as_str(), &happened.event.to_string());
             }
         }

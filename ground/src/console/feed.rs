@@ -12,7 +12,7 @@ use serde::Serialize;
 use skein_bp::Value;
 use skein_bp::script::ScriptFile;
 use skein_dbp::{Happened, NodeName, Peer};
-use skein_wire::vocabulary::{ADVANCE, HOMEWARD};
+use skein_wire::event::{Advance, Declared as _, Homeward};
 use skein_wire::{Form, MissionState, Scene, State};
 
 use super::subscription::{Broadcast, Subscription, Text};
@@ -253,7 +253,7 @@ impl Feed {
     fn publish_events(&mut self, station: &NodeName, happened: &[Happened]) {
         let tells = |happened: &&Happened| {
             // Leaves to move are ten a second for each vehicle; what keeps one back shows as `stalled`.
-            let repeated = matches!(happened.event.kind(), ADVANCE | HOMEWARD);
+            let repeated = matches!(happened.event.kind(), Advance::NAME | Homeward::NAME);
             !(repeated || happened.home == *station && is_about_leave(happened))
         };
         let told: Vec<&Happened> = happened.iter().filter(tells).collect();
@@ -276,7 +276,7 @@ impl<'a> Message<'a> {
 
 /// Tells facts of the station about a leave to move, which came too late to matter.
 fn is_about_leave(happened: &Happened) -> bool {
-    happened.event.text("event").is_some_and(|event| event.ends_with(ADVANCE))
+    happened.event.text("event").is_some_and(|event| event.ends_with(Advance::NAME))
 }
 
 fn fleet(now: Duration, station: &GroundCore) -> Message<'_> {
@@ -347,7 +347,7 @@ fn order_view(record: &OrderRecord) -> OrderView<'_> {
     };
     OrderView {
         id: record.id,
-        what: record.order.what(),
+        what: record.order.what().word(),
         script: record.order.script(),
         time_s: record.at.as_secs_f64(),
         answers: record.answers.iter().map(|(vehicle, said)| (vehicle.as_str(), answer(said))).collect(),

@@ -6,6 +6,7 @@ use std::sync::mpsc::SyncSender;
 use serde::Deserialize;
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_dbp::NodeName;
+use skein_wire::event::{OrderGiven, What};
 use tokio::sync::oneshot;
 
 use crate::core::UnknownVehicle;
@@ -84,6 +85,7 @@ pub(super) struct OrderMessage {
     #[serde(default)]
     #[cfg_attr(test, ts(optional))]
     tag: Option<String>,
+    #[cfg_attr(test, ts(type = "What"))]
     what: What,
     to: To,
     #[serde(default)]
@@ -97,24 +99,6 @@ pub(super) struct OrderMessage {
     #[serde(default)]
     #[cfg_attr(test, ts(optional))]
     name: Option<String>,
-}
-
-#[derive(Deserialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-#[serde(rename_all = "snake_case")]
-enum What {
-    Launch,
-    LaunchTogether,
-    Abort,
-    Hold,
-    Resume,
-    Return,
-    Land,
-    #[serde(rename = "goto")]
-    GoTo,
-    HandBack,
-    Load,
-    Unload,
 }
 
 #[derive(Deserialize)]
@@ -140,7 +124,7 @@ pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
 
 fn order(OrderMessage { what, to, point, script, name, .. }: OrderMessage) -> Result<Order, String> {
     let who = match to {
-        To::Word(word) if word == "all" => Who::All,
+        To::Word(word) if word == OrderGiven::ALL => Who::All,
         To::Word(word) => return Err(format!("`to` is {word:?}: expected \"all\" or a list of vehicles")),
         To::Names(names) if names.is_empty() => return Err("`to` names no vehicle".into()),
         To::Names(names) => {
@@ -149,16 +133,12 @@ fn order(OrderMessage { what, to, point, script, name, .. }: OrderMessage) -> Re
         }
     };
     Ok(match what {
-        What::Launch if who == Who::All => Order::Launch,
-        What::Launch => return Err("a launch is for all: vehicles take off in turn".into()),
-        What::LaunchTogether if who == Who::All => Order::LaunchTogether,
-        What::Abort if who == Who::All => Order::Abort,
-        What::LaunchTogether | What::Abort => return Err("what is decided together is for all".into()),
-        What::Hold => Order::Hold(who),
-        What::Resume => Order::Resume(who),
-        What::Return => Order::Return(who),
-        What::Land => Order::Land(who),
-        What::HandBack => Order::HandBack(who),
+        What::Launch if who != Who::All => {
+            return Err("a launch is for all: vehicles take off in turn".into());
+        }
+        what if what.is_for_all() && who != Who::All => {
+            return Err("what is decided together is for all".into());
+        }
         What::Load => {
             let script = script.ok_or("`load` needs a `script`: {script, with}")?;
             Order::Load(who, SentScript::new(&script).map_err(|error| error.to_string())?)
@@ -172,6 +152,7 @@ fn order(OrderMessage { what, to, point, script, name, .. }: OrderMessage) -> Re
             }
             Order::GoTo(who, Destination { x, y, z })
         }
+        what => Order::plain(what, who).ok_or("this order needs more than its word")?,
     })
 }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use skein_dbp::{Board, Happened, NodeName};
 use skein_wire::State;
-use skein_wire::vocabulary::{ADVANCE, ENTER, GOTO, HOMEWARD, PLAN, TAKEOFF};
+use skein_wire::event::{Advance, Declared as _, Enter, Events as _, Goto, Homeward, Plan, Takeoff};
 
 use super::party::Party;
 use super::stillness::Stillness;
@@ -15,7 +15,7 @@ const EVENTS_KEPT: usize = 4;
 /// Of how many b-threads of a node it is remembered that they ask for movement: quotas of the bids allow no more names.
 const MOST_MOVERS: usize = 64;
 /// What a vehicle's movement is made of, take-off apart.
-const MOVES: [&str; 5] = [GOTO, PLAN, ADVANCE, HOMEWARD, ENTER];
+type Moves = (Goto, Plan, Advance, Homeward, Enter);
 
 /// What has been heard up to a moment: feed it in the order in which it was heard.
 #[derive(Clone, Debug, Default)]
@@ -67,15 +67,15 @@ impl Evidence {
     /// An event has happened, at a time on the clock of who listens.
     pub fn note_event(&mut self, happened: Happened) {
         let requested_by = || happened.requested_by.iter().map(|name| Party::read(&happened.home, name));
-        if happened.event.kind() == TAKEOFF && self.launchers.len() < MOST_MOVERS {
+        if happened.event.kind() == Takeoff::NAME && self.launchers.len() < MOST_MOVERS {
             self.launchers.extend(requested_by());
         }
         let Some(vehicle) = self.vehicles.get_mut(&happened.home) else { return };
-        if MOVES.contains(&happened.event.kind()) && vehicle.movers.len() < MOST_MOVERS {
+        if Moves::NAMES.contains(&happened.event.kind()) && vehicle.movers.len() < MOST_MOVERS {
             let own = requested_by().filter(|party| party.node == happened.home);
             vehicle.movers.extend(own.map(|party| party.bthread));
         }
-        if matches!(happened.event.kind(), ADVANCE | HOMEWARD) {
+        if matches!(happened.event.kind(), Advance::NAME | Homeward::NAME) {
             vehicle.leave = Some(happened);
             return;
         }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use skein_bp::EventSet;
 use skein_dbp::{Board, BoardLease, BoardRequest, BoardRow, NodeName, first_two_chunks};
 use skein_wire::MissionState;
-use skein_wire::vocabulary::{ADVANCE, ENTER, GOTO, HOMEWARD, TAKEOFF, event};
+use skein_wire::event::{Advance, Declared as _, Enter, Events as _, Goto, Homeward, Takeoff};
 
 use super::evidence::Evidence;
 use super::explanation::Change;
@@ -22,7 +22,7 @@ const MOST_FOLLOWED: usize = 4;
 /// B-threads that are asked in all: boards may be as tangled as those who bid like.
 const MOST_ASKED: usize = 256;
 /// What a standing vehicle lacks first; other requests come after these.
-const FIRST: [&str; 5] = [ADVANCE, HOMEWARD, ENTER, TAKEOFF, GOTO];
+type First = (Advance, Homeward, Enter, Takeoff, Goto);
 
 /// Follows who waits for whom, from one vehicle on.
 pub(super) struct Inquiry<'a> {
@@ -68,8 +68,9 @@ impl<'a> Inquiry<'a> {
             .flat_map(|row| row.requests.iter().map(move |request| (row, request)))
             .filter(|(_, request)| !request.blocked_by.is_empty())
             .collect();
-        let rank = |request: &BoardRequest| FIRST.iter().position(|kind| *kind == request.event.kind());
-        blocked.sort_by_key(|(_, request)| rank(request).unwrap_or(FIRST.len()));
+        let rank =
+            |request: &BoardRequest| First::NAMES.iter().position(|kind| *kind == request.event.kind());
+        blocked.sort_by_key(|(_, request)| rank(request).unwrap_or(First::NAMES.len()));
         for (row, request) in blocked {
             let by = Party::read(&board.node, &row.bthread);
             // Who stands in the way of a move has been asked already.
@@ -107,7 +108,7 @@ impl<'a> Inquiry<'a> {
     }
 
     fn ask_who_would_launch_it(&mut self, board: &'a Board) {
-        let takeoff = event(self.vehicle, TAKEOFF);
+        let takeoff = Takeoff.at(self.vehicle);
         let mut rows = self.evidence.boards().flat_map(|board| &board.rows);
         if rows.any(|row| row.requests.iter().any(|request| request.event == takeoff)) {
             let because = format!("`{}` is requested, and nobody is known to block it", takeoff.name());

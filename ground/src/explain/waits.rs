@@ -1,24 +1,21 @@
 //! What a b-thread waits for, in words.
 
-use skein_bp::{Event, EventSet};
-use skein_dbp::{NodeName, facts, first_two_chunks};
-use skein_wire::vocabulary::{self, HAND_BACK, ORDER};
-
-use crate::order::{ALL, ORDERED, ordered_event};
+use skein_bp::EventSet;
+use skein_dbp::facts::Confirmed;
+use skein_dbp::{NodeName, first_two_chunks};
+use skein_wire::event::{Declared as _, HandBack, OrderGiven, OrderTaken, What};
 
 /// Alternatives that are told one by one.
 const MOST_TOLD: usize = 6;
-/// What an operator may say to free a b-thread, as the events and the console's buttons name it.
-const ORDERS: [(&str, &str); 6] = [
-    ("resume", "Resume"),
-    ("return", "Return"),
-    ("land", "Land"),
-    ("goto", "Go to"),
-    ("launch", "Launch"),
-    ("hand_back", "Hand back"),
+/// What an operator may say to free a b-thread, and as the console's buttons name it.
+const ORDERS: [(What, &str); 6] = [
+    (What::Resume, "Resume"),
+    (What::Return, "Return"),
+    (What::Land, "Land"),
+    (What::GoTo, "Go to"),
+    (What::Launch, "Launch"),
+    (What::HandBack, "Hand back"),
 ];
-/// An order that many wait for, and that frees nobody.
-const HOLD: &str = "hold";
 
 /// What has to happen for a b-thread that waits for `set` to go on; nobody requests any of it.
 pub(super) fn in_words(set: &EventSet, vehicle: &NodeName) -> Vec<String> {
@@ -73,26 +70,27 @@ fn split<'a>(set: &'a EventSet, into: &mut Vec<&'a EventSet>) {
 }
 
 /// Which orders of an operator are in the set, be it at the station or as they reach a vehicle.
-fn orders_in(set: &EventSet, vehicle: &NodeName) -> Vec<&'static str> {
+fn orders_in(set: &EventSet, vehicle: &NodeName) -> Vec<What> {
     let Some(name) = literal_name(set) else { return Vec::new() };
     let Some(node) = first_two_chunks(name) else { return Vec::new() };
     let kind = name.rsplit('/').next();
-    let contains = |what: &'static str| match kind {
-        Some(ORDERED) => {
-            [ALL, vehicle.as_str()].iter().any(|who| set.contains(&ordered_event(node, what, who)))
-        }
-        Some(ORDER) => set.contains(&vocabulary::order(node, what)),
+    let contains = |what: What| match kind {
+        Some(OrderGiven::NAME) => [OrderGiven::ALL, vehicle.as_str()]
+            .iter()
+            .any(|who| set.contains(&OrderGiven::plain(what, who).at(node))),
+        Some(OrderTaken::NAME) => set.contains(&OrderTaken::plain(what).at(node)),
         // Only an operator hands back.
-        Some(HAND_BACK) => what == HAND_BACK && set.contains(&Event::new(name)),
+        Some(HandBack::NAME) => what == What::HandBack && set.contains(&HandBack.at(node)),
         _ => false,
     };
-    ORDERS.iter().map(|(what, _)| *what).chain([HOLD]).filter(|what| contains(what)).collect()
+    // Many wait for a hold, and it frees nobody.
+    ORDERS.iter().map(|(what, _)| *what).chain([What::Hold]).filter(|what| contains(*what)).collect()
 }
 
 /// The node whose blocks are to be confirmed, if that is what the set is about.
 fn confirmed_at(set: &EventSet) -> Option<&str> {
     let (node, kind) = literal_name(set)?.rsplit_once('/')?;
-    (kind == facts::CONFIRMED).then_some(node)
+    (kind == Confirmed::NAME).then_some(node)
 }
 
 /// The one name that all events of the set have.

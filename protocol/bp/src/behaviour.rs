@@ -271,20 +271,16 @@ impl Chosen {
         self.of(host.node).for_each(|choice| choice.ready.model(host, model));
     }
 
-    /// The names of the events that they bring to `node`.
-    pub fn event_names<'a>(&'a self, node: &'a str) -> impl Iterator<Item = String> + 'a {
-        self.declarations(node).map(move |event| format!("{node}/{}", event.name))
-    }
-
     /// The events that they bring to `node` in which `whose` has a say.
     #[must_use]
     pub fn events(&self, node: &str, whose: Whose) -> EventSet {
-        let declared = self.declarations(node).filter(|event| event.whose == whose);
+        let declared = self.declarations(node).flatten().filter(|event| event.whose == whose);
         declared.fold(EventSet::None, |set, event| set.or(EventSet::named(format!("{node}/{}", event.name))))
     }
 
-    fn declarations<'a>(&'a self, node: &'a str) -> impl Iterator<Item = &'static Declaration> + 'a {
-        self.of(node).flat_map(|choice| choice.known.events)
+    /// The lists of events that they bring to `node`.
+    pub fn declarations<'a>(&'a self, node: &'a str) -> impl Iterator<Item = &'static [Declaration]> + 'a {
+        self.of(node).map(|choice| choice.known.events)
     }
 
     /// The settings of those that are for `node`: what its configuration states.

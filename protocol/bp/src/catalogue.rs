@@ -2,8 +2,8 @@
 //! and documents the event follows from there.
 //!
 //! ```
-//! use skein_bp::catalogue::{Declared as _, Whose};
-//! use skein_bp::{Event, EventSet};
+//! use skein_bp::catalogue::{Declared as _, Events as _, Whose};
+//! use skein_bp::Event;
 //!
 //! skein_bp::words! {
 //!     /// Which way a door goes.
@@ -30,11 +30,14 @@
 //! assert_eq!(open, Event::new("door/1/open").with("way", "out").with("width_m", 0.8));
 //! assert_eq!(Open::read(&open).map(|open| open.way), Some(Way::Out));
 //! assert!(Open::any_at("door/1").contains(&open) && !Shut::any_at("door/1").contains(&open));
+//! assert!(<(Open, Shut)>::any_at("door/1").contains(&open));
+//! assert!(Open::way(Way::Out).contains(&open) && !Open::guest("Anna").contains(&open));
 //! assert_eq!((DOOR[1].name, DOOR[1].whose), ("shut", Whose::Own));
 //! ```
 
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::ops::RangeInclusive;
+use std::sync::Arc;
 
 use crate::event::Event;
 use crate::event_set::EventSet;
@@ -62,6 +65,14 @@ pub enum Whose {
     Anyone,
 }
 
+impl Declaration {
+    /// The field of this name.
+    #[must_use]
+    pub fn field(&self, name: &str) -> Option<&'static Field> {
+        self.fields.iter().find(|field| field.name == name)
+    }
+}
+
 /// A datum of an event as it is declared.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
@@ -87,6 +98,44 @@ pub enum Kind {
     Optional(&'static Kind),
 }
 
+impl Kind {
+    /// Whether an event may have this value in a field of this kind.
+    #[must_use]
+    pub fn takes(self, value: &Value) -> bool {
+        match self {
+            Self::Flag => matches!(value, Value::Bool(_)),
+            Self::Whole => value.as_whole().is_some(),
+            Self::Number => value.as_number().is_some(),
+            Self::Text => matches!(value, Value::Text(_)),
+            Self::Word(words) => matches!(value, Value::Text(word) if words.contains(&&**word)),
+            Self::Optional(kind) => kind.takes(value),
+        }
+    }
+
+    /// Whether it is a number, or none.
+    #[must_use]
+    pub fn is_number(self) -> bool {
+        match self {
+            Self::Whole | Self::Number => true,
+            Self::Optional(kind) => kind.is_number(),
+            Self::Flag | Self::Text | Self::Word(_) => false,
+        }
+    }
+}
+
+impl Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Flag => f.write_str("true or false"),
+            Self::Whole => f.write_str("whole number"),
+            Self::Number => f.write_str("number"),
+            Self::Text => f.write_str("text"),
+            Self::Word(words) => f.write_str(&words.join(", ")),
+            Self::Optional(kind) => write!(f, "{kind}, or none"),
+        }
+    }
+}
+
 /// A type that a declaration belongs to: [`events!`](crate::events) makes it.
 pub trait Declared: Sized {
     /// The last chunk of its name.
@@ -104,21 +153,45 @@ pub trait Declared: Sized {
     /// The data of an event of this name, whatever its home. `None` if the name is another, or a datum is missing, of another
     /// kind, or out of its range.
     fn read(event: &Event) -> Option<Self>;
+}
 
-    /// The events of this name at `node`, whatever their data.
+/// One declared type, or a tuple of several.
+pub trait Events {
+    /// The last chunks of their names.
+    const NAMES: &'static [&'static str];
+
+    /// The events of these names at `node`, whatever their data.
     fn any_at(node: impl Display) -> EventSet {
-        EventSet::named(format!("{node}/{}", Self::NAME))
+        EventSet::any_of(Self::NAMES.iter().map(|name| EventSet::named(format!("{node}/{name}"))))
     }
 
-    /// The events of this name at every node that `pattern` fits, such as `uav/*`.
+    /// The events of these names at every node that `pattern` fits, such as `uav/*`.
     fn any_of(pattern: &str) -> EventSet {
-        EventSet::from(format!("{pattern}/{}", Self::NAME))
+        EventSet::any_of(Self::NAMES.iter().map(|name| EventSet::from(format!("{pattern}/{name}"))))
     }
+}
+
+impl<T: Declared> Events for T {
+    const NAMES: &'static [&'static str] = &[T::NAME];
+}
+
+macro_rules! tuples_of_events {
+    ($(($($name:ident)+))+) => {
+        $(impl<$($name: Declared),+> Events for ($($name,)+) {
+            const NAMES: &'static [&'static str] = &[$($name::NAME),+];
+        })+
+    };
+}
+
+tuples_of_events! {
+    (A B) (A B C) (A B C D) (A B C D E) (A B C D E F) (A B C D E F G) (A B C D E F G H)
 }
 
 /// A type that a field may have.
 pub trait Datum: Sized {
     const KIND: Kind;
+    /// The type of what stands in the field if anything does.
+    type Plain: Datum;
 
     /// `None` leaves the field out.
     fn write(self) -> Option<Value>;
@@ -129,6 +202,7 @@ pub trait Datum: Sized {
 
 impl Datum for bool {
     const KIND: Kind = Kind::Flag;
+    type Plain = Self;
 
     fn write(self) -> Option<Value> {
         Some(self.into())
@@ -144,6 +218,7 @@ impl Datum for bool {
 
 impl Datum for i64 {
     const KIND: Kind = Kind::Whole;
+    type Plain = Self;
 
     fn write(self) -> Option<Value> {
         Some(self.into())
@@ -154,8 +229,23 @@ impl Datum for i64 {
     }
 }
 
+/// A counter. Beyond [`i64::MAX`] it is told as that.
+impl Datum for u64 {
+    const KIND: Kind = Kind::Whole;
+    type Plain = Self;
+
+    fn write(self) -> Option<Value> {
+        Some(i64::try_from(self).unwrap_or(i64::MAX).into())
+    }
+
+    fn read(value: Option<&Value>) -> Option<Self> {
+        value?.as_whole()?.try_into().ok()
+    }
+}
+
 impl Datum for f64 {
     const KIND: Kind = Kind::Number;
+    type Plain = Self;
 
     fn write(self) -> Option<Value> {
         Some(self.into())
@@ -166,8 +256,25 @@ impl Datum for f64 {
     }
 }
 
+impl Datum for Arc<str> {
+    const KIND: Kind = Kind::Text;
+    type Plain = Self;
+
+    fn write(self) -> Option<Value> {
+        Some(self.into())
+    }
+
+    fn read(value: Option<&Value>) -> Option<Self> {
+        match value? {
+            Value::Text(text) => Some(text.clone()),
+            _ => None,
+        }
+    }
+}
+
 impl Datum for String {
     const KIND: Kind = Kind::Text;
+    type Plain = Self;
 
     fn write(self) -> Option<Value> {
         Some(self.into())
@@ -181,18 +288,17 @@ impl Datum for String {
     }
 }
 
+/// A datum of another kind than `T` counts as none.
 impl<T: Datum> Datum for Option<T> {
     const KIND: Kind = Kind::Optional(&T::KIND);
+    type Plain = T::Plain;
 
     fn write(self) -> Option<Value> {
         self.and_then(T::write)
     }
 
     fn read(value: Option<&Value>) -> Option<Self> {
-        match value {
-            None => Some(None),
-            some => T::read(some).map(Some),
-        }
+        Some(T::read(value))
     }
 }
 
@@ -201,10 +307,35 @@ impl Field {
     #[doc(hidden)]
     pub fn read<T: Datum>(&self, event: &Event) -> Option<T> {
         let value = event.get(self.name);
-        let number = value.and_then(Value::as_number);
-        let fits = number.zip(self.range.as_ref()).is_none_or(|(number, range)| range.contains(&number));
-        fits.then(|| T::read(value))?
+        self.takes_number(value.and_then(Value::as_number)).then(|| T::read(value))?
     }
+
+    /// Whether a number is within the range, if there is one of each.
+    #[must_use]
+    pub fn takes_number(&self, number: Option<f64>) -> bool {
+        number.zip(self.range.as_ref()).is_none_or(|(number, range)| range.contains(&number))
+    }
+
+    /// What it may be, in words: `number in m, at least 0`.
+    #[must_use]
+    pub fn expected(&self) -> String {
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" in {}", self.unit) };
+        let range = match self.range.as_ref().map(|range| (range.start(), range.end())) {
+            None => String::new(),
+            Some((least, most)) if most.is_infinite() => format!(", at least {least}"),
+            Some((least, most)) => format!(", {least} to {most}"),
+        };
+        match self.kind {
+            Kind::Optional(kind) => format!("{kind}{unit}{range}, or none"),
+            kind => format!("{kind}{unit}{range}"),
+        }
+    }
+}
+
+/// The events that have this datum.
+#[doc(hidden)]
+pub fn with_datum(name: &'static str, datum: impl Datum) -> EventSet {
+    datum.write().map_or(EventSet::None, |value| EventSet::field_is(name, value))
 }
 
 /// Declares events: a list of them, and for each a type with its data that is [`Declared`]. See [the module](crate::catalogue).
@@ -240,6 +371,17 @@ macro_rules! event {
         $(#[doc = $about])*
         #[derive(Clone, Debug, PartialEq)]
         $vis struct $name { $($(#[doc = $field_about])* $vis $field: $type),+ }
+
+        #[allow(dead_code)]
+        impl $name {
+            $(
+                #[doc = concat!("The events whose `", stringify!($field), "` is this.")]
+                #[must_use]
+                $vis fn $field(value: impl Into<<$type as $crate::catalogue::Datum>::Plain>) -> $crate::EventSet {
+                    $crate::catalogue::with_datum(stringify!($field), value.into())
+                }
+            )+
+        }
 
         $crate::event! {
             @declared $name, concat!($($about),*), $text, $whose,
@@ -324,6 +466,7 @@ macro_rules! words {
 
         impl $crate::catalogue::Datum for $name {
             const KIND: $crate::catalogue::Kind = $crate::catalogue::Kind::Word(Self::WORDS);
+            type Plain = Self;
 
             fn write(self) -> Option<$crate::Value> {
                 Some(self.word().into())

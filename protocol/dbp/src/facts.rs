@@ -1,109 +1,144 @@
-//! What a node tells its own b-threads about the fleet: events under its own name that have simply happened.
+//! Facts: what a node tells its own b-threads about the fleet. They are events under its own name that have simply happened.
 //!
 //! Facts cannot be blocked, nor requested from afar. Like all events of their home they are numbered and published.
-//! Texts are under the key given with each; an event is named by its name.
 
-use skein_bp::{Event, EventSet};
+use std::sync::Arc;
 
+use skein_bp::EventSet;
+use skein_bp::catalogue::Events as _;
+
+use crate::message::RefusalReason;
 use crate::name::NodeName;
 
-/// The block of `bthread` at its synchronisation point `sync` is acknowledged by every home it concerns (G3).
-///
-/// It is told only while the b-thread is still at that point. One that moves on with the same block, or with a part of it, is
-/// told anew once that has been acknowledged, and may rely on the block all the while, unless [`BLOCK_LAPSED`] is told.
-pub const CONFIRMED: &str = "confirmed";
-/// The block of `bthread`, once confirmed, is not sure any more at `home`, which has not been heard in time, has lifted it, or
-/// has come into the roster and has yet to acknowledge it (G3).
-pub const BLOCK_LAPSED: &str = "block_lapsed";
-/// `home` does not honour a bid of `bthread`, for `reason`.
-pub const REFUSED: &str = "refused";
-/// This home does not honour a bid of `bthread` at `node`, for `reason` (G7): what [`REFUSED`] is to the bidder.
-pub const DENIED: &str = "denied";
-/// `home` has restarted, or is coordinator no more, while `bthread` requested `event` there: it may have occurred or not,
-/// and is not asked for again before the b-thread's next synchronisation point (G4).
-pub const UNKNOWN: &str = "unknown";
-/// `event` of `home` has occurred at the request of `bthread`, which had moved on meanwhile.
-pub const ORPHAN: &str = "orphan";
-/// The occurrences `from` to `to` of `home` are lost for good (G1).
-pub const GAP: &str = "gap";
-/// `node` is heard, in this `incarnation`.
-pub const PEER_JOINED: &str = "peer_joined";
-/// `node` has not been heard for its lease, or has restarted (G5). `released` names, with blanks between, those of its
-/// b-threads whose blocks ended here with that, and `held` those whose blocks stay.
-pub const PEER_LOST: &str = "peer_lost";
-/// This node has heard all `decided` decisions of its `term` from the `coordinator` (G8): told after they were, at the
-/// start and after each loss of the coordinator.
-pub const IN_STEP: &str = "in_step";
-/// `node`, a member of the roster, is in another `term`: nothing can be decided until an operator brings both to one.
-pub const OUT_OF_STEP: &str = "out_of_step";
-/// An order of a new roster was not taken, for the reason `why`.
-pub const ROSTER_REFUSED: &str = "roster_refused";
-/// `event` is requested here and blocked `by` a remote b-thread, `node#bthread`.
-pub const STALLED: &str = "stalled";
-/// `event` is no longer stalled.
-pub const UNSTALLED: &str = "unstalled";
-/// Another process has this node's name, in this `incarnation`; told every few seconds while it goes on.
-pub const DUPLICATE_NAME: &str = "duplicate_name";
-/// `bthread` requests `event`, whose home is not in the roster.
-pub const UNROUTABLE: &str = "unroutable";
-/// `event`, whose home is elsewhere, was handed in here as external.
-pub const MISDIRECTED: &str = "misdirected";
+skein_bp::events! {
+    /// Every fact.
+    pub const FACTS;
 
-const ALL: [&str; 17] = [
-    CONFIRMED,
-    BLOCK_LAPSED,
-    REFUSED,
-    DENIED,
-    UNKNOWN,
-    ORPHAN,
-    GAP,
-    PEER_JOINED,
-    PEER_LOST,
-    IN_STEP,
-    OUT_OF_STEP,
-    ROSTER_REFUSED,
-    STALLED,
-    UNSTALLED,
-    DUPLICATE_NAME,
-    UNROUTABLE,
-    MISDIRECTED,
-];
-
-/// The names of all facts.
-pub fn names() -> impl Iterator<Item = &'static str> {
-    ALL.into_iter()
+    /// The block of a b-thread is acknowledged by every home it concerns (G3). It is told only while the b-thread is still
+    /// at that point. One that moves on with the same block, or with a part of it, is told anew once that has been
+    /// acknowledged, and may rely on the block all the while, unless `block_lapsed` is told.
+    Confirmed = "confirmed", Own {
+        bthread: Arc<str>,
+        /// Number of the b-thread's synchronisation point.
+        sync: u64,
+    }
+    /// The block of a b-thread, once confirmed, is not sure any more at `home`, which has not been heard in time, has lifted
+    /// it, or has come into the roster and has yet to acknowledge it (G3).
+    BlockLapsed = "block_lapsed", Own {
+        bthread: Arc<str>,
+        home: NodeName,
+    }
+    /// A home does not honour a bid of a b-thread.
+    Refused = "refused", Own {
+        bthread: Arc<str>,
+        home: NodeName,
+        reason: RefusalReason,
+    }
+    /// This home does not honour a bid of a b-thread of another node (G7): what `refused` is to the bidder.
+    Denied = "denied", Own {
+        node: NodeName,
+        bthread: Arc<str>,
+        reason: RefusalReason,
+    }
+    /// The home has restarted, or is coordinator no more, while a b-thread requested an event there. The event may have
+    /// occurred or not, and is not asked for again before the b-thread's next synchronisation point (G4).
+    Unknown = "unknown", Own {
+        /// Its name.
+        event: Arc<str>,
+        bthread: Arc<str>,
+        home: NodeName,
+    }
+    /// An event has occurred at the request of a b-thread that had moved on meanwhile.
+    Orphan = "orphan", Own {
+        /// Its name.
+        event: Arc<str>,
+        bthread: Arc<str>,
+        home: NodeName,
+    }
+    /// Occurrences of a home are lost for good (G1).
+    Gap = "gap", Own {
+        home: NodeName,
+        /// Number of the first.
+        from: u64,
+        /// Number of the last.
+        to: u64,
+    }
+    /// A node is heard.
+    PeerJoined = "peer_joined", Own {
+        node: NodeName,
+        /// Which of its lives this is.
+        incarnation: u64,
+    }
+    /// A node has not been heard for its lease, or has restarted (G5).
+    PeerLost = "peer_lost", Own {
+        node: NodeName,
+        /// Its b-threads whose blocks ended here with that, with blanks between.
+        released: Arc<str>,
+        /// Its b-threads whose blocks stay, with blanks between.
+        held: Option<Arc<str>>,
+    }
+    /// This node has heard all decisions of its term (G8): told after they were, at the start and after each loss of the
+    /// coordinator.
+    InStep = "in_step", Own {
+        term: u64,
+        /// How many decisions there were.
+        decided: u64,
+        coordinator: NodeName,
+    }
+    /// A member of the roster is in another term: nothing can be decided until an operator brings both to one.
+    OutOfStep = "out_of_step", Own {
+        node: NodeName,
+        /// Its term.
+        term: u64,
+    }
+    /// An order of a new roster was not taken.
+    RosterRefused = "roster_refused", Own {
+        why: Arc<str>,
+    }
+    /// An event is requested here and blocked by a remote b-thread.
+    Stalled = "stalled", Own {
+        /// Its name.
+        event: Arc<str>,
+        /// Who blocks it, as `node#bthread`.
+        by: Arc<str>,
+    }
+    /// An event is no longer stalled.
+    Unstalled = "unstalled", Own {
+        /// Its name.
+        event: Arc<str>,
+    }
+    /// Another process has this node's name; told every few seconds while it goes on.
+    DuplicateName = "duplicate_name", Own {
+        /// The other's incarnation.
+        incarnation: u64,
+    }
+    /// A b-thread requests an event whose home is not in the roster.
+    Unroutable = "unroutable", Own {
+        /// Its name.
+        event: Arc<str>,
+        bthread: Arc<str>,
+    }
+    /// An event whose home is elsewhere was handed in here as external.
+    Misdirected = "misdirected", Own {
+        /// Its name.
+        event: Arc<str>,
+    }
 }
 
 /// All facts of `node`.
 #[must_use]
 pub fn all(node: &NodeName) -> EventSet {
-    EventSet::any_of(ALL.map(|fact| of(node, fact)))
+    EventSet::any_of(FACTS.iter().map(|fact| EventSet::named(node.event_name(fact.name))))
 }
 
-/// The fact of this name at `node`, any data.
-#[must_use]
-pub fn of(node: &NodeName, fact: &str) -> EventSet {
-    EventSet::named(node.event_name(fact))
-}
-
-/// [`CONFIRMED`] for one b-thread of `node`: what a b-thread waits for after it has stated its block.
+/// [`Confirmed`] for one b-thread of `node`: what a b-thread waits for after it has stated its block.
 #[must_use]
 pub fn confirmed(node: &NodeName, bthread: &str) -> EventSet {
-    of(node, CONFIRMED).and(EventSet::field_is("bthread", bthread))
+    Confirmed::any_at(node).and(Confirmed::bthread(bthread))
 }
 
-/// [`BLOCK_LAPSED`] for one b-thread of `node`.
+/// [`BlockLapsed`] for one b-thread of `node`.
 #[must_use]
 pub fn block_lapsed(node: &NodeName, bthread: &str) -> EventSet {
-    of(node, BLOCK_LAPSED).and(EventSet::field_is("bthread", bthread))
-}
-
-/// The event itself.
-pub(crate) fn tell(node: &NodeName, fact: &str) -> Event {
-    Event::new(node.event_name(fact))
-}
-
-/// A counter as an event's datum.
-pub(crate) fn count(number: u64) -> i64 {
-    i64::try_from(number).unwrap_or(i64::MAX)
+    BlockLapsed::any_at(node).and(BlockLapsed::bthread(bthread))
 }

@@ -6,9 +6,6 @@ use skein_bp::{Event, EventSet};
 use crate::joint::roster::Roster;
 use crate::name::NodeName;
 
-/// Last chunk of the event by which an authority lifts a block that outlives its holder: data `node` and `bthread`.
-pub const LIFT: &str = "lift";
-
 /// The promises that a node must keep on disk.
 ///
 /// A driver saves what [`Node::take_unsaved`](crate::Node::take_unsaved) gives *before* it sends

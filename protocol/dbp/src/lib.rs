@@ -62,6 +62,7 @@ mod mutant;
 mod name;
 mod node;
 mod routes;
+mod rule;
 mod run;
 pub mod verify;
 
@@ -72,8 +73,8 @@ pub use error::NodeError;
 pub use explain::NodeExplanation;
 pub use home::authority::{Authority, Grant, Role, SCRIPT};
 pub use home::table::RemoteParty;
-pub use joint::roster::{ROSTER, Roster, RosterError, SWARM};
-pub use kept::{Kept, KeptBlock, LIFT};
+pub use joint::roster::{Roster, RosterError, SWARM};
+pub use kept::{Kept, KeptBlock};
 pub use message::{
     BidAck, BidRecord, JointWord, Message, Occurrence, OnLoss, Presence, Recipient, Refusal, RefusalReason,
     RemoteBid, Repair, ServedRequest,
@@ -82,4 +83,5 @@ pub use message::{
 pub use mutant::Mutant;
 pub use name::{NodeName, NodeNameError, first_two_chunks, is_chunk};
 pub use node::{Node, NodeStats};
+pub use rule::{Lift, NewRoster, RULES};
 pub use run::{BoardChange, ChannelMove, Happened};

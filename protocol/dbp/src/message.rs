@@ -146,29 +146,30 @@ pub struct Refusal {
     pub reason: RefusalReason,
 }
 
-/// Why a home does not honour a bid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum RefusalReason {
-    /// For a reason that this version has no word for.
-    Unspecified,
-    /// It requests a safety event from afar, past the gateway (G6).
-    Safety,
-    /// It requests an event that has its home elsewhere.
-    NotHome,
-    /// It asks to be held after its owner's loss, and this home has no durable store to keep it in.
-    HoldUnsupported,
-    /// Its lease is longer than this home grants.
-    LeaseTooLong,
-    /// It requests an event by which this home tells facts about itself, see [`facts`](crate::facts).
-    Reserved,
-    /// Its sender has no right to request this here (G7).
-    MayNotRequest,
-    /// Its sender has no right to block all of this here (G7).
-    MayNotBlock,
-    /// An authority has lifted the block since.
-    Lifted,
-    /// It exceeds the number of bids or requests that one node may have here.
-    Quota,
+skein_bp::words! {
+    /// Why a home does not honour a bid.
+    pub enum RefusalReason {
+        /// For a reason that this version has no word for.
+        Unspecified = "unspecified",
+        /// It requests a safety event from afar, past the gateway (G6).
+        Safety = "safety",
+        /// It requests an event that has its home elsewhere.
+        NotHome = "not_home",
+        /// It asks to be held after its owner's loss, and this home has no durable store to keep it in.
+        HoldUnsupported = "hold_unsupported",
+        /// Its lease is longer than this home grants.
+        LeaseTooLong = "lease_too_long",
+        /// It requests an event by which this home tells facts about itself, see [`facts`](crate::facts).
+        Reserved = "reserved",
+        /// Its sender has no right to request this here (G7).
+        MayNotRequest = "may_not_request",
+        /// Its sender has no right to block all of this here (G7).
+        MayNotBlock = "may_not_block",
+        /// An authority has lifted the block since.
+        Lifted = "lifted",
+        /// It exceeds the number of bids or requests that one node may have here.
+        Quota = "quota",
+    }
 }
 
 impl RefusalReason {
@@ -184,23 +185,6 @@ impl RefusalReason {
                 | Self::Lifted
                 | Self::Quota
         )
-    }
-
-    /// The reason as one word.
-    #[must_use]
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Unspecified => "unspecified",
-            Self::Safety => "safety",
-            Self::NotHome => "not_home",
-            Self::HoldUnsupported => "hold_unsupported",
-            Self::LeaseTooLong => "lease_too_long",
-            Self::Reserved => "reserved",
-            Self::Lifted => "lifted",
-            Self::MayNotRequest => "may_not_request",
-            Self::MayNotBlock => "may_not_block",
-            Self::Quota => "quota",
-        }
     }
 }
 

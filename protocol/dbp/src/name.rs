@@ -6,6 +6,8 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
+use skein_bp::Value;
+use skein_bp::catalogue::{Datum, Kind};
 
 /// Longest name of a node, in bytes.
 const MAX_LENGTH: usize = 64;
@@ -31,9 +33,7 @@ pub struct NodeNameError {
 impl NodeName {
     /// Checks `name` and makes a node's name of it.
     pub fn new(name: &str) -> Result<Self, NodeNameError> {
-        let mut chunks = name.split('/');
-        let two = [chunks.next(), chunks.next()].into_iter().all(|chunk| chunk.is_some_and(is_chunk));
-        if two && chunks.next().is_none() && name.len() <= MAX_LENGTH {
+        if is_name(name) {
             Ok(Self(name.into()))
         } else {
             Err(NodeNameError { given: name.chars().take(2 * MAX_LENGTH).collect() })
@@ -62,6 +62,34 @@ impl NodeName {
     #[must_use]
     pub fn event_name(&self, what: &str) -> String {
         format!("{}/{what}", self.0)
+    }
+}
+
+fn is_name(text: &str) -> bool {
+    let mut chunks = text.split('/');
+    let two = [chunks.next(), chunks.next()].into_iter().all(|chunk| chunk.is_some_and(is_chunk));
+    two && chunks.next().is_none() && text.len() <= MAX_LENGTH
+}
+
+impl Datum for NodeName {
+    const KIND: Kind = Kind::Text;
+    type Plain = Self;
+
+    fn write(self) -> Option<Value> {
+        Some(self.0.into())
+    }
+
+    fn read(value: Option<&Value>) -> Option<Self> {
+        match value? {
+            Value::Text(text) => is_name(text).then(|| Self(text.clone())),
+            _ => None,
+        }
+    }
+}
+
+impl From<&NodeName> for NodeName {
+    fn from(name: &NodeName) -> Self {
+        name.clone()
     }
 }
 

@@ -18,7 +18,7 @@ use crate::clock::Clock;
 use crate::config::NodeConfig;
 use crate::error::NodeError;
 use crate::explain::NodeExplanation;
-use crate::facts;
+use crate::facts::Misdirected;
 use crate::guest::Guest;
 use crate::home::Home;
 use crate::joint::Joint;
@@ -103,7 +103,7 @@ impl Node {
         match self.routes().of(&event) {
             Route::Here | Route::Local => self.run.program.enqueue(event),
             Route::Elsewhere(_) | Route::Unroutable => {
-                self.run.fact(facts::MISDIRECTED, |fact| fact.with("event", event.name()))
+                self.run.fact(Misdirected { event: event.name().into() })
             }
         }
     }

@@ -4,10 +4,11 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
+use skein_bp::catalogue::Declared;
 use skein_bp::{Bid, Event, Origin, Program};
 
 use crate::channel::stream::Heard;
-use crate::facts::{self, count, tell};
+use crate::facts::{BlockLapsed, Confirmed, Gap};
 use crate::guest::held_blocks::BlockNews;
 use crate::message::Occurrence;
 use crate::name::NodeName;
@@ -107,8 +108,8 @@ impl Run {
     }
 
     /// Tells a fact about the fleet.
-    pub(crate) fn fact(&mut self, what: &str, data: impl FnOnce(Event) -> Event) {
-        self.news.push_back(Delivery::Fact(data(tell(&self.node, what))));
+    pub(crate) fn fact(&mut self, fact: impl Declared) {
+        self.news.push_back(Delivery::Fact(fact.at(&self.node)));
     }
 
     /// Delivers the occurrences and gaps that `listen` hears of the stream of `home`.
@@ -118,9 +119,7 @@ impl Run {
         for heard in heard {
             match heard {
                 Heard::Occurrence(occurrence) => self.news.push_back(Delivery::Occurrence(occurrence)),
-                Heard::Gap { from, to } => self.fact(facts::GAP, |fact| {
-                    fact.with("home", home.as_str()).with("from", count(from)).with("to", count(to))
-                }),
+                Heard::Gap { from, to } => self.fact(Gap { home: home.clone(), from, to }),
             }
         }
     }
@@ -156,7 +155,7 @@ impl Run {
 
     /// The fact that the block of `bthread` at its synchronisation point `sync` is confirmed.
     pub(crate) fn confirmation(&self, bthread: &str, sync: u64) -> Event {
-        tell(&self.node, facts::CONFIRMED).with("bthread", bthread).with("sync", count(sync))
+        Confirmed { bthread: bthread.into(), sync }.at(&self.node)
     }
 
     /// The fact that a block is confirmed or has lapsed, if it still concerns the holder. One that has moved on has
@@ -169,10 +168,7 @@ impl Run {
             }
             BlockNews::Lapsed { bthread, home } => {
                 let blocks = self.program.bid(&bthread).is_some_and(|bid| !bid.blocks().is_none());
-                blocks.then(|| {
-                    let fact = tell(&self.node, facts::BLOCK_LAPSED);
-                    fact.with("bthread", bthread).with("home", home.as_str())
-                })
+                blocks.then(|| BlockLapsed { bthread: bthread.into(), home }.at(&self.node))
             }
         }
     }

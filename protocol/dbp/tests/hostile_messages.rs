@@ -170,7 +170,7 @@ fn a_record_that_asks_for_too_much_is_cut_down_and_the_rest_is_told() {
         .collect();
     assert_eq!(acks.len(), 1);
     let reasons: Vec<_> =
-        acks[0].refused.iter().map(|refusal| (&*refusal.bthread, refusal.reason.as_str())).collect();
+        acks[0].refused.iter().map(|refusal| (&*refusal.bthread, refusal.reason.word())).collect();
     assert_eq!(reasons[..3], [("b0", "safety"), ("b1", "not_home"), ("b2", "hold_unsupported")]);
     assert_eq!(reasons.len(), 3 + 300 - 256);
     assert!(reasons[3..].iter().all(|(_, reason)| *reason == "quota"));

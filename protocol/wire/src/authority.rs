@@ -1,10 +1,11 @@
 //! The rights that a fleet grants unless it is configured otherwise.
 
 use skein_bp::EventSet;
-use skein_dbp::{Authority, Grant, LIFT, NodeName, ROSTER, Role, Roster};
+use skein_dbp::{Authority, Grant, Lift, NewRoster, NodeName, Role, Roster};
 
-use crate::vocabulary::{
-    ABORT, ADVANCE, ENTER, GOTO, LAUNCH, LOAD, ORDER, SWARM, TAKEOFF, UNLOAD, of_every_vehicle,
+use crate::event::{
+    Abort, Advance, Enter, Events as _, Goto, Launch, Load, OrderTaken, SWARM, Takeoff, Unload,
+    of_every_vehicle,
 };
 
 /// First chunk of a vehicle's name.
@@ -21,20 +22,17 @@ pub fn joint_roster<'a>(ground: NodeName, fleet: impl IntoIterator<Item = &'a No
 /// claim passages from one another, keep a joint launch back until they are ready, and may call one off.
 #[must_use]
 pub fn standard_authority() -> Authority {
-    let of_any_node = |verb: &str| EventSet::from(format!("*/*/{verb}"));
-    let every = |verbs: &[&str]| EventSet::any_of(verbs.iter().map(|verb| of_every_vehicle(verb)));
     let joint = || EventSet::from(format!("{SWARM}/**"));
     let command = Grant {
-        request: every(&[TAKEOFF, ORDER, LOAD, UNLOAD])
-            .or(of_any_node(ROSTER))
-            .or(of_any_node(LIFT))
+        request: of_every_vehicle::<(Takeoff, OrderTaken, Load, Unload)>()
+            .or(<(NewRoster, Lift)>::any_of("*/*"))
             .or(joint()),
-        block: every(&[TAKEOFF, GOTO, ADVANCE]).or(of_any_node(ENTER)).or(joint()),
+        block: of_every_vehicle::<(Takeoff, Goto, Advance)>().or(Enter::any_of("*/*")).or(joint()),
     };
     let vehicle = Grant {
-        request: EventSet::from(format!("{SWARM}/{ABORT}")),
+        request: Abort::any_of(SWARM),
         // Whoever claims a passage asks the ground station too.
-        block: of_any_node(ENTER).or(EventSet::from(format!("{SWARM}/{LAUNCH}"))),
+        block: Enter::any_of("*/*").or(Launch::any_of(SWARM)),
     };
     let role = |name: &str, nodes: &[&str], grant: &Grant| Role {
         name: name.to_owned(),
@@ -52,6 +50,7 @@ pub fn standard_authority() -> Authority {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::event::{Declared as _, What};
 
     #[test]
     fn vehicles_may_claim_passages_and_not_hold_one_another() {
@@ -60,8 +59,8 @@ mod tests {
         let claim = EventSet::any_of(["uav/1/enter", "uav/30/enter", "ground/main/enter"])
             .and(EventSet::region([0.0; 3], [6.0; 3]));
         assert!(authority.may_block(&vehicle, "right_of_way", &claim));
-        assert!(!authority.may_block(&vehicle, "right_of_way", &of_every_vehicle(ADVANCE)));
-        assert!(!authority.may_request(&vehicle, "x", &crate::vocabulary::order("uav/1", "land")));
+        assert!(!authority.may_block(&vehicle, "right_of_way", &of_every_vehicle::<Advance>()));
+        assert!(!authority.may_request(&vehicle, "x", &OrderTaken::plain(What::Land).at("uav/1")));
         assert!(authority.may_request(&vehicle, "x", &"swarm/abort".into()));
         let stranger = NodeName::new("camera/1").unwrap();
         assert!(!authority.may_block(&stranger, "x", &claim));

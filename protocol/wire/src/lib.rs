@@ -2,7 +2,7 @@
 //!
 //! The protocol's records ([`skein_dbp::Message`]) and each vehicle's [`State`] travel as protobuf under keys
 //! `skein/<fleet>/<what>/<node>/...`. A [`NodeLink`] couples a [`skein_dbp::Node`] to any [`Link`]; the
-//! [`vocabulary`] names the events that nodes agree on.
+//! catalogue in [`event`] declares the events that nodes agree on.
 //!
 //! ```
 //! use std::time::Duration;
@@ -30,6 +30,7 @@
 
 mod authority;
 mod decode_error;
+pub mod event;
 mod key;
 mod link;
 mod message;
@@ -38,7 +39,6 @@ mod node_link;
 pub mod proto;
 mod store;
 mod trace;
-pub mod vocabulary;
 
 /// The compiled `proto/skein.proto`, a `FileDescriptorSet`: the schema to put beside recorded messages.
 pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/skein.bin"));

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::swarm::{Always, LEASE, Requester, Swarm, TICK, hostile, name, program};
+use skein_bp::catalogue::Declared as _;
 use skein_bp::script::{Op, Script};
 use skein_bp::{Bid, Event, Origin};
 use skein_dbp::{NodeConfig, Roster, facts};
@@ -187,10 +188,10 @@ fn take_order(swarm: &mut Swarm, roster: &Roster, nodes: &[&str]) {
 }
 
 /// What `node` was told to be unknown: event, b-thread, and who was asked.
-fn unknown<'a>(swarm: &'a Swarm, node: &'a str) -> Vec<[&'a str; 3]> {
+fn unknown(swarm: &Swarm, node: &str) -> Vec<[String; 3]> {
     let told = swarm.seen.iter().filter(|seen| seen.node.as_str() == node);
-    let told = told.map(|seen| &seen.happened.event).filter(|event| event.kind() == facts::UNKNOWN);
-    told.map(|fact| ["event", "bthread", "home"].map(|key| fact.text(key).unwrap())).collect()
+    let told = told.filter_map(|seen| facts::Unknown::read(&seen.happened.event));
+    told.map(|fact| [fact.event.to_string(), fact.bthread.to_string(), fact.home.to_string()]).collect()
 }
 
 #[test]

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)] // A test fails by panicking.
 
 mod boards;
+mod catalogue;
 mod determinism;
 mod g1_order;
 mod g2_cause;

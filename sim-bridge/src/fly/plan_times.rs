@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use skein_dbp::Happened;
-use skein_wire::vocabulary::PLAN;
+use skein_wire::event::{Declared as _, Plan};
 
 /// The time of each plan: the wall times of the agent's ticks that worked on it, together.
 #[derive(Debug, Default)]
@@ -20,7 +20,7 @@ impl PlanTimes {
             self.under_way.resize(vehicle + 1, 0.0);
         }
         let Some(under_way) = self.under_way.get_mut(vehicle) else { return };
-        let planned = selections.iter().any(|happened| happened.event.name().ends_with(PLAN));
+        let planned = selections.iter().any(|happened| happened.event.name().ends_with(Plan::NAME));
         if planned || is_planning || *under_way > 0.0 {
             *under_way += milliseconds(began.elapsed());
         }

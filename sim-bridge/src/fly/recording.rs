@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use skein_ground::GroundCore;
 use skein_ground::recorder::{Level, Recorder, RecorderError};
-use skein_wire::vocabulary::ADVANCE;
+use skein_wire::event::{Advance, Declared as _};
 
 use super::{
     setup::vehicle_name,
@@ -86,7 +86,7 @@ impl Recording {
         for happened in &happenings.selections {
             self.recorder.trace(&happened.home, happened)?;
             // The trace holds every leave to move; people do not need to read each.
-            if happened.event.kind() != ADVANCE {
+            if happened.event.kind() != Advance::NAME {
                 self.recorder.log(now, Level::Info, happened.home.as_str(), &happened.event.to_string())?;
             }
         }

@@ -12,7 +12,7 @@ use skein_wire::{Fleet, standard_authority};
 use skein_world::{SimulationConfig, VehicleSetup};
 
 use crate::cli;
-use crate::scenario::{self, OrderKind, Scenario, VehiclePlan};
+use crate::scenario::{self, Scenario, VehiclePlan};
 use crate::sequential::Sequential;
 
 /// The fleet's name on one host.
@@ -153,26 +153,18 @@ fn lease(scenario: &Scenario) -> Duration {
 /// The ground station of a scenario, with its operator's orders.
 #[must_use]
 pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Controller) -> GroundConfig {
-    let orders = scenario.orders.iter().map(|said| {
+    let orders = scenario.orders.iter().filter_map(|said| {
         let who = match said.who {
             scenario::Who::All => Who::All,
             scenario::Who::Vehicle(number) => Who::only(vehicle_name(number.saturating_sub(1))),
         };
-        let order = match said.order {
-            OrderKind::Hold => Order::Hold(who),
-            OrderKind::Resume => Order::Resume(who),
-            OrderKind::Land => Order::Land(who),
-            OrderKind::Return => Order::Return(who),
-            OrderKind::LaunchTogether => Order::LaunchTogether,
-            OrderKind::Abort => Order::Abort,
-        };
-        (Duration::from_secs_f64(said.at_s), order)
+        Some((Duration::from_secs_f64(said.at_s), Order::plain(said.order, who)?))
     });
     let vehicles = (0..scenario.vehicles.len()).map(vehicle_name).collect();
     GroundConfig {
         orders: orders.collect(),
         loaded: controller == cli::Controller::Bp,
-        launch_on_order: scenario.orders.iter().any(|said| said.order == OrderKind::LaunchTogether),
+        launch_on_order: scenario.orders.iter().any(|said| said.order.is_launch()),
         muster: scenario.muster || swaps_places(scenario),
         behaviours: scenario.behaviours.clone(),
         operators: NodeName::new(SCRIPT).into_iter().collect(),

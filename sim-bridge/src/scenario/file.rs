@@ -12,6 +12,7 @@ use skein_bp::behaviour::{Behaviours, Settings};
 use skein_bp::configuration::{self, Malformed};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_planning::airspace::Airspace;
+use skein_wire::event::What;
 use skein_world::{Aabb, Obstacle, Scene, Shape, VehicleModel, WindConfig};
 
 use super::antipodal::Antipodal;
@@ -25,8 +26,8 @@ use super::open::Open;
 use super::targets::{PacedRoute, Targets};
 use super::window::Window;
 use super::{
-    DEFAULT_TIME_LIMIT_S, Network, Order, OrderKind, Scenario, ScenarioError, VehiclePlan, VehicleScript,
-    Who, check_count, read, read_world, stated_datum,
+    DEFAULT_TIME_LIMIT_S, Network, Order, Scenario, ScenarioError, VehiclePlan, VehicleScript, Who,
+    check_count, read, read_world, stated_datum,
 };
 use crate::mission;
 
@@ -137,7 +138,7 @@ struct GpsTable {
 struct OrderTable {
     #[serde(deserialize_with = "field::non_negative")]
     at_s: f64,
-    order: OrderKind,
+    order: What,
     vehicle: Option<usize>,
 }
 
@@ -525,10 +526,13 @@ impl ScenarioFile {
 
     fn orders(&self, vehicles: usize) -> Result<Vec<Order>, ScenarioError> {
         let order = |(i, table): (usize, &OrderTable)| {
-            let joint = matches!(table.order, OrderKind::LaunchTogether | OrderKind::Abort);
-            if joint && table.vehicle.is_some() {
+            if table.order.is_for_all() && table.vehicle.is_some() {
                 let message = "expected none: what is decided together is for the whole swarm";
                 return Err(self.contradiction(format!("order[{i}].vehicle"), message));
+            }
+            if table.order.needs_more() {
+                let message = "expected an order that needs no more than whom it is for";
+                return Err(self.contradiction(format!("order[{i}].order"), message));
             }
             let who = match table.vehicle {
                 None => Who::All,

@@ -30,6 +30,7 @@ use skein_bp::behaviour::{Behaviours, Chosen};
 use skein_bp::script::Assignment;
 use skein_mav::Datum;
 use skein_planning::airspace::{Airspace, KeepOut};
+use skein_wire::event::What;
 use skein_world::{Aabb, Scene, VehicleModel, WindConfig};
 
 pub use error::ScenarioError;
@@ -149,23 +150,8 @@ impl Default for Network {
 pub struct Order {
     /// Simulated seconds since the start.
     pub at_s: f64,
-    pub order: OrderKind,
+    pub order: What,
     pub who: Who,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OrderKind {
-    /// Take off together, instead of one after another as soon as all are there.
-    LaunchTogether,
-    Abort,
-    /// Stop and hover.
-    Hold,
-    /// Go on after a hold.
-    Resume,
-    Land,
-    /// Fly home and land.
-    Return,
 }
 
 /// A script on one vehicle.

@@ -8,9 +8,9 @@ use skein_agent::bthreads::{HOME_LEG, OPERATOR_LEG};
 use skein_agent::verify::Requirement;
 use skein_agent::{Me, field, precedence};
 use skein_bp::behaviour::{Behaviour, Behaviours, Host, Model};
-use skein_bp::catalogue::{Declaration, Declared as _};
+use skein_bp::catalogue::Declaration;
 use skein_bp::{BThread, Bid, Context, Event, EventSet, Program};
-use skein_wire::vocabulary::{ARRIVED, GOTO, LAND, LANDED, RETURN};
+use skein_wire::event::{Arrived, Events, Goto, Land, Landed, Return};
 
 /// Adds the behaviours of this crate to a program.
 pub fn behaviours(known: &mut Behaviours) {
@@ -49,21 +49,21 @@ impl Behaviour for Dwell {
     fn model(&self, host: &Host<'_>, model: &mut Model<'_>) {
         let me = Me::new(host.node);
         let rule = "between arriving and having dwelt, the mission does not go on";
-        let (onward, here) = (of_mission(&me, GOTO), of_mission(&me, ARRIVED));
+        let (onward, here) = (of_mission::<Goto>(&me), of_mission::<Arrived>(&me));
         let left = Dwelt::any_at(host.node).or(elsewhere(&me));
         model.require(rule, Requirement::absence(rule, onward, here, left));
     }
 }
 
-/// The events of this name about waypoints of the mission, whose numbers begin at 0.
-fn of_mission(me: &Me, verb: &str) -> EventSet {
-    me.any(verb).and(EventSet::field_range("leg", 0.0, f64::MAX))
+/// The events of this type about waypoints of the mission, whose numbers begin at 0.
+fn of_mission<E: Events>(me: &Me) -> EventSet {
+    me.any::<E>().and(EventSet::field_range("leg", 0.0, f64::MAX))
 }
 
 /// What leads a vehicle elsewhere: to an operator's point, home, or down.
 fn elsewhere(me: &Me) -> EventSet {
-    let away = EventSet::field_is("leg", OPERATOR_LEG).or(EventSet::field_is("leg", HOME_LEG));
-    me.any(GOTO).and(away).or(me.any_of(&[RETURN, LAND, LANDED]))
+    let away = Goto::leg(OPERATOR_LEG).or(Goto::leg(HOME_LEG));
+    me.any::<Goto>().and(away).or(me.any::<(Return, Land, Landed)>())
 }
 
 /// Blocks the mission's next `goto` for a while after each `arrived`, then tells that it has.
@@ -84,11 +84,11 @@ enum Phase {
 impl BThread for Dwelling {
     fn bid(&self) -> Option<Bid> {
         let bid = Bid::new().priority(precedence::MISSION);
-        let stays = || bid.clone().block(of_mission(&self.me, GOTO)).wait_for(elsewhere(&self.me));
+        let stays = || bid.clone().block(of_mission::<Goto>(&self.me)).wait_for(elsewhere(&self.me));
         Some(match self.phase {
-            Phase::Flying => bid.wait_for(of_mission(&self.me, ARRIVED)),
+            Phase::Flying => bid.wait_for(of_mission::<Arrived>(&self.me)),
             Phase::There { until, .. } => stays().deadline(until),
-            Phase::Over { leg } => stays().request(Dwelt { leg }.at(self.me.name())),
+            Phase::Over { leg } => stays().request(self.me.event(Dwelt { leg })),
         })
     }
 

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use skein_bp::catalogue::Declared as _;
 use skein_bp::{Bid, Event, EventSet, Program};
-use skein_dbp::{BidRecord, ChannelMove, Happened, LIFT, NodeName, OnLoss, ROSTER, Roster, facts};
+use skein_dbp::{BidRecord, ChannelMove, Happened, Lift, NewRoster, NodeName, OnLoss, Roster, facts};
 
 use crate::story::{Cast, Grants, Story};
 
@@ -272,18 +273,17 @@ impl Member {
         {
             life.occurred.push(event.clone());
         }
-        if event.kind() == ROSTER
+        if event.kind() == NewRoster::NAME
             && let Ok(roster) = Roster::ordered(event)
             && self.roster.as_ref().is_none_or(|known| roster.term > known.term)
         {
             self.rosters.push(roster.clone());
             self.roster = Some(roster);
         }
-        if event.kind() == LIFT
-            && let (Some(holder), Some(bthread)) =
-                (event.text("node").and_then(number), event.text("bthread"))
+        if let Some(lift) = Lift::read(event)
+            && let Some(holder) = number(lift.node.as_str())
         {
-            let key = (holder, bthread.to_owned());
+            let key = (holder, lift.bthread.to_string());
             if let Some(kept) = self.kept.remove(&key) {
                 self.lifted.insert(key, (kept.incarnation, kept.sync));
             }
@@ -351,7 +351,7 @@ impl Member {
     /// Whether this home lets others block `event` at all.
     pub(crate) fn lets_block(&self, event: &Event) -> bool {
         let never = [&self.facts, &self.safety, &self.gateway];
-        let is_order = [ROSTER, LIFT].contains(&event.kind());
+        let is_order = [NewRoster::NAME, Lift::NAME].contains(&event.kind());
         self.home.contains(event) && !is_order && !never.into_iter().any(|set| set.contains(event))
     }
 

@@ -4,7 +4,9 @@ use std::fmt;
 use std::time::Duration;
 
 use serde::Serialize;
+use skein_bp::catalogue::Events as _;
 use skein_bp::{BThread, Bid, Context, Event, EventSet, Program};
+use skein_dbp::facts::{Gap, Unknown};
 use skein_dbp::{NodeName, facts};
 
 use crate::seconds::Seconds;
@@ -117,8 +119,8 @@ struct Told {
 impl Told {
     /// The facts after which a request may stay open for ever: who meets them has to ask anew.
     fn in_vain(&self) -> EventSet {
-        let unknown = facts::of(&self.me, facts::UNKNOWN).and(EventSet::field_is("bthread", &*self.bthread));
-        unknown.or(facts::of(&self.me, facts::GAP))
+        let unknown = Unknown::any_at(&self.me).and(Unknown::bthread(&*self.bthread));
+        unknown.or(Gap::any_at(&self.me))
     }
 }
 

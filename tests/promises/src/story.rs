@@ -5,7 +5,8 @@ use std::ops::AddAssign;
 use std::time::Duration;
 
 use skein_bp::Event;
-use skein_dbp::{LIFT, NodeName, Roster};
+use skein_bp::catalogue::Declared as _;
+use skein_dbp::{Lift, NodeName, Roster};
 use skein_wire::NetworkConfig;
 
 use crate::programs::Role;
@@ -226,8 +227,7 @@ impl Story {
                 Some(Roster { term: *term, ..first }.order(&to))
             }
             Ordered::Lift { holder, bthread } => {
-                let lift = Event::new(to.event_name(LIFT));
-                Some(lift.with("node", name(holder)?.as_str()).with("bthread", bthread.as_str()))
+                Some(Lift { node: name(holder)?, bthread: bthread.as_str().into() }.at(&to))
             }
         }
     }

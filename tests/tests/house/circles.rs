@@ -145,7 +145,8 @@ fn imports(modules: &Modules) -> BTreeMap<Path, BTreeSet<Path>> {
 
 fn only_hands_on(said: &Named, home: &Path) -> bool {
     let leads_there = |path: &&Path| path.starts_with(home);
-    said.paths.iter().filter(leads_there).count() == said.handed_on.iter().filter(|(_, path)| path.starts_with(home)).count()
+    said.paths.iter().filter(leads_there).count()
+        == said.handed_on.iter().filter(|(_, path)| path.starts_with(home)).count()
 }
 
 /// The groups of files each of which leads to every other one.
@@ -162,7 +163,13 @@ fn circles(imports: &BTreeMap<Path, BTreeSet<Path>>) -> Vec<BTreeSet<Path>> {
         let back = |other: &&Path| reached[*other].contains(path);
         reached[path].iter().filter(back).cloned().collect()
     };
-    imports.keys().map(circle).filter(|circle| !circle.is_empty()).collect::<BTreeSet<_>>().into_iter().collect()
+    imports
+        .keys()
+        .map(circle)
+        .filter(|circle| !circle.is_empty())
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .collect()
 }
 
 #[test]

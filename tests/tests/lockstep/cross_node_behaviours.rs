@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use skein_agent::Outcome;
-use skein_dbp::{NodeName, facts::PEER_LOST};
+use skein_dbp::{NodeName, facts::PeerLost};
 use skein_ground::{Order, Who};
 use skein_tests::Lockstep;
-use skein_wire::vocabulary::{ENTER, LANDED, LEAVE, TAKEOFF};
+use skein_wire::event::{Declared as _, Enter, Landed, Leave, Takeoff};
 
 fn seconds(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds)
@@ -27,7 +27,7 @@ fn vehicles_take_off_one_after_another_at_the_grounds_request() {
     let mut launched = Vec::new();
     while launched.len() < 4 && lockstep.swarm.now() < seconds(60.0) {
         for selection in lockstep.step().selections {
-            if selection.event.kind() == TAKEOFF {
+            if selection.event.kind() == Takeoff::NAME {
                 let airborne = lockstep.swarm.simulation().vehicle(launched.len().saturating_sub(1));
                 assert!(
                     launched.is_empty() || airborne.is_some_and(|state| state.airborne),
@@ -62,7 +62,7 @@ fn a_joint_launch_takes_everyone_off_at_once_and_not_before_all_are_ready() {
         for selection in lockstep.step().selections {
             match selection.event.name() {
                 "swarm/launch" => decided = Some(selection.at),
-                name if name.ends_with(TAKEOFF) => {
+                name if name.ends_with(Takeoff::NAME) => {
                     taken_off.insert(selection.home.to_string(), lockstep.swarm.now());
                 }
                 _ => {}
@@ -168,11 +168,11 @@ fn a_narrow_passage_never_has_two_holders() {
         while !(lockstep.swarm.is_over() && lockstep.swarm.is_grounded()) {
             for selection in lockstep.step().selections {
                 match selection.event.kind() {
-                    ENTER => {
+                    Enter::NAME => {
                         entries += 1;
                         holders.insert(selection.home.clone());
                     }
-                    LEAVE => drop(holders.remove(&selection.home)),
+                    Leave::NAME => drop(holders.remove(&selection.home)),
                     _ => {}
                 }
                 assert!(holders.len() <= 1, "seed {seed}: {holders:?} at {:?}", lockstep.swarm.now());
@@ -207,17 +207,18 @@ fn cut_one_off_at_the_window(seed: u64, cut: Duration, apart: Duration) -> (bool
         }
         for selection in lockstep.step().selections {
             match selection.event.kind() {
-                ENTER => {
-                    let place = ["x", "y", "z"].map(|axis| selection.event.real(axis).unwrap());
-                    holders.insert(selection.home.clone(), place);
+                Enter::NAME => {
+                    let Enter { x, y, z } = Enter::read(&selection.event).unwrap();
+                    holders.insert(selection.home.clone(), [x, y, z]);
                 }
-                LANDED => drop(holders.remove(&selection.home)),
-                LEAVE => {
+                Landed::NAME => drop(holders.remove(&selection.home)),
+                Leave::NAME => {
                     holders.remove(&selection.home);
                     through_meanwhile += usize::from(is_cut && selection.home != alone);
                 }
-                PEER_LOST if selection.event.text("node") == Some(alone.as_str()) => {
-                    had_claim |= selection.event.text("released").is_some_and(|names| !names.is_empty());
+                PeerLost::NAME => {
+                    had_claim |= PeerLost::read(&selection.event)
+                        .is_some_and(|lost| lost.node == alone && !lost.released.is_empty());
                 }
                 _ => {}
             }

@@ -4,8 +4,10 @@ use std::time::Duration;
 
 use skein_agent::Outcome;
 use skein_dbp::Happened;
+use skein_dbp::facts::PeerLost;
 use skein_tests::{Lockstep, flight, fly};
 use skein_wire::NetworkConfig;
+use skein_wire::event::Declared as _;
 
 #[test]
 fn without_the_ground_station_vehicles_finish_by_themselves() {
@@ -29,7 +31,7 @@ fn the_ghost_of_a_vehicle_that_falls_silent_in_flight_is_flown_around() {
         // One that is lost with a claim on a passage is waited for.
         let mut claims = false;
         while lockstep.swarm.now() < Duration::from_secs(27) {
-            let released = |selection: &Happened| selection.event.text("released").map(str::to_owned);
+            let released = |selection: &Happened| PeerLost::read(&selection.event).map(|lost| lost.released);
             claims |=
                 lockstep.step().selections.iter().filter_map(released).any(|names| names.contains("right"));
         }

@@ -13,7 +13,7 @@ use crate::channel::stream::Heard;
 use crate::channel::stream::Stream;
 use crate::clock::Clock;
 use crate::config::{LEAST_LEASE, NodeConfig};
-use crate::facts::{self, count};
+use crate::facts::DuplicateName;
 use crate::history::History;
 use crate::message::{JointWord, Message, Occurrence, Presence, Recipient, Repair};
 use crate::name::NodeName;
@@ -141,7 +141,7 @@ impl Channel {
         }
         if self.double_told.is_none_or(|at| clock.now() >= at + REPEAT_DOUBLE) {
             self.double_told = Some(clock.now());
-            run.fact(facts::DUPLICATE_NAME, |fact| fact.with("incarnation", count(presence.incarnation)));
+            run.fact(DuplicateName { incarnation: presence.incarnation });
         }
     }
 

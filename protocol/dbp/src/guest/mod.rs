@@ -13,7 +13,7 @@ use skein_bp::Bid;
 use crate::channel::Channel;
 use crate::config::NodeConfig;
 use crate::error::NodeError;
-use crate::facts;
+use crate::facts::{Refused, Unknown, Unroutable};
 use crate::guest::bidding::BidAbroad;
 use crate::guest::held_blocks::HeldBlocks;
 use crate::guest::outbox::{Outbox, Upheld};
@@ -87,9 +87,7 @@ impl Guest {
     fn report_unroutable(&mut self, bid: &BidAbroad, run: &mut Run) {
         let Some(event) = &bid.unroutable else { return };
         if self.unroutable.insert(bid.bthread.clone(), bid.sync) != Some(bid.sync) {
-            run.fact(facts::UNROUTABLE, |fact| {
-                fact.with("event", event.as_str()).with("bthread", bid.bthread.as_str())
-            });
+            run.fact(Unroutable { event: event.as_str().into(), bthread: bid.bthread.as_str().into() });
         }
     }
 
@@ -141,11 +139,8 @@ impl Guest {
         let home = ack.home.clone();
         let refused = self.outboxes.get_mut(&home).map(|outbox| outbox.acknowledged(now, ack));
         for refusal in refused.into_iter().flatten() {
-            run.fact(facts::REFUSED, |fact| {
-                fact.with("bthread", refusal.bthread.as_str())
-                    .with("home", home.as_str())
-                    .with("reason", refusal.reason.as_str())
-            });
+            let bthread = refusal.bthread.as_str().into();
+            run.fact(Refused { bthread, home: home.clone(), reason: refusal.reason });
         }
     }
 
@@ -222,7 +217,5 @@ fn upheld(
 
 /// Tells that a request at `home` may have been served or not, and is not made again (G4).
 fn tell_unknown(event: &str, bthread: &str, home: &NodeName, run: &mut Run) {
-    run.fact(facts::UNKNOWN, |fact| {
-        fact.with("event", event).with("bthread", bthread).with("home", home.as_str())
-    });
+    run.fact(Unknown { event: event.into(), bthread: bthread.into(), home: home.clone() });
 }

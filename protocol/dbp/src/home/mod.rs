@@ -14,7 +14,7 @@ use skein_bp::{Bid, EventSet, Program};
 
 use crate::clock::Clock;
 use crate::config::NodeConfig;
-use crate::facts;
+use crate::facts::{Denied, PeerLost, Stalled, Unstalled};
 use crate::history::History;
 use crate::home::rights::Rights;
 use crate::home::stalls::{StallNews, Stalls};
@@ -76,11 +76,8 @@ impl Home {
         let TakenIn { proxies, denied } = self.table.take_in(now, record, &past)?;
         run.change_proxies(proxies);
         for refusal in denied {
-            run.fact(facts::DENIED, |fact| {
-                fact.with("node", record.node.as_str())
-                    .with("bthread", refusal.bthread.as_str())
-                    .with("reason", refusal.reason.as_str())
-            });
+            let bthread = refusal.bthread.as_str().into();
+            run.fact(Denied { node: record.node.clone(), bthread, reason: refusal.reason });
         }
         Some(BidAck {
             home: config.name.clone(),
@@ -98,10 +95,8 @@ impl Home {
     pub(crate) fn tell_loss(&self, node: &NodeName, run: &mut Run) {
         let names = |bthreads: BTreeSet<String>| bthreads.into_iter().collect::<Vec<_>>().join(" ");
         let (released, held) = (names(self.table.released_by(node)), names(self.table.held_for(node)));
-        run.fact(facts::PEER_LOST, |fact| {
-            let fact = fact.with("node", node.as_str()).with("released", released);
-            if held.is_empty() { fact } else { fact.with("held", held) }
-        });
+        let held = (!held.is_empty()).then(|| held.into());
+        run.fact(PeerLost { node: node.clone(), released: released.into(), held });
     }
 
     /// Lets `guarded` events happen once every peer's blocks are known, or the longest lease has passed since the
@@ -133,12 +128,8 @@ impl Home {
         }
         for news in self.stalls.update(stalled) {
             match news {
-                StallNews::Stalled { event, by } => {
-                    run.fact(facts::STALLED, |fact| fact.with("event", event).with("by", by))
-                }
-                StallNews::Unstalled { event } => {
-                    run.fact(facts::UNSTALLED, |fact| fact.with("event", event))
-                }
+                StallNews::Stalled { event, by } => run.fact(Stalled { event: event.into(), by: by.into() }),
+                StallNews::Unstalled { event } => run.fact(Unstalled { event: event.into() }),
             }
         }
     }

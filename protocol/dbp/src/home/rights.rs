@@ -9,12 +9,11 @@ use crate::config::NodeConfig;
 use crate::facts;
 use crate::home::authority::Authority;
 use crate::home::bidder::{Bidder, TakenBid};
-use crate::joint::roster::ROSTER;
-use crate::kept::LIFT;
 use crate::message::{OnLoss, RefusalReason, RemoteBid};
 #[cfg(feature = "mutants")]
 use crate::mutant::Mutant;
 use crate::name::NodeName;
+use crate::rule::RULES;
 
 #[derive(Clone, Debug)]
 pub(super) struct Rights {
@@ -50,7 +49,7 @@ impl Rights {
             facts: facts::all(&config.name),
             safety: config.safety.clone(),
             gateway: config.gateway.clone(),
-            orders: EventSet::any_of([ROSTER, LIFT].map(|order| config.name.event_name(order))),
+            orders: EventSet::any_of(RULES.iter().map(|rule| config.name.event_name(rule.name))),
             blockable: EventSet::None,
             authority: config.authority.clone(),
             priority: config.remote_priority.clone(),

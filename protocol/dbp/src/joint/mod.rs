@@ -9,7 +9,7 @@ use skein_bp::{Bid, Event, Program};
 
 use crate::clock::Clock;
 use crate::config::NodeConfig;
-use crate::facts::{self, count};
+use crate::facts::{InStep, OutOfStep};
 use crate::history::History;
 use crate::joint::roster::Roster;
 use crate::joint::term::Term;
@@ -148,7 +148,7 @@ impl Joint {
             run.hear(node, |heard| term.stream.presence(word.decided, 1, true, heard));
         }
         if let Some(term) = astray {
-            run.fact(facts::OUT_OF_STEP, |fact| fact.with("node", node.as_str()).with("term", count(term)));
+            run.fact(OutOfStep { node: node.clone(), term });
         }
         is_followed && word.asks
     }
@@ -201,11 +201,8 @@ impl Joint {
     pub(crate) fn tell_step(&mut self, run: &mut Run) {
         let Some(term) = &mut self.term else { return };
         if term.comes_into_step() {
-            run.fact(facts::IN_STEP, |fact| {
-                fact.with("term", count(term.number()))
-                    .with("decided", count(term.decided()))
-                    .with("coordinator", term.roster.coordinator.as_str())
-            });
+            let (decided, coordinator) = (term.decided(), term.roster.coordinator.clone());
+            run.fact(InStep { term: term.number(), decided, coordinator });
         }
     }
 

@@ -3,15 +3,14 @@
 use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
+use skein_bp::catalogue::Declared as _;
 use skein_bp::{Event, EventSet};
 
 use crate::name::{NodeName, NodeNameError};
+use crate::rule::NewRoster;
 
 /// First chunk of the events that the coordinator is home to.
 pub const SWARM: &str = "swarm/";
-/// Last chunk of the event by which an operator gives a node a new roster: data `term` (int), `coordinator`, and
-/// `members`, with blanks between.
-pub const ROSTER: &str = "roster";
 
 /// The nodes that decide on joint events, for one term.
 ///
@@ -58,10 +57,8 @@ impl Roster {
     #[must_use]
     pub fn order(&self, node: &NodeName) -> Event {
         let members: Vec<&str> = self.members.iter().map(NodeName::as_str).collect();
-        Event::new(node.event_name(ROSTER))
-            .with("term", i64::try_from(self.term).unwrap_or(i64::MAX))
-            .with("coordinator", self.coordinator.as_str())
-            .with("members", members.join(" "))
+        let (term, coordinator) = (self.term, self.coordinator.clone());
+        NewRoster { term, coordinator, members: members.join(" ").into() }.at(node)
     }
 
     /// The roster that such an order gives.

@@ -1,7 +1,7 @@
 //! Taking in messages.
 
 use crate::channel::peers::Word;
-use crate::facts::{self, count};
+use crate::facts::PeerJoined;
 use crate::message::{BidAck, BidRecord, Message, Occurrence, Presence, Repair};
 use crate::name::NodeName;
 use crate::node::Node;
@@ -41,9 +41,7 @@ impl Node {
                 self.address_home(node, incarnation);
             }
         }
-        self.run.fact(facts::PEER_JOINED, |fact| {
-            fact.with("node", node.as_str()).with("incarnation", count(incarnation))
-        });
+        self.run.fact(PeerJoined { node: node.clone(), incarnation });
         // So that the other one need not wait for the next sign of life.
         self.channel.speak_up(self.clock.now());
         true

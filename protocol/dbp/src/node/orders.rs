@@ -1,23 +1,23 @@
 //! An operator's orders to the node itself: a new roster, and lifting a block.
 
 use skein_bp::Event;
+use skein_bp::catalogue::Declared as _;
 
-use crate::facts;
-use crate::joint::roster::{ROSTER, Roster};
-use crate::kept::LIFT;
+use crate::facts::RosterRefused;
+use crate::joint::roster::Roster;
 use crate::name::NodeName;
 use crate::node::Node;
+use crate::rule::{Lift, NewRoster};
 
 impl Node {
     /// Obeys an event that was selected here, if it is such an order.
     pub(super) fn heed(&mut self, event: &Event) {
         let own = event.name().strip_prefix(self.config.name.as_str());
         match own.and_then(|rest| rest.strip_prefix('/')) {
-            Some(ROSTER) => self.adopt(event),
-            Some(LIFT) => {
-                let node = event.text("node").and_then(|node| NodeName::new(node).ok());
-                if let (Some(node), Some(bthread)) = (node, event.text("bthread")) {
-                    self.run.change_proxies(self.home.table.lift(&node, bthread));
+            Some(NewRoster::NAME) => self.adopt(event),
+            Some(Lift::NAME) => {
+                if let Some(Lift { node, bthread }) = Lift::read(event) {
+                    self.run.change_proxies(self.home.table.lift(&node, &bthread));
                 }
             }
             _ => {}
@@ -42,7 +42,7 @@ impl Node {
                 }
             },
         };
-        self.run.fact(facts::ROSTER_REFUSED, |fact| fact.with("why", refused));
+        self.run.fact(RosterRefused { why: refused.into() });
     }
 
     /// Sets the events that are decided here, and may be bid for here, by the roster.

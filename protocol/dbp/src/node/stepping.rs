@@ -8,7 +8,7 @@ use skein_bp::{Event, Origin, Rival, Selection};
 
 use crate::board::shorten;
 use crate::error::NodeError;
-use crate::facts;
+use crate::facts::Orphan;
 use crate::joint::roster::Roster;
 use crate::message::{Message, Occurrence};
 use crate::node::{Node, Select};
@@ -127,11 +127,8 @@ impl Node {
             let wanted = request.incarnation == self.config.incarnation
                 && self.run.sync_of(&request.bthread) == Some(request.sync);
             if ours && !wanted {
-                self.run.fact(facts::ORPHAN, |fact| {
-                    fact.with("event", event.name())
-                        .with("home", home.as_str())
-                        .with("bthread", request.bthread.as_str())
-                });
+                let (event, bthread) = (event.name().into(), request.bthread.as_str().into());
+                self.run.fact(Orphan { event, bthread, home: home.clone() });
             }
         }
         self.stats.heard += 1;

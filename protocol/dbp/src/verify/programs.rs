@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde::Serialize;
+use skein_bp::catalogue::{Declared as _, Events as _};
 use skein_bp::script::{Op, Script, ScriptError};
 use skein_bp::{BThread, Bid, Context, Event, EventSet, Program, ProgramConfig};
 
@@ -307,7 +308,7 @@ fn holding(name: &'static str, about: &'static str, outlives: bool) -> Result<Ne
     let ground = NodeName::new("ground/main")?;
     let lapsed = facts::block_lapsed(&ground, "hold");
     // It stays where it is while the block is to hold, since every synchronisation point is a new block.
-    let block = Bid::new().block(ADVANCE).wait_for(facts::of(&ground, "enough"));
+    let block = Bid::new().block(ADVANCE).wait_for(EventSet::named(ground.event_name("enough")));
     let block = if outlives { block.hold_when_lost() } else { block };
     let trust = [
         Op::Sync(Bid::new().wait_for(facts::confirmed(&ground, "hold"))),
@@ -348,7 +349,7 @@ pub fn asked_once() -> Result<Network, NetworkError> {
 
 /// The same request, asked again when it is unknown whether it was served. It is not safe.
 pub fn asked_again() -> Result<Network, NetworkError> {
-    let unknown = facts::of(&NodeName::new("ground/main")?, facts::UNKNOWN);
+    let unknown = facts::Unknown::any_at(NodeName::new("ground/main")?);
     let ask = Op::Sync(Bid::new().request("uav/1/drop").wait_for(unknown));
     let again = Op::On([("ground/main/unknown".to_owned(), vec![ask.clone()])].into());
     let about = "the ground asks again when it is unknown whether it was served";
@@ -419,7 +420,7 @@ impl BThread for Entrance {
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         self.place = match (self.place, event.kind()) {
-            (_, facts::BLOCK_LAPSED) => Place::Outside,
+            (_, facts::BlockLapsed::NAME) => Place::Outside,
             (Place::Outside, _) => Place::Before,
             (Place::Before | Place::Inside, _) => Place::Inside,
         };
@@ -470,9 +471,9 @@ impl BThread for Claim {
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         self.stage = match (self.stage, event.kind()) {
             (Stage::Yielding, _) => Stage::Claiming,
-            (Stage::Claiming, facts::CONFIRMED) => Stage::Entering,
+            (Stage::Claiming, facts::Confirmed::NAME) => Stage::Entering,
             (Stage::Claiming, _) if !self.gives_way => Stage::Entering,
-            (Stage::Entering, kind) if kind != facts::BLOCK_LAPSED => Stage::Inside,
+            (Stage::Entering, kind) if kind != facts::BlockLapsed::NAME => Stage::Inside,
             _ => Stage::Yielding,
         };
         let waits = matches!(self.stage, Stage::Yielding | Stage::Claiming);

@@ -102,7 +102,7 @@ impl<'a> Row<'a> {
     pub(crate) fn refusal(&mut self, node: &NodeName, life: u64, refusal: &Refusal) {
         self.text(&refusal.bthread);
         self.number(Family::Sync(node.clone(), life, refusal.bthread.clone()), refusal.sync);
-        self.text(refusal.reason.as_str());
+        self.text(refusal.reason.word());
     }
 
     /// The whole row, its numbers counted anew.

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_dbp::facts::{self, BLOCK_LAPSED, STALLED};
+use skein_dbp::facts::{self, BlockLapsed, Stalled};
 use skein_wire::NodeName;
+use skein_wire::event::{Declared as _, Events as _};
 
 /// The name under which this b-thread runs, as confirmations name it.
 pub const NAME: &str = "gate";
@@ -58,7 +59,7 @@ impl Guarded {
 
     /// Of two that keep each other out, the one with the higher name yields.
     fn must_yield(&self, event: &Event) -> bool {
-        event.kind() == STALLED && event.text("by").is_some_and(|by| by < self.me.as_str())
+        Stalled::read(event).is_some_and(|stalled| *stalled.by < *self.me.as_str())
     }
 }
 
@@ -71,7 +72,7 @@ impl BThread for Guarded {
             Phase::Entering => self
                 .claim()
                 .request(me.event_name("enter"))
-                .wait_for([facts::of(me, STALLED), facts::block_lapsed(me, NAME)]),
+                .wait_for([Stalled::any_at(me), facts::block_lapsed(me, NAME)]),
             Phase::Inside => self.claim().wait_for(me.event_name("leave")),
             Phase::Yielding { until } => Bid::new().wait_for("uav/*/leave").deadline(until),
         })
@@ -82,7 +83,7 @@ impl BThread for Guarded {
             Phase::Away | Phase::Yielding { .. } => self.begin(),
             Phase::Claiming => Phase::Entering,
             Phase::Entering if event.kind() == "enter" => Phase::Inside,
-            Phase::Entering if event.kind() == BLOCK_LAPSED => Phase::Claiming,
+            Phase::Entering if event.kind() == BlockLapsed::NAME => Phase::Claiming,
             Phase::Entering if self.must_yield(event) => Phase::Yielding { until: cx.now() + PATIENCE },
             Phase::Entering => Phase::Entering,
             Phase::Inside => Phase::Away,

@@ -3,9 +3,10 @@
 use std::error::Error;
 use std::time::Duration;
 
+use skein_bp::catalogue::Declared as _;
 use skein_bp::script::{Op, Script};
-use skein_bp::{Bid, Event, Program};
-use skein_dbp::{Happened, LIFT, NodeName};
+use skein_bp::{Bid, Program};
+use skein_dbp::{Happened, Lift, NodeName};
 
 use crate::fleet::{Fleet, GROUND, VEHICLES};
 use crate::guarded::{self, Care, Guarded};
@@ -35,19 +36,19 @@ fn guard(me: &NodeName, program: &mut Program) {
 }
 
 /// The operator's word `ground/main/let_go` becomes a request at each home that keeps the block.
-fn ground(lost: &str) -> Result<Script, Box<dyn Error>> {
+fn ground(lost: &NodeName) -> Result<Script, Box<dyn Error>> {
     let lift = |home: &&str| {
-        let lift = Event::new(format!("{home}/{LIFT}")).with("node", lost).with("bthread", guarded::NAME);
-        Op::Sync(Bid::new().request(lift))
+        let lift = Lift { node: lost.clone(), bthread: guarded::NAME.into() };
+        Op::Sync(Bid::new().request(lift.at(home)))
     };
     let told = Op::Sync(Bid::new().wait_for(format!("{GROUND}/let_go")));
-    let homes = VEHICLES.iter().filter(|home| **home != lost);
+    let homes = VEHICLES.iter().filter(|home| **home != lost.as_str());
     Ok(Script::new(&[told].into_iter().chain(homes.map(lift)).collect::<Vec<_>>())?)
 }
 
 pub fn fly(seed: u64) -> Result<Story, Box<dyn Error>> {
     let lost = NodeName::new(VEHICLES[0])?;
-    let lifting = ground(lost.as_str())?;
+    let lifting = ground(&lost)?;
     let mut fleet = Fleet::new(seed)?;
     fleet.start(GROUND, 1, |_, program| drop(program.add("lift", lifting)))?;
     for me in VEHICLES {

@@ -14,7 +14,7 @@ use serde_json::json;
 use skein_bp::{BThread, Bid, Context, Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Node, NodeConfig, NodeName, facts};
 use skein_sim::cli::Exit;
-use skein_wire::vocabulary::{ADVANCE, ENTER, TAKEOFF, event, of, of_every_vehicle};
+use skein_wire::event::{self, Declared as _, Enter, Takeoff, of, of_every_vehicle};
 use skein_wire::{Fleet, Key, Link, MemoryLink, Network, NetworkConfig, NodeLink, State};
 
 use crate::numbers::seconds;
@@ -248,7 +248,7 @@ struct Launch {
 
 impl BThread for Launch {
     fn bid(&self) -> Option<Bid> {
-        self.vehicles.get(self.asked).map(|vehicle| Bid::new().request(event(vehicle, TAKEOFF)))
+        self.vehicles.get(self.asked).map(|vehicle| Bid::new().request(Takeoff.at(vehicle)))
     }
 
     fn resume(&mut self, _: &Event, _: &mut Context) {
@@ -271,7 +271,7 @@ impl BThread for Hold {
     fn bid(&self) -> Option<Bid> {
         match self.0 {
             Held::NotYet => Some(Bid::new().deadline(HELD.0)),
-            Held::Now => Some(Bid::new().block(of_every_vehicle(ADVANCE)).deadline(HELD.1)),
+            Held::Now => Some(Bid::new().block(of_every_vehicle::<event::Advance>()).deadline(HELD.1)),
             Held::NoMore => None,
         }
     }
@@ -290,7 +290,7 @@ struct Preflight {
 
 impl BThread for Preflight {
     fn bid(&self) -> Option<Bid> {
-        let checked = Bid::new().block(of(&self.me, TAKEOFF)).deadline(CYCLE);
+        let checked = Bid::new().block(of::<Takeoff>(&self.me)).deadline(CYCLE);
         (!self.ready).then_some(checked)
     }
 
@@ -310,7 +310,7 @@ struct Advance {
 impl BThread for Advance {
     fn bid(&self) -> Option<Bid> {
         Some(match self.asking {
-            true => Bid::new().request(event(&self.me, ADVANCE)),
+            true => Bid::new().request(event::Advance::ANYWHERE.at(&self.me)),
             false => Bid::new().deadline(self.due),
         })
     }
@@ -341,12 +341,14 @@ enum Phase {
 
 impl BThread for Claim {
     fn bid(&self) -> Option<Bid> {
-        let others = of_every_vehicle(ENTER).and(of(&self.me, ENTER).not());
+        let others = of_every_vehicle::<Enter>().and(of::<Enter>(&self.me).not());
         let claim = Bid::new().block(others.and(EventSet::field_is("passage", self.passage)));
         Some(match self.phase {
             Phase::Away { until } => Bid::new().deadline(until),
             Phase::Claiming => claim.wait_for(facts::confirmed(&self.me, CLAIM)),
-            Phase::Entering => claim.request(event(&self.me, ENTER).with("passage", self.passage)),
+            Phase::Entering => {
+                claim.request(Event::new(self.me.event_name(Enter::NAME)).with("passage", self.passage))
+            }
             Phase::Inside { until } => claim.deadline(until),
         })
     }
@@ -367,7 +369,7 @@ struct Watch;
 
 impl BThread for Watch {
     fn bid(&self) -> Option<Bid> {
-        Some(Bid::new().wait_for(of_every_vehicle(ENTER)))
+        Some(Bid::new().wait_for(of_every_vehicle::<Enter>()))
     }
 
     fn resume(&mut self, _: &Event, _: &mut Context) {}

@@ -9,7 +9,7 @@ use serde::Serialize;
 use skein_agent::bthreads::right_of_way::{around, entering};
 use skein_agent::{AgentConfig, Me, Mind, bthreads, precedence};
 use skein_bp::{BThread, Bid, Context, Event, Program};
-use skein_wire::vocabulary::{ADVANCE, ENTER, HOMEWARD, LANDED, LEAVE, PASSAGE, of_every_vehicle};
+use skein_wire::event::{Advance, Declared, Enter, Homeward, Landed, Leave, Passage, of_every_vehicle};
 
 /// The behaviour of a vehicle that shares passages by this rule.
 #[derive(Debug)]
@@ -44,19 +44,19 @@ impl BThread for NaiveRightOfWay {
         let me = &self.me;
         let bid = Bid::new()
             .priority(precedence::COLLISION)
-            .wait_for([ENTER, LEAVE, LANDED].map(of_every_vehicle))
-            .wait_for(me.any(PASSAGE));
+            .wait_for(of_every_vehicle::<(Enter, Leave, Landed)>())
+            .wait_for(me.any::<Passage>());
         let Some(passage) = &self.ahead else { return Some(bid) };
         let taken = self.inside.values().any(|enter| around(passage).contains(enter));
-        let bid = bid.block(me.any_of(&[ADVANCE, HOMEWARD]));
+        let bid = bid.block(me.any::<(Advance, Homeward)>());
         Some(if taken { bid } else { bid.request(entering(me, passage)) })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         let mine = event.home() == self.me.name();
         match event.kind() {
-            PASSAGE => self.ahead = Some(event.clone()),
-            ENTER if !mine => drop(self.inside.insert(event.home().to_owned(), event.clone())),
+            Passage::NAME => self.ahead = Some(event.clone()),
+            Enter::NAME if !mine => drop(self.inside.insert(event.home().to_owned(), event.clone())),
             _ if !mine => drop(self.inside.remove(event.home())),
             _ => self.ahead = None,
         }
@@ -70,7 +70,7 @@ mod tests {
     use skein_bp::ProgramConfig;
     use skein_sim::fly::agent_configs;
     use skein_sim::scenario::Scenario;
-    use skein_wire::vocabulary::{AIRBORNE, PLANNED, READY, TAKEOFF, event};
+    use skein_wire::event::{Airborne, Planned, Ready, Takeoff};
 
     use super::*;
 
@@ -78,6 +78,11 @@ mod tests {
     const LOWER: &str = "uav/1";
     const HIGHER: &str = "uav/3";
     const PLACE: [f64; 3] = [5.0, 0.0, 2.0];
+
+    /// An event of this type without data.
+    fn named<D: Declared>(node: &str) -> Event {
+        Event::new(format!("{node}/{}", D::NAME))
+    }
 
     fn at(event: Event, [x, y, z]: [f64; 3]) -> Event {
         event.with("x", x).with("y", y).with("z", z)
@@ -95,10 +100,10 @@ mod tests {
             let mut program = Program::new(ProgramConfig::vehicle(1));
             Naive.load(&mut program, &agent_configs(&scenario)[1]);
             let mut vehicle = Self { program, now: Duration::ZERO };
-            for verb in [READY, TAKEOFF, AIRBORNE] {
-                vehicle.hears(event(ME, verb));
+            for event in [Ready.at(ME), Takeoff.at(ME), Airborne.at(ME)] {
+                vehicle.hears(event);
             }
-            assert_eq!(vehicle.hears(event(ME, PLANNED)), [event(ME, PLANNED), event(ME, ADVANCE)]);
+            assert_eq!(vehicle.hears(named::<Planned>(ME)), [named::<Planned>(ME), named::<Advance>(ME)]);
             vehicle
         }
 
@@ -126,32 +131,32 @@ mod tests {
     #[test]
     fn enters_at_once_when_nobody_is_heard_inside_and_blocks_nobody() {
         let mut vehicle = Vehicle::on_its_way();
-        let passage = at(event(ME, PASSAGE), PLACE);
-        assert_eq!(vehicle.hears(passage.clone()), [passage, at(event(ME, ENTER), PLACE)]);
-        assert_eq!(vehicle.after(Duration::from_millis(100)), [event(ME, ADVANCE)]);
-        let other = at(event(LOWER, ENTER), PLACE);
+        let passage = at(named::<Passage>(ME), PLACE);
+        assert_eq!(vehicle.hears(passage.clone()), [passage, at(named::<Enter>(ME), PLACE)]);
+        assert_eq!(vehicle.after(Duration::from_millis(100)), [named::<Advance>(ME)]);
+        let other = at(named::<Enter>(LOWER), PLACE);
         assert!(vehicle.hears(other.clone()).contains(&other), "two are inside");
     }
 
     #[test]
     fn waits_until_all_who_were_heard_to_enter_the_same_passage_have_left_or_landed() {
         let mut vehicle = Vehicle::on_its_way();
-        vehicle.learns(at(event(LOWER, ENTER), [6.0, 1.0, 2.0]));
-        vehicle.learns(at(event(HIGHER, ENTER), PLACE));
-        let passage = at(event(ME, PASSAGE), PLACE);
+        vehicle.learns(at(named::<Enter>(LOWER), [6.0, 1.0, 2.0]));
+        vehicle.learns(at(named::<Enter>(HIGHER), PLACE));
+        let passage = at(named::<Passage>(ME), PLACE);
         assert_eq!(vehicle.hears(passage.clone()), [passage]);
         assert!(vehicle.after(Duration::from_secs(1)).is_empty());
-        vehicle.learns(event(LOWER, LEAVE));
-        assert!(vehicle.hears(event(ME, ADVANCE)).is_empty(), "it has no leave to move");
-        let happened = vehicle.learns(event(HIGHER, LANDED));
-        assert!(happened.contains(&at(event(ME, ENTER), PLACE)), "{happened:?}");
+        vehicle.learns(named::<Leave>(LOWER));
+        assert!(vehicle.hears(named::<Advance>(ME)).is_empty(), "it has no leave to move");
+        let happened = vehicle.learns(named::<Landed>(HIGHER));
+        assert!(happened.contains(&at(named::<Enter>(ME), PLACE)), "{happened:?}");
     }
 
     #[test]
     fn does_not_mind_another_passage() {
         let mut vehicle = Vehicle::on_its_way();
-        vehicle.learns(at(event(LOWER, ENTER), [15.0, 1.0, 2.0]));
-        let passage = at(event(ME, PASSAGE), PLACE);
-        assert_eq!(vehicle.hears(passage.clone()), [passage, at(event(ME, ENTER), PLACE)]);
+        vehicle.learns(at(named::<Enter>(LOWER), [15.0, 1.0, 2.0]));
+        let passage = at(named::<Passage>(ME), PLACE);
+        assert_eq!(vehicle.hears(passage.clone()), [passage, at(named::<Enter>(ME), PLACE)]);
     }
 }

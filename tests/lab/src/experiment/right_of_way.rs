@@ -11,7 +11,7 @@ use skein_dbp::{Happened, NodeName};
 use skein_sim::cli::Controller;
 use skein_sim::fly::Trial;
 use skein_sim::scenario::Scenario;
-use skein_wire::vocabulary::{ENTER, LANDED, LEAVE};
+use skein_wire::event::{Declared as _, Enter, Landed, Leave};
 
 use super::naive_right_of_way::Naive;
 use crate::figure::{Figure, Line, Style};
@@ -46,13 +46,13 @@ impl Passage {
     fn watch(&mut self, now_s: f64, happened: &Happened) {
         let before = self.inside.len();
         match happened.event.kind() {
-            ENTER => {
+            Enter::NAME => {
                 let place = place(&happened.event);
                 self.entries += 1;
                 self.shared += usize::from(self.inside.values().any(|other| is_same(other, &place)));
                 self.inside.insert(happened.home.clone(), place);
             }
-            LEAVE | LANDED => drop(self.inside.remove(&happened.home)),
+            Leave::NAME | Landed::NAME => drop(self.inside.remove(&happened.home)),
             _ => {}
         }
         let now = self.inside.len();

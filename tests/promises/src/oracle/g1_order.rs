@@ -3,8 +3,10 @@
 
 use std::collections::BTreeMap;
 
+use skein_bp::catalogue::Declared as _;
 use skein_bp::{Event, Program};
-use skein_dbp::{Happened, facts};
+use skein_dbp::Happened;
+use skein_dbp::facts::{Gap, PeerJoined};
 
 use super::{Findings, Oracle};
 use crate::knowledge::{Knowledge, Step};
@@ -72,16 +74,18 @@ impl Observer {
             return Ok(());
         }
         match happened.event.kind() {
-            facts::PEER_JOINED => self.meets(me, &happened.event, knowledge),
-            facts::GAP => self.is_told_of_a_gap(&happened.event, knowledge),
+            PeerJoined::NAME => self.meets(me, &happened.event, knowledge),
+            Gap::NAME => self.is_told_of_a_gap(&happened.event, knowledge),
             _ => Ok(()),
         }
     }
 
     /// A life of a home begins for this node.
     fn meets(&mut self, me: usize, fact: &Event, knowledge: &Knowledge) -> Result<(), String> {
-        let home = fact.text("node").and_then(|name| knowledge.number(name));
-        let (Some(home), Some(incarnation)) = (home, number(fact, "incarnation")) else {
+        let joined = PeerJoined::read(fact);
+        let member =
+            joined.and_then(|joined| Some((knowledge.number(joined.node.as_str())?, joined.incarnation)));
+        let Some((home, incarnation)) = member else {
             return Err(format!("{fact} names no member"));
         };
         let Some(life) = knowledge.member(home).life(incarnation) else {
@@ -126,11 +130,11 @@ impl Observer {
     }
 
     fn is_told_of_a_gap(&mut self, fact: &Event, knowledge: &Knowledge) -> Result<(), String> {
-        let home = fact.text("home").and_then(|name| knowledge.number(name));
-        let place = home.and_then(|home| Some((home, self.positions.get_mut(&home)?)));
-        let (Some((home, position)), Some(from), Some(to)) =
-            (place, number(fact, "from"), number(fact, "to"))
-        else {
+        let stream = Gap::read(fact).and_then(|Gap { home, from, to }| {
+            let home = knowledge.number(home.as_str())?;
+            Some((home, self.positions.get_mut(&home)?, from, to))
+        });
+        let Some((home, position, from, to)) = stream else {
             return Err(format!("{fact} is about no stream"));
         };
         if to < from || position.at.is_some_and(|at| from != at + 1) {
@@ -146,8 +150,4 @@ impl Observer {
         }
         Ok(())
     }
-}
-
-fn number(fact: &Event, key: &str) -> Option<u64> {
-    u64::try_from(fact.int(key)?).ok()
 }

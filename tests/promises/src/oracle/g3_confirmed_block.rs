@@ -1,11 +1,12 @@
 //! G3: from `confirmed` until its withdrawal or `block_lapsed`, no event of a block occurs at any home it concerns. A
 //! b-thread that moves on with the same block, or with a part of it, withdraws no more than the rest.
 
+use skein_bp::catalogue::Declared as _;
+use skein_dbp::facts::{BlockLapsed, Confirmed};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
 use skein_bp::{Bid, Event, EventSet, Origin, Program};
-use skein_dbp::facts;
 
 use super::{Findings, Oracle};
 use crate::knowledge::{Knowledge, Member, Step};
@@ -45,14 +46,10 @@ impl Oracle for ConfirmedBlock {
         for happened in step.happened {
             let event = &happened.event;
             if me.is_fact(happened) {
-                match (event.kind(), event.text("bthread")) {
-                    (facts::CONFIRMED, Some(bthread)) => {
-                        self.confirm(step, event, bthread, knowledge, findings)
-                    }
-                    (facts::BLOCK_LAPSED, Some(bthread)) => {
-                        self.sure.remove(&(step.node, bthread.to_owned()));
-                    }
-                    _ => {}
+                if let Some(confirmed) = Confirmed::read(event) {
+                    self.confirm(step, &confirmed, knowledge, findings);
+                } else if let Some(lapsed) = BlockLapsed::read(event) {
+                    self.sure.remove(&(step.node, lapsed.bthread.to_string()));
                 }
             } else if happened.home == me.name && happened.origin != Origin::Occurred {
                 self.occurs(step, event, knowledge, findings);
@@ -108,18 +105,11 @@ impl ConfirmedBlock {
         }
     }
 
-    fn confirm(
-        &mut self,
-        step: &Step<'_>,
-        fact: &Event,
-        bthread: &str,
-        knowledge: &Knowledge,
-        findings: &mut Findings,
-    ) {
+    fn confirm(&mut self, step: &Step<'_>, fact: &Confirmed, knowledge: &Knowledge, findings: &mut Findings) {
         let incarnation = knowledge.member(step.node).incarnation();
-        let sync = fact.int("sync").and_then(|sync| u64::try_from(sync).ok()).unwrap_or_default();
+        let (bthread, sync) = (&*fact.bthread, fact.sync);
         let Some(bid) = knowledge.stated(step.node, incarnation, bthread, sync) else {
-            findings.broken(Promise::G3, step.node, format!("{fact}, which was never stated"));
+            findings.broken(Promise::G3, step.node, format!("{fact:?}, which was never stated"));
             return;
         };
         let homes: Vec<usize> = concerned(knowledge, step.node, bid.blocks()).collect();
@@ -129,7 +119,7 @@ impl ConfirmedBlock {
                 findings.broken(
                     Promise::G7,
                     step.node,
-                    format!("{fact}, which {name} does not let it block"),
+                    format!("{fact:?}, which {name} does not let it block"),
                 );
             }
             let key = (*home, step.node, incarnation, bthread.to_owned(), sync);
@@ -140,7 +130,7 @@ impl ConfirmedBlock {
             };
             if self.received.get(&key).is_none_or(|at| *at < recent) {
                 let name = &knowledge.member(*home).name;
-                findings.broken(Promise::G3, step.node, format!("{fact}, which {name} has not heard of"));
+                findings.broken(Promise::G3, step.node, format!("{fact:?}, which {name} has not heard of"));
             }
         }
         let (set, hold) = (bid.blocks().clone(), bid.holds_when_lost());

@@ -2,8 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use skein_bp::catalogue::Declared as _;
 use skein_bp::{Event, Origin, Program};
-use skein_dbp::{Happened, facts};
+use skein_dbp::Happened;
+use skein_dbp::facts::{PeerJoined, Unknown};
 
 use super::{Findings, Oracle};
 use crate::knowledge::{Knowledge, Member, Step};
@@ -33,7 +35,7 @@ impl Oracle for Once {
             if happened.origin == Origin::Internal {
                 self.serves(step, happened, knowledge, findings);
             } else if knowledge.member(step.node).is_fact(happened)
-                && happened.event.kind() == facts::PEER_JOINED
+                && happened.event.kind() == PeerJoined::NAME
             {
                 self.meets(step, happened, knowledge, findings);
             }
@@ -119,9 +121,8 @@ impl Once {
         findings: &mut Findings,
     ) {
         let me = knowledge.member(step.node);
-        let home = happened.event.text("node").and_then(|name| knowledge.number(name));
-        let incarnation = happened.event.int("incarnation").and_then(|number| u64::try_from(number).ok());
-        let (Some(home), Some(incarnation)) = (home, incarnation) else { return };
+        let Some(PeerJoined { node, incarnation }) = PeerJoined::read(&happened.event) else { return };
+        let Some(home) = knowledge.number(node.as_str()) else { return };
         let known = self.met.insert((step.node, home), incarnation);
         if known.is_none_or(|known| known == incarnation) {
             return;
@@ -134,8 +135,7 @@ impl Once {
             let stays = step.program.bids().any(|(name, _, sync)| name == bthread && sync == stated.sync);
             let told = step.happened.iter().any(|told| {
                 me.is_fact(told)
-                    && told.event.kind() == facts::UNKNOWN
-                    && told.event.text("bthread") == Some(bthread)
+                    && Unknown::read(&told.event).is_some_and(|unknown| *unknown.bthread == **bthread)
             });
             if open && stays && !told {
                 let home = &knowledge.member(home).name;

@@ -1,10 +1,11 @@
 //! G5, for blocks that are to outlive their holders: once confirmed, they stay through the loss of the holder and the
 //! restart of the home, until they are withdrawn or an authority lifts them.
 
+use skein_bp::catalogue::Declared as _;
+use skein_dbp::facts::Confirmed;
 use std::collections::BTreeSet;
 
 use skein_bp::Origin;
-use skein_dbp::facts;
 
 use super::{Findings, Oracle};
 use crate::knowledge::{Knowledge, Step};
@@ -21,11 +22,10 @@ impl Oracle for Hold {
         let me = knowledge.member(step.node);
         for happened in step.happened {
             let event = &happened.event;
-            if me.is_fact(happened) && event.kind() == facts::CONFIRMED {
-                let sync = event.int("sync").and_then(|sync| u64::try_from(sync).ok());
-                if let (Some(bthread), Some(sync)) = (event.text("bthread"), sync) {
-                    self.confirmed.insert((step.node, me.incarnation(), bthread.to_owned(), sync));
-                }
+            if me.is_fact(happened)
+                && let Some(Confirmed { bthread, sync }) = Confirmed::read(event)
+            {
+                self.confirmed.insert((step.node, me.incarnation(), bthread.to_string(), sync));
             }
             if happened.origin == Origin::Occurred || !me.lets_block(event) {
                 continue;

@@ -2,11 +2,12 @@
 //!
 //! That such a block holds nothing back is seen by G5's observer, and that it is never confirmed by G3's.
 
+use skein_bp::catalogue::Declared as _;
+use skein_dbp::facts::{Denied, Refused};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
 use skein_bp::Origin;
-use skein_dbp::facts;
 
 use super::{Findings, Oracle};
 use crate::knowledge::{Knowledge, Step};
@@ -24,13 +25,15 @@ impl Oracle for Rights {
         let me = knowledge.member(step.node);
         for happened in step.happened {
             let event = &happened.event;
-            let named = |key: &str| event.text(key).and_then(|name| knowledge.number(name));
-            let bthread = || event.text("bthread").unwrap_or_default().to_owned();
             if me.is_fact(happened) {
-                match (event.kind(), named("home"), named("node")) {
-                    (facts::REFUSED, Some(home), _) => drop(self.told.insert((step.node, bthread(), home))),
-                    (facts::DENIED, _, Some(node)) => drop(self.noted.insert((node, bthread(), step.node))),
-                    _ => {}
+                if let Some(refused) = Refused::read(event)
+                    && let Some(home) = knowledge.number(refused.home.as_str())
+                {
+                    self.told.insert((step.node, refused.bthread.to_string(), home));
+                } else if let Some(denied) = Denied::read(event)
+                    && let Some(node) = knowledge.number(denied.node.as_str())
+                {
+                    self.noted.insert((node, denied.bthread.to_string(), step.node));
                 }
             } else if happened.origin == Origin::Internal {
                 let remote = happened.requested_by.iter().filter_map(|name| name.split_once('#'));

@@ -4,8 +4,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use skein_bp::catalogue::Declared as _;
 use skein_bp::{Event, EventSet, Origin, Program};
-use skein_dbp::{Happened, ROSTER, Roster};
+use skein_dbp::{Happened, NewRoster, Roster};
 
 use super::{Findings, Oracle};
 use crate::knowledge::{Knowledge, Member, Step};
@@ -80,7 +81,7 @@ fn replay(program: &mut Program, step: &Step<'_>, knowledge: &Knowledge) -> Resu
         }
         expect(program, step.clock, Some(happened))?;
         if home == me
-            && event.kind() == ROSTER
+            && event.kind() == NewRoster::NAME
             && let Ok(roster) = Roster::ordered(event)
             && roster.term > term
         {

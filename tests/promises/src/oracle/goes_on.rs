@@ -4,8 +4,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use skein_bp::catalogue::Declared as _;
 use skein_bp::{Event, Program};
-use skein_dbp::{ROSTER, RefusalReason, Roster, facts};
+use skein_dbp::facts::Refused;
+use skein_dbp::{NewRoster, RefusalReason, Roster};
 
 use super::{Findings, Oracle};
 use crate::knowledge::{Knowledge, Member, Step};
@@ -45,11 +47,11 @@ impl Oracle for GoesOn {
                 if let Some(home) = knowledge.number(happened.home.as_str()) {
                     self.heard.insert((step.node, home), happened.seq);
                 }
-            } else if me.is_fact(happened) && happened.event.kind() == facts::REFUSED {
-                let (bthread, reason) = (happened.event.text("bthread"), happened.event.text("reason"));
-                if let Some(bthread) = bthread.filter(|_| reason == Some(RefusalReason::Safety.as_str())) {
-                    self.refused.insert((step.node, bthread.to_owned()));
-                }
+            } else if me.is_fact(happened)
+                && let Some(refused) = Refused::read(&happened.event)
+                && refused.reason == RefusalReason::Safety
+            {
+                self.refused.insert((step.node, refused.bthread.to_string()));
             }
         }
         for (marks, since) in
@@ -121,7 +123,7 @@ fn came_after(observer: usize, home: usize, knowledge: &Knowledge) -> bool {
 fn keeps_to_a_former_term(node: usize, home: usize, knowledge: &Knowledge) -> bool {
     let member = knowledge.member(node);
     let term = |member: &Member| member.roster.as_ref().map_or(0, |roster| roster.term);
-    let order = Event::new(member.name.event_name(ROSTER));
+    let order = Event::new(member.name.event_name(NewRoster::NAME));
     term(member) < term(knowledge.member(home)) && !is_free(&order, node, knowledge)
 }
 

@@ -20,7 +20,7 @@ use skein_bp::script::{Op, Script};
 use skein_bp::{BThread, Bid, Context, Event, Program, ProgramConfig};
 use skein_dbp::{BidRecord, NodeName, facts};
 use skein_sim::cli::Exit;
-use skein_wire::vocabulary::{ADVANCE, event, of_every_vehicle};
+use skein_wire::event::{Advance, Declared as _, of_every_vehicle};
 use skein_wire::{Key, Link as _};
 use skein_zenoh::{ZenohLink, ZenohSession};
 
@@ -224,7 +224,7 @@ impl Events {
     fn start() -> anyhow::Result<Self> {
         let session = session(Vec::new())?;
         let mut program = Program::new(ProgramConfig::vehicle(1));
-        let ask = Bid::new().request(event(home(1)?, PING));
+        let ask = Bid::new().request(home(1)?.event_name(PING));
         program.add("asker", Script::new(&[Op::forever([Op::Sync(ask)])])?);
         let peer = Peer::start(Role::Node, 1, 1, locator(&session)?)?;
         let mut events =
@@ -320,7 +320,7 @@ fn swarm(extent: &Extent) -> anyhow::Result<SwarmSeen> {
 
 /// Lets the fleet go on once; the microseconds that a block took, if it has just been confirmed.
 fn confirmation(member: &mut Member) -> anyhow::Result<Option<f64>> {
-    let confirmed = member.go_on()?.iter().any(|happened| happened.event.kind() == facts::CONFIRMED);
+    let confirmed = member.go_on()?.iter().any(|happened| happened.event.kind() == facts::Confirmed::NAME);
     let state = member.node.node().program().state_of::<Confirm>(CONFIRM);
     let took = state.map(|confirm| (member.up() - confirm.stated).as_secs_f64() * 1e6);
     Ok(took.filter(|_| confirmed))
@@ -341,9 +341,9 @@ struct Confirm {
 impl BThread for Confirm {
     fn bid(&self) -> Option<Bid> {
         Some(match self.blocking {
-            true => {
-                Bid::new().block(of_every_vehicle(ADVANCE)).wait_for(facts::confirmed(&self.ground, CONFIRM))
-            }
+            true => Bid::new()
+                .block(of_every_vehicle::<Advance>())
+                .wait_for(facts::confirmed(&self.ground, CONFIRM)),
             false => Bid::new().deadline(self.until),
         })
     }

@@ -12,9 +12,10 @@ use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use skein_bp::script::{Op, Script};
 use skein_bp::{Bid, Program, ProgramConfig};
-use skein_dbp::{BidAck, Happened, Node, NodeConfig, NodeName, facts};
+use skein_dbp::facts::{BlockLapsed, PeerLost};
+use skein_dbp::{BidAck, Happened, Node, NodeConfig, NodeName};
 use skein_sim::cli::Exit;
-use skein_wire::vocabulary::{ENTER, of_every_vehicle};
+use skein_wire::event::{Declared as _, Enter, of_every_vehicle};
 use skein_wire::{Fleet, Key, Link as _, NodeLink};
 use skein_zenoh::{Bell, NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
 use zenoh::Wait as _;
@@ -103,12 +104,9 @@ impl Member {
         self.seen.longest_superstep_us = self.seen.longest_superstep_us.max(took_us);
         let happened = self.node.node_mut().take_selections();
         for fact in happened.iter().filter(|fact| fact.home == *self.node.node().name()) {
-            let whom = match fact.event.kind() {
-                facts::PEER_LOST => fact.event.text("node"),
-                facts::BLOCK_LAPSED => fact.event.text("home"),
-                _ => None,
-            };
-            self.seen.lost.extend(whom.map(str::to_owned));
+            let lost = PeerLost::read(&fact.event).map(|lost| lost.node);
+            let whom = lost.or_else(|| BlockLapsed::read(&fact.event).map(|lapsed| lapsed.home));
+            self.seen.lost.extend(whom.map(|node| node.to_string()));
         }
         Ok(happened)
     }
@@ -262,7 +260,7 @@ fn be_a_node(
     sections: &Receiver<()>,
 ) -> anyhow::Result<()> {
     let mut program = Program::new(ProgramConfig::vehicle(number as u64));
-    program.add("guard", Script::new(&[Op::Sync(Bid::new().block(of_every_vehicle(ENTER)))])?);
+    program.add("guard", Script::new(&[Op::Sync(Bid::new().block(of_every_vehicle::<Enter>()))])?);
     let mut member = Member::new(&session(connect)?, &home(number)?, homes, program)?;
     let mut seen = Vec::new();
     loop {

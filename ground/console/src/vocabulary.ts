@@ -1,0 +1,21 @@
+/**
+ * The words of orders, from the catalogue of events (protocol/wire/src/event). Do not edit: a test of skein-wire writes it.
+ */
+
+export const What = {
+  launch: 'launch',
+  launchTogether: 'launch_together',
+  hold: 'hold',
+  resume: 'resume',
+  land: 'land',
+  return: 'return',
+  abort: 'abort',
+  goto: 'goto',
+  handBack: 'hand_back',
+  load: 'load',
+  unload: 'unload',
+} as const;
+export type What = (typeof What)[keyof typeof What];
+
+/** These are decided for everyone, whoever is selected. */
+export const FOR_ALL: ReadonlySet<What> = new Set([What.launch, What.launchTogether, What.abort]);

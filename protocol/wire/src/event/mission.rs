@@ -1,0 +1,39 @@
+//! Where a vehicle's flight and mission stand.
+
+use super::Text;
+
+skein_bp::events! {
+    /// The stages of a flight, and what interrupts it.
+    pub const MISSION;
+
+    /// Preflight checks pass.
+    Ready = "ready", Own;
+    /// A preflight check that had passed fails again.
+    Unready = "unready", Own;
+    /// The vehicle is in the air at its take-off height.
+    Airborne = "airborne", Own;
+    /// The vehicle stands on the ground, disarmed.
+    Landed = "landed", Own;
+    /// The mission is complete and the vehicle is on the ground.
+    Complete = "complete", Anyone;
+    /// The mission ended without reaching its goal.
+    Failed = "failed", Anyone {
+        why: Text,
+    }
+    /// Somebody else changed the flight mode.
+    PilotTook = "pilot", Own {
+        /// The new mode.
+        mode: Text,
+    }
+    /// The agent did not run for too long for what it knew and what it had said to count.
+    Slept = "slept", Own {
+        seconds: f64 ["s", 0.0..=f64::INFINITY],
+    }
+    /// The agent started while its vehicle was in the air.
+    FoundAirborne = "found_airborne", Own;
+    /// The autopilot refused or never answered a command.
+    CommandFailed = "command_failed", Own {
+        /// The command, and the answer.
+        why: Text,
+    }
+}

@@ -1,0 +1,156 @@
+//! An operator's orders, and what vehicles answer.
+
+use super::Text;
+
+skein_bp::words! {
+    /// What an operator may order, as console, scripts, scenarios and events name it.
+    pub enum What {
+        /// Take off, one after another, those that stand ready.
+        Launch = "launch",
+        /// Take off together, once every vehicle of the roster is there and ready.
+        LaunchTogether = "launch_together",
+        /// Stay where you are until resumed.
+        Hold = "hold",
+        /// Go on after a hold.
+        Resume = "resume",
+        /// Land where you are.
+        Land = "land",
+        /// Fly home and land there.
+        Return = "return",
+        /// Land together, wherever you are: every vehicle of the roster learns of it before anything else is decided.
+        Abort = "abort",
+        /// Fly there and hover until resumed.
+        GoTo = "goto",
+        /// Fly again by yourself: the pilot has let go.
+        HandBack = "hand_back",
+        /// Run a script beside whatever you do.
+        Load = "load",
+        /// Run a script no more.
+        Unload = "unload",
+    }
+}
+
+impl What {
+    /// Those of which something is true, in the order of their declaration.
+    pub fn those(is_so: fn(Self) -> bool) -> impl Iterator<Item = Self> {
+        Self::ALL.iter().copied().filter(move |what| is_so(*what))
+    }
+
+    /// Whether it is for every vehicle, and cannot be for some.
+    #[must_use]
+    pub fn is_for_all(self) -> bool {
+        matches!(self, Self::Launch | Self::LaunchTogether | Self::Abort)
+    }
+
+    /// Whether it needs more than whom it is for: a place, or a script.
+    #[must_use]
+    pub fn needs_more(self) -> bool {
+        matches!(self, Self::GoTo | Self::Load | Self::Unload)
+    }
+
+    #[must_use]
+    pub fn is_launch(self) -> bool {
+        matches!(self, Self::Launch | Self::LaunchTogether)
+    }
+
+    /// Whether it is about a script.
+    #[must_use]
+    pub fn is_about_script(self) -> bool {
+        matches!(self, Self::Load | Self::Unload)
+    }
+
+    /// Whether a vehicle takes it in at its gateway, as [`OrderTaken`]. The ground station carries out the others.
+    #[must_use]
+    pub fn reaches_vehicle(self) -> bool {
+        matches!(self, Self::Resume | Self::Land | Self::Return | Self::GoTo | Self::HandBack)
+    }
+
+    /// Whether a script may give it to its own vehicle.
+    #[must_use]
+    pub fn is_open_to_scripts(self) -> bool {
+        matches!(self, Self::Hold | Self::Resume | Self::Land | Self::Return | Self::GoTo)
+    }
+
+    /// Whether it sets a vehicle going. Such an order is not brought any more after a while.
+    #[must_use]
+    pub fn sets_going(self) -> bool {
+        matches!(self, Self::Resume | Self::GoTo | Self::HandBack)
+    }
+
+    /// Whether it frees a vehicle whose agent has started in the air.
+    #[must_use]
+    pub fn releases(self) -> bool {
+        matches!(self, Self::Resume | Self::Return)
+    }
+
+    /// Whether it ends a hold: whoever is ordered elsewhere, home or down must be free to move, like who is to go on.
+    #[must_use]
+    pub fn ends_hold(self) -> bool {
+        matches!(self, Self::Resume | Self::Land | Self::Return | Self::GoTo)
+    }
+
+    /// Whether it brings a vehicle to the ground.
+    #[must_use]
+    pub fn brings_down(self) -> bool {
+        matches!(self, Self::Land | Self::Return)
+    }
+
+    /// Whether it calls a launch off, if it is for all: who orders the swarm down does not want the rest of it up.
+    #[must_use]
+    pub fn calls_launch_off(self) -> bool {
+        self.brings_down() || self == Self::Abort
+    }
+
+    /// Whether it says nothing against what other orders have set going.
+    #[must_use]
+    pub fn is_beside_flight(self) -> bool {
+        self.is_launch() || self.is_about_script()
+    }
+}
+
+skein_bp::events! {
+    /// Orders at a vehicle, and its answers.
+    pub const ORDERS;
+
+    /// An operator orders this vehicle: the one gateway for remote safety requests.
+    OrderTaken = "order", Operator {
+        what: What,
+        /// Where to, for `goto`.
+        x: Option<f64> ["m"],
+        y: Option<f64> ["m"],
+        z: Option<f64> ["m"],
+        /// The b-thread of the script that has given it, if one has.
+        by: Option<Text>,
+    }
+    /// An operator gives the vehicle back to its agent after a pilot had it.
+    HandBack = "hand_back", Own;
+    /// An order is not carried out.
+    Declined = "declined", Own {
+        what: What,
+        why: Text,
+    }
+    /// A joint decision is taken to heart.
+    Heeded = "heeded", Own {
+        what: What,
+    }
+}
+
+impl OrderTaken {
+    /// An order that needs no more than its word.
+    #[must_use]
+    pub fn plain(what: What) -> Self {
+        Self { what, x: None, y: None, z: None, by: None }
+    }
+
+    /// The order to go there, metres ENU.
+    #[must_use]
+    pub fn go_to([x, y, z]: [f64; 3]) -> Self {
+        Self { x: Some(x), y: Some(y), z: Some(z), ..Self::plain(What::GoTo) }
+    }
+
+    /// Where to go, metres ENU.
+    #[must_use]
+    pub fn place(&self) -> Option<[f64; 3]> {
+        Some([self.x?, self.y?, self.z?])
+    }
+}

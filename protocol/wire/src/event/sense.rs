@@ -1,0 +1,51 @@
+//! What a vehicle finds out on its way.
+
+use super::Text;
+
+skein_bp::events! {
+    /// What is found out about the way, the vehicle's surroundings and its battery.
+    pub const SENSES;
+
+    /// The waypoint is reached.
+    Arrived = "arrived", Own {
+        /// As in `goto`.
+        leg: i64,
+    }
+    /// A path to the waypoint exists.
+    Planned = "planned", Own {
+        /// As in `goto`.
+        leg: i64,
+        length_m: f64 ["m", 0.0..=f64::INFINITY],
+    }
+    /// No path to the waypoint exists.
+    Unplannable = "unplannable", Own {
+        /// As in `goto`.
+        leg: i64,
+        why: Text,
+    }
+    /// The path ahead runs into an obstacle that was not known when it was planned.
+    PathBlocked = "path_blocked", Own;
+    /// Leave to move was given, and yet the vehicle makes no way.
+    Stuck = "stuck", Own;
+    /// A narrow passage lies ahead, around this place.
+    Passage = "passage", Own {
+        x: f64 ["m"],
+        y: f64 ["m"],
+        z: f64 ["m"],
+    }
+    /// The narrow passage lies behind.
+    Leave = "leave", Own;
+    /// A neighbour is nearer than the emergency distance.
+    TooClose = "too_close", Own {
+        /// Which one.
+        other: Text,
+    }
+    /// No neighbour is nearer than the emergency distance any more.
+    Clear = "clear", Own;
+    /// What is left in the battery is what the way home needs.
+    BatteryLow = "battery_low", Own;
+    /// The battery is nearly empty.
+    BatteryCritical = "battery_critical", Own;
+    /// The vehicle is outside its geofence.
+    FenceBreached = "fence_breached", Own;
+}

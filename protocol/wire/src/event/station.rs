@@ -1,0 +1,82 @@
+//! What a ground station tells its own b-threads.
+
+use skein_dbp::NodeName;
+
+use super::{Text, What};
+
+skein_bp::words! {
+    /// How a vehicle was found by a station that has just heard of it.
+    pub enum Situation {
+        /// On the ground, its mission before it.
+        Grounded = "grounded",
+        /// In the air, or about to be.
+        Flying = "flying",
+        /// On the ground, its mission done.
+        Complete = "complete",
+        /// On the ground, its mission not done.
+        Failed = "failed",
+    }
+}
+
+skein_bp::events! {
+    /// The station's own events.
+    pub const STATION;
+
+    /// The operator has ordered something.
+    OrderGiven = "ordered", Anyone {
+        what: What,
+        /// A vehicle, or `all`.
+        who: Text,
+        /// The name of the script that it is about.
+        name: Option<Text>,
+        /// For `load`: the script and the values of its parameters, as JSON.
+        script: Option<Text>,
+        /// Where to, for `goto`.
+        x: Option<f64> ["m"],
+        y: Option<f64> ["m"],
+        z: Option<f64> ["m"],
+    }
+    /// A vehicle's first word to this station, in each of its lives.
+    Heard = "heard", Anyone {
+        vehicle: NodeName,
+        situation: Situation,
+        /// Its task, as it tells it.
+        why: Text,
+    }
+    /// It is this vehicle's turn to take off.
+    Turn = "turn", Anyone {
+        vehicle: NodeName,
+    }
+    /// This vehicle does not take off now; others go first.
+    Later = "later", Anyone {
+        vehicle: NodeName,
+    }
+    /// Every vehicle is on the ground, and knows how its mission went.
+    MissionOver = "mission_over", Anyone {
+        /// Whether every vehicle did what it was sent for.
+        succeeded: bool,
+    }
+}
+
+impl OrderGiven {
+    /// How it names all vehicles.
+    pub const ALL: &str = "all";
+
+    /// An order that needs no more than whom it is for.
+    #[must_use]
+    pub fn plain(what: What, who: &str) -> Self {
+        Self { what, who: who.into(), name: None, script: None, x: None, y: None, z: None }
+    }
+
+    /// The same order, to this place, metres ENU.
+    #[must_use]
+    pub fn to(self, [x, y, z]: [f64; 3]) -> Self {
+        Self { x: Some(x), y: Some(y), z: Some(z), ..self }
+    }
+
+    /// Whether it is for `vehicle`.
+    #[must_use]
+    pub fn is_for(&self, vehicle: &NodeName) -> bool {
+        *self.who == *Self::ALL || *self.who == *vehicle.as_str()
+    }
+}
