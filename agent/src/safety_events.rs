@@ -6,8 +6,8 @@ use skein_wire::vocabulary::{GOTO, OWN};
 use crate::bthreads::HOME_LEG;
 use crate::me::Me;
 
-/// What no remote b-thread can block, and only the operator's gateway can request; the waypoint at home is part of it, for
-/// without it `return` would lead nowhere.
+/// What no remote b-thread can block, and only the operator's gateway can request; the waypoint at home is part of
+/// it, for without it `return` would lead nowhere.
 pub(crate) fn safety_events(me: &Me) -> EventSet {
     let home = me.any(GOTO).and(EventSet::field_is("leg", HOME_LEG));
     me.any_of(&OWN).or(home)
