@@ -1,4 +1,5 @@
-//! Control: from the autopilot's telemetry, scans and neighbours to set-points. It waits for no b-thread and no network.
+//! Control: from the autopilot's telemetry, scans and neighbours to set-points. It waits for no b-thread and no
+//! network.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -227,7 +228,8 @@ impl Control {
         None
     }
 
-    /// A vehicle that is to land goes to where it can, and lands there; wherever it is in the end, or if it does not see.
+    /// A vehicle that is to land goes to where it can, and lands there; wherever it is in the end, or if it does not
+    /// see.
     fn settle(&mut self, now: Duration) {
         let FlightPhase::Settling { until } = self.flight.phase() else { return };
         let sees = keep_alive(now, &self.inputs()) == KeepAlive::Command;

@@ -1,7 +1,7 @@
 //! The agent core: one vehicle's mission around its control, without I/O.
 //!
-//! [`Control`] flies the vehicle and [`Mission`] decides what for. They know nothing of one another: control says what it has
-//! found out in [reports](crate::report::Report), the mission what is to be done in
+//! [`Control`] flies the vehicle and [`Mission`] decides what for. They know nothing of one another: control says
+//! what it has found out in [reports](crate::report::Report), the mission what is to be done in
 //! [instructions](crate::instruction::Instruction), and this core carries both to and fro in a fixed order.
 
 use std::sync::Arc;

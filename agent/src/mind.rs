@@ -8,8 +8,8 @@ use skein_dbp::{Happened, Node};
 use crate::bthreads;
 use crate::config::AgentConfig;
 
-/// Hears what the vehicle's body reports, and decides what is to be done. As given, the b-threads that it loads into the
-/// node's program do so.
+/// Hears what the vehicle's body reports, and decides what is to be done. As given, the b-threads that it loads into
+/// the node's program do so.
 pub trait Mind: std::fmt::Debug + Send {
     /// Loads b-threads into the program of the vehicle's node.
     fn load(&self, program: &mut Program, config: &AgentConfig);

@@ -1,4 +1,5 @@
-//! Mission: what the vehicle is to do. The node with its b-threads and peers, the scripts, and how far the task has come.
+//! Mission: what the vehicle is to do. The node with its b-threads and peers, the scripts, and how far the task has
+//! come.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -27,8 +28,8 @@ use crate::{
     verify::check_script,
 };
 
-/// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for between
-/// two ticks. `skein-agent verify --script` looks at all.
+/// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for
+/// between two ticks. `skein-agent verify --script` looks at all.
 const STATES_TRIED: usize = 500;
 
 /// How a vehicle's mission ended.
@@ -57,10 +58,10 @@ pub struct Mission {
 }
 
 impl Mission {
-    /// The mission of a vehicle on the ground, decided by `mind`. What its node promises is kept in `store`, if there is one.
+    /// The mission of a vehicle on the ground, decided by `mind`. What its node promises is kept in `store`, if there
+    /// is one.
     ///
-    /// # Errors
-    /// [`AgentError`] names the field of the configuration at fault.
+    /// # Errors [`AgentError`] names the field of the configuration at fault.
     pub fn new(
         config: Arc<AgentConfig>,
         mind: Box<dyn Mind>,
@@ -266,8 +267,8 @@ impl Mission {
         self.scripts.load(self.node.node_mut().program_mut(), assignment, from, begins)
     }
 
-    /// Whether `from` has the right to send this script: the vehicle itself, or a b-thread of another node that is a member
-    /// and no vehicle.
+    /// Whether `from` has the right to send this script: the vehicle itself, or a b-thread of another node that is a
+    /// member and no vehicle.
     fn may_send(&self, assignment: &Assignment, from: &str) -> Result<bool, String> {
         let Some((node, bthread)) = from.split_once('#') else { return Ok(from == self.name.as_str()) };
         let text = assignment.to_json().map_err(|error| error.to_string())?;

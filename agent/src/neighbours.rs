@@ -77,8 +77,8 @@ impl Neighbour {
         self.track.predicted()
     }
 
-    /// Whether it may fly where a vehicle of this envelope would climb from `place`, as far as can be known: one that is silent
-    /// may have come closer meanwhile.
+    /// Whether it may fly where a vehicle of this envelope would climb from `place`, as far as can be known: one that
+    /// is silent may have come closer meanwhile.
     #[must_use]
     pub fn may_be_over(&self, place: &Vector3<f64>, envelope: &Envelope) -> bool {
         let unseen_s = match self.track.age_s {

@@ -69,8 +69,8 @@ pub struct Watches {
 }
 
 impl Watches {
-    /// Preflight: the autopilot is heard, ready to arm and charged, and the other checks pass. A vehicle that somebody else
-    /// has armed is not ready.
+    /// Preflight: the autopilot is heard, ready to arm and charged, and the other checks pass. A vehicle that
+    /// somebody else has armed is not ready.
     pub fn preflight(&mut self, telemetry: &Telemetry, checks: Checks) -> Option<Report> {
         let charged = telemetry.battery.is_some_and(|battery| battery.value.fraction >= BATTERY_TO_START);
         let ready = telemetry.connected
@@ -108,7 +108,7 @@ impl Watches {
             position[axis] < fence.min[axis] - FENCE_TOLERANCE_M
                 || position[axis] > fence.max[axis] + FENCE_TOLERANCE_M
         });
-        self.outside.rises(outside).then(|| Report::FenceBreached)
+        self.outside.rises(outside).then_some(Report::FenceBreached)
     }
 
     /// Separation: a neighbour in the air is inside the emergency distance.

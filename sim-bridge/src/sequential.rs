@@ -1,9 +1,9 @@
 //! The navigator without behavioural programming: one loop and one state machine around the same pipeline.
 //!
-//! It is what the b-threads are compared with (Wang 2023, the second experiment). It hears the same reports as they do
-//! and orders the same acts, at the same rates: takes off when the checks pass, flies the waypoints in turn, plans anew
-//! around what is in the way, goes home on a low battery and from beyond the fence, and lands. But it knows only its own
-//! vehicle: nobody can hold it from afar or order it about, and it yields to nobody in a narrow passage.
+//! It is what the b-threads are compared with (Wang 2023, the second experiment). It hears the same reports as they
+//! do and orders the same acts, at the same rates: takes off when the checks pass, flies the waypoints in turn, plans
+//! anew around what is in the way, goes home on a low battery and from beyond the fence, and lands. But it knows only
+//! its own vehicle: nobody can hold it from afar or order it about, and it yields to nobody in a narrow passage.
 
 use std::time::Duration;
 
@@ -68,7 +68,8 @@ enum Way {
 }
 
 impl Sequential {
-    /// The navigator of a vehicle that stands on the ground: over its waypoints, landing at the last, and home where it must.
+    /// The navigator of a vehicle that stands on the ground: over its waypoints, landing at the last, and home where
+    /// it must.
     #[must_use]
     pub fn new(config: &AgentConfig) -> Self {
         let (me, [x, y, _]) = (Me::new(&config.node), config.home);

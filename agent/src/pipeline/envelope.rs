@@ -4,7 +4,8 @@ use skein_planning::{local::braking::BrakingConfig, separation::FilterConfig};
 
 use crate::config::Envelope;
 
-/// Clearance that the safety filter keeps between hull and obstacles, m: less than paths do, so that it does not fight them.
+/// Clearance that the safety filter keeps between hull and obstacles, m: less than paths do, so that it does not
+/// fight them.
 const OBSTACLE_MARGIN_M: f64 = 0.1;
 
 impl Envelope {

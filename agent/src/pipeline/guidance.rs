@@ -1,7 +1,7 @@
 //! Guidance: from waypoints, and leave to fly to them, to set-points.
 //!
-//! [`Planning`] finds a path, [`Progress`] watches how the vehicle gets on along it, [`Steering`] makes the set-points. What
-//! they share is the [`Course`].
+//! [`Planning`] finds a path, [`Progress`] watches how the vehicle gets on along it, [`Steering`] makes the
+//! set-points. What they share is the [`Course`].
 
 use std::time::Duration;
 

@@ -1,8 +1,8 @@
 //! The pipeline: *how* the vehicle does what its b-threads have decided.
 //!
-//! scan and pose -> [`perception`] -> map -> [`planning`] (a path by the [`global`] planner) -> [`steering`] (velocity by the
-//! [`local`] planner, repulsion, [`safety_filter`]) -> [`set_point`] rule -> set-point. [`guidance`] holds these together, and
-//! [`progress`] watches the vehicle on its [`course`].
+//! scan and pose -> [`perception`] -> map -> [`planning`] (a path by the [`global`] planner) -> [`steering`]
+//! (velocity by the [`local`] planner, repulsion, [`safety_filter`]) -> [`set_point`] rule -> set-point. [`guidance`]
+//! holds these together, and [`progress`] watches the vehicle on its [`course`].
 
 pub mod course;
 mod envelope;

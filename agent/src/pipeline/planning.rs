@@ -54,9 +54,9 @@ impl Planning {
         self.routes.is_under_way()
     }
 
-    /// Begins to plan a path to the waypoint. Where the vehicle is stuck, neighbours that stand around are obstacles too. One
-    /// that has fallen silent always is, as large as its ghost will be. The answer comes at once if this tick's allowance is
-    /// enough for it, else from [`Planning::go_on`].
+    /// Begins to plan a path to the waypoint. Where the vehicle is stuck, neighbours that stand around are obstacles
+    /// too. One that has fallen silent always is, as large as its ghost will be. The answer comes at once if this
+    /// tick's allowance is enough for it, else from [`Planning::go_on`].
     pub fn begin(
         &mut self,
         is_stuck: bool,
@@ -94,7 +94,8 @@ impl Planning {
         self.search(course, map)
     }
 
-    /// Goes on with a plan that the ticks before were not enough for. Once in each tick, before anything else is planned.
+    /// Goes on with a plan that the ticks before were not enough for. Once in each tick, before anything else is
+    /// planned.
     pub fn go_on(&mut self, course: &mut Course, map: &mut ClearanceMap) -> Option<Report> {
         self.allowance = ALLOWANCE;
         self.search(course, map)
@@ -124,8 +125,8 @@ impl Planning {
         Potential::gated(&motion.position, &heading, &repellers, 2.0)
     }
 
-    /// The places that silent neighbours may come to take. The ends of the path are outside in any case: the filter leads out of
-    /// a ghost.
+    /// The places that silent neighbours may come to take. The ends of the path are outside in any case: the filter
+    /// leads out of a ghost.
     fn ghosts<'a>(
         &'a self,
         neighbours: &'a [Neighbour],
@@ -145,8 +146,9 @@ impl Planning {
     }
 }
 
-/// Where to plan to: the waypoint, or the nearest place that is open instead of one that is closed, if that is on the way to
-/// a waypoint beyond the map, or home; there the way home ends. Other waypoints are flown to as they are, or not at all.
+/// Where to plan to: the waypoint, or the nearest place that is open instead of one that is closed, if that is on the
+/// way to a waypoint beyond the map, or home; there the way home ends. Other waypoints are flown to as they are, or
+/// not at all.
 fn open_goal(waypoint: &mut Waypoint, map: &ClearanceMap) -> Vector3<f64> {
     let goal = map.voxels().clamp(&waypoint.target);
     let is_waypoint = (goal - waypoint.target).norm() < SAME_PLACE_M;

@@ -28,8 +28,8 @@ pub struct Kept {
 
 /// Makes a velocity safe.
 pub trait VelocityFilter: std::fmt::Debug + Send {
-    /// The velocity nearest to the one desired that keeps all distances, or the way out of where none does. `others` are the
-    /// neighbours, and what moves and tells nobody where it is.
+    /// The velocity nearest to the one desired that keeps all distances, or the way out of where none does. `others`
+    /// are the neighbours, and what moves and tells nobody where it is.
     fn keep_apart(
         &mut self,
         now: Duration,
@@ -56,7 +56,8 @@ impl SafetyFilter {
         Self { fence, climb_m_s, config, evasion: Evasion::default() }
     }
 
-    /// The nearest points of the fence's walls: the filter keeps clear of them as of obstacles. From outside they are open.
+    /// The nearest points of the fence's walls: the filter keeps clear of them as of obstacles. From outside they are
+    /// open.
     fn fence_ahead(&self, position: Vector3<f64>) -> impl Iterator<Item = Vector3<f64>> + '_ {
         let Fence { min, max } = self.fence;
         let walls =

@@ -1,4 +1,5 @@
-//! Steering: the set-point of now, along the path with leave to move, else at a place; kept apart from everything either way.
+//! Steering: the set-point of now, along the path with leave to move, else at a place; kept apart from everything
+//! either way.
 
 use std::time::Duration;
 
@@ -173,7 +174,8 @@ impl Steering {
     }
 }
 
-/// Where to hover instead of at `place`, if that is closed: the nearest place that is open and to which the way is free.
+/// Where to hover instead of at `place`, if that is closed: the nearest place that is open and to which the way is
+/// free.
 fn open_place(place: &Vector3<f64>, from: &Vector3<f64>, map: &ClearanceMap) -> Vector3<f64> {
     let Some(keep_out) = map.keep_out() else { return *place };
     let is_reached = |there: &Vector3<f64>| map.is_segment_clear(from, there, 0.0);

@@ -14,8 +14,8 @@ const CLIMBING_BUDGET: usize = 40_000;
 /// As the height band of a level search: search all heights.
 const ALL_HEIGHTS: f64 = -1.0;
 
-/// Finds the path with the widest of the margins that allow one: level if there is such a path, else over or under what is
-/// in the way, and around the discs if possible.
+/// Finds the path with the widest of the margins that allow one: level if there is such a path, else over or under
+/// what is in the way, and around the discs if possible.
 #[derive(Debug, Default)]
 pub struct AstarFinder {
     astar: Astar,

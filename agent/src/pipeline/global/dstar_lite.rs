@@ -1,4 +1,5 @@
-//! D* Lite as global planner: repairs the last path, and asks A* where that does not lead to one of the margin wanted.
+//! D* Lite as global planner: repairs the last path, and asks A* where that does not lead to one of the margin
+//! wanted.
 
 use skein_planning::{
     global::{

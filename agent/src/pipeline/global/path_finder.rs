@@ -44,7 +44,8 @@ impl Task {
 pub struct Found {
     /// From the start towards the goal.
     pub path: Path,
-    /// The clearance it keeps, m. A path without one was not looked for in the map, and is kept whatever the map learns.
+    /// The clearance it keeps, m. A path without one was not looked for in the map, and is kept whatever the map
+    /// learns.
     pub clearance_m: Option<f64>,
 }
 
@@ -62,8 +63,8 @@ pub trait PathFinder: std::fmt::Debug + Send {
     /// Begins anew; [`advance`](Self::advance) does the work. What was found out before may serve again.
     fn begin(&mut self);
 
-    /// Goes on with the same task for about as long as `allowance` expansions of A* in one layer take, and takes what was used
-    /// from it. `None` if there is no answer yet.
+    /// Goes on with the same task for about as long as `allowance` expansions of A* in one layer take, and takes what
+    /// was used from it. `None` if there is no answer yet.
     fn advance(
         &mut self,
         task: &Task,

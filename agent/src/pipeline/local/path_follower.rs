@@ -26,11 +26,12 @@ pub trait PathFollower: std::fmt::Debug + Send {
     /// How the vehicle slows down and speeds up under this planner.
     fn braking(&self) -> &BrakingConfig;
 
-    /// The velocity that follows the path, no faster than `cap_m_s`. `attraction` is 1, and less while a local minimum is
-    /// escaped from.
+    /// The velocity that follows the path, no faster than `cap_m_s`. `attraction` is 1, and less while a local
+    /// minimum is escaped from.
     fn follow(&mut self, place: &Place<'_>, cap_m_s: f64, attraction: f64, map: &ClearanceMap) -> Step;
 
-    /// Takes in the obstacle points of a scan of `rays` rays that was taken at `origin`, and what is closed; metres ENU.
+    /// Takes in the obstacle points of a scan of `rays` rays that was taken at `origin`, and what is closed; metres
+    /// ENU.
     fn look(
         &mut self,
         origin: &Vector3<f64>,

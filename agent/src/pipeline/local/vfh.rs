@@ -20,8 +20,8 @@ const GENTLE_M_S2: f64 = 0.45;
 const GENTLE_BRAKE_M_S2: f64 = 0.7 * GENTLE_M_S2;
 /// Openings are looked for among what is within this distance, m.
 const OPENINGS_M: f64 = 8.0;
-/// A scan may show an obstacle this much nearer than the one before did, m: who is no faster than that allows is not stopped
-/// short by the safety filter.
+/// A scan may show an obstacle this much nearer than the one before did, m: who is no faster than that allows is not
+/// stopped short by the safety filter.
 const BESIDE_FILTER_M: f64 = 0.2;
 /// What is this much further aside than the safety filter keeps does not stand in the way, m.
 const BESIDE_WAY_M: f64 = 0.1;

@@ -1,7 +1,7 @@
 //! The rule that reads well and is wrong: enter a passage in which nobody has been heard to be.
 //!
-//! Between another's `enter` and the news of it, two that arrive together both find the passage empty. It is flown beside
-//! [`RightOfWay`](skein_agent::bthreads::RightOfWay).
+//! Between another's `enter` and the news of it, two that arrive together both find the passage empty. It is flown
+//! beside [`RightOfWay`](skein_agent::bthreads::RightOfWay).
 
 use std::collections::BTreeMap;
 
