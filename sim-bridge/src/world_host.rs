@@ -13,7 +13,7 @@ use skein_wire::{Fleet, Key, Link as _, MissionState, Payload, Scan, State, Topi
 use skein_world::{LidarScan, STEP, Simulation};
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
 
-use crate::fly::{FLEET, report, simulation_config, vehicle_name};
+use crate::fly::{FLEET, account::Account, simulation_config, vehicle_name};
 use crate::mavlink_ports::MavlinkPorts;
 use crate::scenario::Scenario;
 use crate::scene_view;
@@ -197,8 +197,8 @@ impl WorldHost {
 
     /// What may be said of the run so far.
     #[must_use]
-    pub fn account(&self) -> report::Account<'_> {
-        report::Account {
+    pub fn account(&self) -> Account<'_> {
+        Account {
             simulation: &self.simulation,
             outcomes: self.outcomes().collect(),
             set_points: Vec::new(),

@@ -1,5 +1,6 @@
 //! `fly`: a whole mission on this host, from the scenario to the summary.
 
+pub(crate) mod account;
 #[cfg(feature = "zenoh")]
 mod apart;
 mod plan_times;

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use skein_agent::{Outcome, SetPointRecord};
-use skein_world::Simulation;
+use skein_agent::Outcome;
 
+use super::account::Account;
 use super::setup::vehicle_name;
 use super::swarm::Swarm;
 use crate::scenario::Scenario;
@@ -38,24 +38,6 @@ pub fn progress(swarm: &Swarm, wall: Duration, messages: u64) -> Progress {
         arrived: swarm.outcomes().filter(|outcome| *outcome == Some(&Outcome::Complete)).count(),
         vehicles: swarm.agents().len(),
     }
-}
-
-/// What is known of a run at its end.
-pub struct Account<'a> {
-    /// The truth of it.
-    pub simulation: &'a Simulation,
-    /// How each vehicle's mission ended, by its agent's word.
-    pub outcomes: Vec<Option<Outcome>>,
-    /// What each agent made its set-points from, where that is known.
-    pub set_points: Vec<SetPointRecord>,
-    /// How long plans took, where that is known.
-    pub plan_times_ms: &'a [f64],
-    /// Events of all nodes.
-    pub events: EventCounts,
-    /// Messages of all nodes.
-    pub network: Traffic,
-    /// Hash of the run; empty where it cannot be had.
-    pub trace_hash: String,
 }
 
 /// What came of the run; `called_off` is why it was ended before it was over.

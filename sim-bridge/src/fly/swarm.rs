@@ -10,7 +10,7 @@ use skein_ground::{GroundConfig, GroundCore, Order, UnknownVehicle};
 use skein_wire::{Link, MemoryStore};
 use skein_world::{LidarScan, Simulation, Truth};
 
-use super::{plan_times::PlanTimes, report::Account, trace_hash::TraceHash};
+use super::{account::Account, plan_times::PlanTimes, trace_hash::TraceHash};
 use crate::cpu_time;
 use crate::summary::{EventCounts, Traffic};
 
