@@ -14,7 +14,7 @@ use skein_agent::pipeline::perception::{Perception, Pose};
 use skein_agent::{AgentConfig, Me};
 use skein_mav::SetPoint;
 use skein_planning::separation::{self, FilterConfig, Neighbour, filter};
-use skein_wire::event::Goto;
+use skein_wire::event::{Goto, PlanReason};
 use skein_world::{Lidar, Scene};
 
 use crate::cli::Controller;
@@ -150,7 +150,7 @@ impl<'a> Flight<'a> {
     fn plan(&mut self, times: &mut Times) -> anyhow::Result<()> {
         let since = cpu_time::this_thread()?;
         let map = self.perception.map_mut();
-        let mut report = self.guidance.plan("waypoint", &self.motion, map, &[]);
+        let mut report = self.guidance.plan(PlanReason::Waypoint, &self.motion, map, &[]);
         while report.is_none() {
             report = self.guidance.go_on_planning(map);
         }
