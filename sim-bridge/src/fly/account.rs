@@ -2,14 +2,13 @@
 
 use std::time::Duration;
 
-use skein_agent::Outcome;
+use skein_agent::{Outcome, SetPointRecord};
+use skein_world::Simulation;
 
-use super::account::Account;
 use super::setup::vehicle_name;
 use crate::scenario::Scenario;
 use crate::summary::{self, Collisions, EventCounts, PlanTimes, Spread, Summary, Traffic, VehicleSummary};
 
-<<<<<<<< HEAD:sim-bridge/src/fly/account.rs
 /// The facts of a run at its end.
 pub struct Account<'a> {
     /// The truth of it.
@@ -29,38 +28,6 @@ pub struct Account<'a> {
 }
 
 /// The summary of the run; `called_off` is the reason why it was ended before it was over.
-========
-/// The live table's rows.
-pub fn rows(swarm: &Swarm) -> Vec<Row> {
-    let now = swarm.now();
-    let row = |agent: &skein_agent::AgentCore| {
-        let status = agent.status(now);
-        Row {
-            vehicle: agent.name().to_string(),
-            mode: status.mode,
-            task: status.task,
-            waiting_for: status.waiting_for,
-            battery: Some(status.battery),
-            nearest: status.nearest.map(|(node, distance_m)| (node.to_string(), distance_m)),
-        }
-    };
-    swarm.agents().map(row).collect()
-}
-
-/// The live table's header.
-pub fn progress(swarm: &Swarm, wall: Duration, messages: u64) -> Progress {
-    Progress {
-        sim_time_s: swarm.now().as_secs_f64(),
-        realtime_factor: swarm.now().as_secs_f64() / wall.as_secs_f64().max(1e-9),
-        events: swarm.events().occurred,
-        messages,
-        arrived: swarm.outcomes().filter(|outcome| *outcome == Some(&Outcome::Complete)).count(),
-        vehicles: swarm.agents().len(),
-    }
-}
-
-/// What came of the run; `called_off` is why it was ended before it was over.
->>>>>>>> program:sim-bridge/src/fly/report.rs
 pub fn summary(
     scenario: &Scenario,
     account: &Account<'_>,
