@@ -150,7 +150,10 @@ fn a_script_requests_only_what_it_may() {
         (json!({"name": "uav/1/order", "data": {"what": "hand_back"}}), "hand_back"),
         (json!({"name": "uav/1/order", "data": {"what": "$what"}}), "$what"),
         (json!({"name": "uav/2/order", "data": {"what": "land"}}), "uav/2/order"),
-        (json!("uav/1/scripted"), "they may request `uav/1/order` with `what` one of goto"),
+        (
+            json!("uav/1/scripted"),
+            "they may request `uav/1/order` with `what` one of hold, resume, land, return, goto",
+        ),
         (json!("uav/1/battery"), "uav/1/battery"),
     ] {
         let error = refusal(json!([{"sync": {"request": request}}]));
@@ -196,7 +199,7 @@ fn the_way_home_stays_open_whatever_a_script_blocks() {
     assert!(!vehicle.moves());
     let verbs = vehicle.verbs_after(OrderTaken::plain(What::Return).at(ME));
     assert_eq!(verbs, ["order", "return", "goto", "plan"]);
-    let planned = mine(Planned::NAME).with("leg", bthreads::HOME_LEG);
+    let planned = Planned { leg: bthreads::HOME_LEG, length_m: 9.0 }.at(ME);
     assert_eq!(vehicle.verbs_after(planned), ["planned", "homeward"]);
 }
 

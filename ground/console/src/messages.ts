@@ -176,4 +176,3 @@ export type StateView = { position: [number, number, number], velocity: [number,
 export type To = string | Array<string>;
 
 export type VehicleView = { name: string, heard: boolean, link: LinkView, notes: Array<string>, };
-

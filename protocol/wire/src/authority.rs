@@ -25,7 +25,8 @@ pub fn standard_authority() -> Authority {
     let joint = || EventSet::from(format!("{SWARM}/**"));
     let command = Grant {
         request: of_every_vehicle::<(Takeoff, OrderTaken, Load, Unload)>()
-            .or(<(NewRoster, Lift)>::any_of("*/*"))
+            .or(NewRoster::any_of("*/*"))
+            .or(Lift::any_of("*/*"))
             .or(joint()),
         block: of_every_vehicle::<(Takeoff, Goto, Advance)>().or(Enter::any_of("*/*")).or(joint()),
     };

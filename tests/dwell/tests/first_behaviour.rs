@@ -1,7 +1,5 @@
 //! docs/first-behaviour.md: its code stands in the files that it names, and its commands print what it shows.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
-
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};

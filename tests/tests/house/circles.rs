@@ -106,7 +106,8 @@ impl<'ast> Visit<'ast> for Reader<'_> {
 
     fn visit_path(&mut self, path: &'ast syn::Path) {
         let parts: Path = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
-        if parts.len() > 1 {
+        // `child::item` names a part of the module itself.
+        if parts.len() > 1 && ["crate", "super", "self"].contains(&parts[0].as_str()) {
             self.named.paths.extend(self.absolute(&parts));
         }
         visit::visit_path(self, path);
@@ -136,17 +137,10 @@ fn imports(modules: &Modules) -> BTreeMap<Path, BTreeSet<Path>> {
     let named: BTreeMap<_, _> = modules.iter().map(read).collect();
     let homes = |path: &Path, said: &Named| {
         let homes = said.paths.iter().filter_map(|named_path| home_of(named_path, modules, &named, 0));
-        // A file that hands on what its folder holds does not use it.
-        let is_door = |home: &Path| home.starts_with(path) && only_hands_on(said, home);
-        homes.filter(|home| home != path && !is_door(home)).collect()
+        // A file is the door of its folder, and may use what is in it.
+        homes.filter(|home| !home.starts_with(path)).collect()
     };
     named.iter().map(|(path, said)| (path.clone(), homes(path, said))).collect()
-}
-
-fn only_hands_on(said: &Named, home: &Path) -> bool {
-    let leads_there = |path: &&Path| path.starts_with(home);
-    said.paths.iter().filter(leads_there).count()
-        == said.handed_on.iter().filter(|(_, path)| path.starts_with(home)).count()
 }
 
 /// The groups of files each of which leads to every other one.

@@ -46,7 +46,12 @@ pub fn roots(folder: &Path) -> Vec<PathBuf> {
             roots.push(if is_program { path } else { path.join("main.rs") });
         }
     }
+    let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
+    let named = manifest.lines().filter_map(|line| line.strip_prefix("path = \"")?.strip_suffix('"'));
+    roots.extend(named.map(|file| folder.join(file)));
     roots.retain(|file| file.is_file());
+    roots.sort();
+    roots.dedup();
     roots
 }
 

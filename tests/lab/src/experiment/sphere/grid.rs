@@ -7,16 +7,6 @@ use nalgebra::Vector3;
 /// A uniform grid (Green 2010, "Particle simulation using CUDA", with the cells sorted rather than hashed). Making it takes `O(n log n)`
 /// steps. Looking around a place costs nine searches of `O(log n)`, and one comparison for each vehicle in the 27 cells
 /// there: with an edge of the distance that is looked at, about as many as are near.
-///
-/// ```
-/// use nalgebra::Vector3;
-/// use skein_planning::separation::Grid;
-///
-/// let vehicles = [Vector3::zeros(), Vector3::new(2.0, 0.0, 0.0), Vector3::new(9.0, 0.0, 0.0)];
-/// let grid = Grid::new(&vehicles, 3.0);
-/// let near: Vec<usize> = grid.within(&Vector3::new(1.0, 0.0, 0.0), 3.0).collect();
-/// assert_eq!(near, [0, 1]);
-/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     edge_m: f64,
@@ -83,6 +73,14 @@ fn cell(place: &Vector3<f64>, edge_m: f64) -> Cell {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn those_within_reach_are_found_and_no_others() {
+        let vehicles = [Vector3::zeros(), Vector3::new(2.0, 0.0, 0.0), Vector3::new(9.0, 0.0, 0.0)];
+        let grid = Grid::new(&vehicles, 3.0);
+        let near: Vec<usize> = grid.within(&Vector3::new(1.0, 0.0, 0.0), 3.0).collect();
+        assert_eq!(near, [0, 1]);
+    }
     use proptest::prelude::*;
 
     #[test]
