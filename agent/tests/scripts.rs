@@ -151,7 +151,7 @@ fn a_script_requests_only_what_it_may() {
         (json!({"name": "uav/1/order", "data": {"what": "hand_back"}}), "hand_back"),
         (json!({"name": "uav/1/order", "data": {"what": "$what"}}), "$what"),
         (json!({"name": "uav/2/order", "data": {"what": "land"}}), "uav/2/order"),
-        (json!("uav/1/scripted"), "they may request `uav/1/order` with `what` one of goto"),
+        (json!("uav/1/scripted"), "they may request `uav/1/order` with `what` one of hold"),
         (json!("uav/1/battery"), "uav/1/battery"),
     ] {
         let error = refusal(json!([{"sync": {"request": request}}]));
@@ -160,6 +160,43 @@ fn a_script_requests_only_what_it_may() {
     for request in [json!({"name": "uav/1/order", "data": {"what": "land"}}), json!("uav/1/script/done")] {
         Vehicle::in_the_air().load(&script(json!([{"sync": {"request": request}}]))).unwrap();
     }
+}
+
+#[test]
+fn a_script_speaks_of_fields_that_there_are_and_of_what_they_may_be() {
+    let order = |data: Value| json!({"request": {"name": "uav/1/order", "data": data}});
+    for (sync, why) in [
+        (
+            order(json!({"what": "land", "speed": 3})),
+            "it requests the field `speed`, and there is no such field: `order` has `what`, `x`, `y`, `z`, `by`",
+        ),
+        (
+            order(json!({"what": "goto", "x": "far"})),
+            "`x` of `order` as \"far\": expected number in m, or none",
+        ),
+        (json!({"wait": {"any_data": "uav/1/arrived", "data_has": {"what": 1}}}), "`arrived` has `leg`"),
+        (json!({"wait": {"any_data": "uav/1/arrived", "data_has": {"leg": 1.5}}}), "expected whole number"),
+        (json!({"wait": {"any_data": "uav/1/landed", "data_has": {"leg": 1}}}), "`landed` has none"),
+        (
+            json!({"wait": {"any_data": "uav/1/plan", "data_has": {"why": "bored"}}}),
+            "waypoint, obstacle, stuck",
+        ),
+        (json!({"wait": {"any_data": "uav/1/battery", "data_has": {"percent": 120}}}), "0 to 100"),
+        (
+            json!({"wait": {"any_data": "uav/1/neighbour", "field_range": {"key": "node", "max": 3}}}),
+            "`node` of `neighbour` as a number: expected text",
+        ),
+        (
+            json!({"wait": {"any_data": "uav/1/landed", "region": {"min": [0, 0, 0], "max": [1, 1, 1]}}}),
+            "the field `x`",
+        ),
+    ] {
+        let error = refusal(json!([{"sync": sync}]));
+        assert!(error.contains(why), "{error} does not say {why}");
+    }
+    let order = order(json!({"what": "goto", "x": "$x", "y": 2, "z": 3.0, "by": "script/test"}));
+    let wait = json!({"wait": {"any_data": "uav/1/neighbour", "data_has": {"node": "uav/2"}}});
+    Vehicle::in_the_air().load(&script(json!([{"sync": wait}, {"sync": order}]))).unwrap();
 }
 
 #[test]
