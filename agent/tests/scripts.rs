@@ -165,6 +165,43 @@ fn a_script_requests_only_what_it_may() {
 }
 
 #[test]
+fn a_script_speaks_of_fields_that_there_are_and_of_what_they_may_be() {
+    let order = |data: Value| json!({"request": {"name": "uav/1/order", "data": data}});
+    for (sync, why) in [
+        (
+            order(json!({"what": "land", "speed": 3})),
+            "it requests the field `speed`, and there is no such field: `order` has `what`, `x`, `y`, `z`, `by`",
+        ),
+        (
+            order(json!({"what": "goto", "x": "far"})),
+            "`x` of `order` as \"far\": expected number in m, or none",
+        ),
+        (json!({"wait": {"any_data": "uav/1/arrived", "data_has": {"what": 1}}}), "`arrived` has `leg`"),
+        (json!({"wait": {"any_data": "uav/1/arrived", "data_has": {"leg": 1.5}}}), "expected whole number"),
+        (json!({"wait": {"any_data": "uav/1/landed", "data_has": {"leg": 1}}}), "`landed` has none"),
+        (
+            json!({"wait": {"any_data": "uav/1/plan", "data_has": {"why": "bored"}}}),
+            "waypoint, obstacle, stuck",
+        ),
+        (json!({"wait": {"any_data": "uav/1/battery", "data_has": {"percent": 120}}}), "0 to 100"),
+        (
+            json!({"wait": {"any_data": "uav/1/neighbour", "field_range": {"key": "node", "max": 3}}}),
+            "`node` of `neighbour` as a number: expected text",
+        ),
+        (
+            json!({"wait": {"any_data": "uav/1/landed", "region": {"min": [0, 0, 0], "max": [1, 1, 1]}}}),
+            "the field `x`",
+        ),
+    ] {
+        let error = refusal(json!([{"sync": sync}]));
+        assert!(error.contains(why), "{error} does not say {why}");
+    }
+    let order = order(json!({"what": "goto", "x": "$x", "y": 2, "z": 3.0, "by": "script/test"}));
+    let wait = json!({"wait": {"any_data": "uav/1/neighbour", "data_has": {"node": "uav/2"}}});
+    Vehicle::in_the_air().load(&script(json!([{"sync": wait}, {"sync": order}]))).unwrap();
+}
+
+#[test]
 fn a_script_blocks_no_safety_event_however_it_is_named() {
     let catalogue = Catalogue::standard();
     let own = catalogue.own().map(|event| event.name);
