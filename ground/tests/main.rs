@@ -3,6 +3,7 @@
 #![allow(clippy::panic, clippy::unwrap_used)] // A test fails by panicking.
 
 mod explain;
+#[cfg(feature = "zenoh")]
 mod explain_command;
 mod recorder;
 mod station;

@@ -34,7 +34,7 @@ impl Hold {
         if self.held.len() == self.vehicles.len() {
             of_every_vehicle::<Advance>()
         } else {
-            EventSet::any_of(self.held.iter().map(|vehicle| of::<Advance>(vehicle)))
+            EventSet::any_of(self.held.iter().map(of::<Advance>))
         }
     }
 }

@@ -1,5 +1,5 @@
 //! The crate's tests, in one program.
 
-#![allow(clippy::unwrap_used)] // A test fails by panicking.
+#![allow(clippy::unwrap_used, clippy::panic)] // A test fails by panicking.
 
 mod first_behaviour;

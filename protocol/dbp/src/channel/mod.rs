@@ -10,7 +10,7 @@ use std::time::Duration;
 use crate::channel::peers::Peers;
 #[cfg(feature = "mutants")]
 use crate::channel::stream::Heard;
-use crate::channel::stream::Stream;
+use crate::channel::stream::{Hole, Stream};
 use crate::clock::Clock;
 use crate::config::{LEAST_LEASE, NodeConfig};
 use crate::facts::DuplicateName;
@@ -167,7 +167,7 @@ impl Channel {
         me: &NodeName,
         coordinator: &NodeName,
         term: u64,
-        holes: Vec<(u64, u64)>,
+        holes: Vec<Hole>,
     ) {
         if let Some(incarnation) = self.peers.incarnation(coordinator) {
             self.outgoing.extend(repairs(me, coordinator, incarnation, term, holes));
@@ -221,7 +221,7 @@ fn repairs(
     home: &NodeName,
     incarnation: u64,
     term: u64,
-    holes: Vec<(u64, u64)>,
+    holes: Vec<Hole>,
 ) -> impl Iterator<Item = (Recipient, Message)> {
     holes.into_iter().map(move |(from_seq, to_seq)| {
         let (home, requester) = (home.clone(), me.clone());

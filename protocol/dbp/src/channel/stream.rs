@@ -21,6 +21,9 @@ pub(crate) enum Heard {
     Gap { from: u64, to: u64 },
 }
 
+/// The first and the last number of occurrences that are missed.
+pub(crate) type Hole = (u64, u64);
+
 /// The occurrences of one home, as far as they are known.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Stream {
@@ -121,7 +124,7 @@ impl Stream {
     }
 
     /// The home's incarnation and the holes to ask for now, both ends included; asks again `patience` later.
-    pub(crate) fn repair(&mut self, now: Duration, patience: Duration) -> Option<(u64, Vec<(u64, u64)>)> {
+    pub(crate) fn repair(&mut self, now: Duration, patience: Duration) -> Option<(u64, Vec<Hole>)> {
         let incarnation = self.incarnation?;
         let holes = self.holes();
         if holes.is_empty() || now < self.repair_due {
@@ -137,7 +140,7 @@ impl Stream {
     }
 
     /// The first few holes.
-    fn holes(&self) -> Vec<(u64, u64)> {
+    fn holes(&self) -> Vec<Hole> {
         let Some(applied) = self.applied else { return Vec::new() };
         let (mut holes, mut from) = (Vec::new(), applied + 1);
         for next in self.pending.keys().copied().chain([self.latest + 1]) {

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use skein_bp::{Bid, Event, Program};
 
+use crate::channel::stream::Hole;
 use crate::clock::Clock;
 use crate::config::NodeConfig;
 use crate::facts::{InStep, OutOfStep};
@@ -187,11 +188,7 @@ impl Joint {
     }
 
     /// Asks for the decisions that are missed: gives the coordinator, the term and their numbers.
-    pub(crate) fn missed(
-        &mut self,
-        now: Duration,
-        lease: Duration,
-    ) -> Option<(&NodeName, u64, Vec<(u64, u64)>)> {
+    pub(crate) fn missed(&mut self, now: Duration, lease: Duration) -> Option<(&NodeName, u64, Vec<Hole>)> {
         let term = self.followed()?;
         let (number, holes) = term.stream.repair(now, lease / 10)?;
         Some((&term.roster.coordinator, number, holes))
