@@ -96,6 +96,7 @@ fn json_is_one_object_on_standard_output_on_failure_too() {
 
 #[test]
 fn ctrl_c_lands_everyone_and_finishes_the_files() {
+    let _turn = crate::turn::turn();
     let folder = tempfile::tempdir().expect("a folder");
     let mut program = Command::new(env!("CARGO_BIN_EXE_skein-sim"))
         .args(["fly", "open", "--clock", "real", "--speed", "2", "--headless", "--out"])

@@ -8,4 +8,5 @@ mod missions;
 mod moving_obstacle;
 mod other_peoples_tools;
 mod scenario_files;
+mod turn;
 mod zones;

@@ -1,14 +1,11 @@
 //! Tools that others wrote read what Skein writes, and fly what it simulates; scripts of one's own take part.
-//!
-//! The tests share the UDP ports of `serve` or measure times, so they take turns.
 
 use std::io::{Read as _, Write as _};
 use std::net::UdpSocket;
 use std::process::{Child, Command, Stdio};
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-static TURN: Mutex<()> = Mutex::new(());
+use crate::turn::turn;
 
 /// The Python that has the packages of `tests/python/requirements.txt`: `SKEIN_PYTHON`, or `python3`.
 fn python_with(packages: &str) -> Option<String> {
@@ -25,7 +22,7 @@ fn python_with(packages: &str) -> Option<String> {
 /// Runs a script that starts the simulator itself, if there is a Python that has what it needs.
 fn run_script(name: &str, packages: &str) {
     let Some(python) = python_with(packages) else { return };
-    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let _turn = turn();
     let status = Command::new(python)
         .arg(script(name))
         .env("SKEIN_SIM", env!("CARGO_BIN_EXE_skein-sim"))
@@ -88,7 +85,7 @@ fn pypi_mcap_reads_a_mission() {
 
 #[test]
 fn garbage_on_a_mavlink_socket_has_no_effect() {
-    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let _turn = turn();
     let mut serve = Ended(
         Command::new(env!("CARGO_BIN_EXE_skein-sim"))
             .args(["serve", "open", "--vehicles", "1"])

@@ -7,7 +7,7 @@ use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::MutexGuard;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -17,7 +17,8 @@ use skein_tests::skipped;
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket};
 
-static TURN: Mutex<()> = Mutex::new(());
+use crate::turn::turn;
+
 /// Other swarms on this computer keep their ports.
 const PORT_OFFSET: &str = "3000";
 /// No flight here takes longer.
@@ -177,7 +178,7 @@ struct Flight {
 
 impl Flight {
     fn start(arguments: &[&str]) -> Self {
-        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        let turn = turn();
         let folder = tempfile::tempdir().unwrap();
         let mut program = Command::new(skein_sim())
             .arg("fly")

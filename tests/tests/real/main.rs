@@ -5,3 +5,4 @@
 mod console;
 mod processes;
 mod real_clock;
+mod turn;

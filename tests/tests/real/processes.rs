@@ -20,10 +20,12 @@ fn try_out(fault: Fault, port_offset: u16, network: Network) {
 
 #[test]
 fn without_its_ground_station_every_vehicle_finishes_and_the_recording_is_readable() {
+    let _turn = crate::turn::turn();
     try_out(Fault::GroundKilled, 4000, Network::Peer);
 }
 
 #[test]
 fn a_vehicle_that_is_cut_off_from_the_router_shares_the_window_with_nobody_and_comes_back() {
+    let _turn = crate::turn::turn();
     try_out(Fault::NodeCut, 4600, Network::Router);
 }

@@ -5,6 +5,7 @@ use skein_tests::{flight, fly};
 
 #[test]
 fn a_swarm_flies_in_real_time_over_zenoh_from_fresh_inputs_only() {
+    let _turn = crate::turn::turn();
     let mut flight = flight("open", 1);
     flight.clock = Clock::Real;
     flight.speed = 2.0;
