@@ -1,5 +1,5 @@
-//! What one vehicle's agent must know. The parts that a user writes are read and written as they stand here, by `agent.toml`
-//! and by whatever else configures a vehicle.
+//! What one vehicle's agent must know. The parts that a user writes are read and written as they stand here, by
+//! `agent.toml` and by whatever else configures a vehicle.
 
 use std::time::Duration;
 

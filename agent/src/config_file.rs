@@ -172,8 +172,8 @@ impl Config {
 }
 
 impl AgentFile {
-    /// The file of a vehicle whose autopilot and lidar are reached in these ways. The files of its scripts are still to be
-    /// named.
+    /// The file of a vehicle whose autopilot and lidar are reached in these ways. The files of its scripts are still
+    /// to be named.
     #[must_use]
     pub fn of(agent: &AgentConfig, link: Address, sensor: &str, network: NetworkSettings) -> Self {
         Self {

@@ -88,9 +88,9 @@ impl AgentCore {
         Ok(Self { control, mission, next_cycle: Duration::ZERO, last_tick: None })
     }
 
-    /// The same agent, which keeps the scripts that are sent to it in `store`. Of those `kept` by a former life, each runs
-    /// again from its beginning if it passes all checks anew, once the vehicle is ready on the ground or an operator lets it
-    /// go on in the air; one that does not is refused, and forgotten.
+    /// The same agent, which keeps the scripts that are sent to it in `store`. Of those `kept` by a former life, each
+    /// runs again from its beginning if it passes all checks anew, once the vehicle is ready on the ground or an
+    /// operator lets it go on in the air; one that does not is refused, and forgotten.
     #[must_use]
     pub fn keeping_scripts(mut self, store: Box<dyn Store<Vec<KeptScript>>>, kept: &[KeptScript]) -> Self {
         self.mission.keep_scripts(store, kept);

@@ -116,7 +116,8 @@ impl Flight {
             (Instruction::Land, FlightPhase::Flying) => {
                 self.phase = FlightPhase::Settling { until: now + SETTLES_FOR };
             }
-            // Said again it changes nothing: to come down upon somebody is worse than some seconds more of an empty battery.
+            // Said again it changes nothing: to come down upon somebody is worse than some seconds more of an empty
+            // battery.
             (Instruction::Land, FlightPhase::Grounded | FlightPhase::Settling { .. }) => {}
             (Instruction::Land, _) => self.touch_down(now, companion),
             (Instruction::Hold, FlightPhase::Adopted) => companion.command(now, Command::Hold),

@@ -1,8 +1,9 @@
-//! One vehicle's program: b-threads that decide *what* may be done, a pipeline that decides *how*, and the core around them.
+//! One vehicle's program: b-threads that decide *what* may be done, a pipeline that decides *how*, and the core
+//! around them.
 //!
-//! [`AgentCore`] does no I/O and reads no clock. A driver feeds it MAVLink bytes and lidar scans, ticks it every 20 ms with a
-//! [`Link`](skein_wire::Link) to the other nodes, and carries its MAVLink bytes to the autopilot. So the same agent flies
-//! on a vehicle, over Zenoh on one host, and in lockstep.
+//! [`AgentCore`] does no I/O and reads no clock. A driver feeds it MAVLink bytes and lidar scans, ticks it every 20
+//! ms with a [`Link`](skein_wire::Link) to the other nodes, and carries its MAVLink bytes to the autopilot. So the
+//! same agent flies on a vehicle, over Zenoh on one host, and in lockstep.
 
 mod agent_error;
 mod airspace_table;

@@ -1,8 +1,9 @@
-//! What a vehicle knows of the others: their last word, which stays, as a ghost that the safety filter lets grow, when they fall silent.
+//! What a vehicle knows of the others: their last word, which stays, as a ghost that the safety filter lets grow,
+//! when they fall silent.
 //!
-//! How old a word is, the time on the network included, is known from echoes: each vehicle tells the others in turn what it
-//! has last heard of them. From the round trip follows where the other's clock stands (NTP, RFC 5905), and from that the
-//! age of everything it says, whichever way each message took.
+//! How old a word is, the time on the network included, is known from echoes: each vehicle tells the others in turn
+//! what it has last heard of them. From the round trip follows where the other's clock stands (NTP, RFC 5905), and
+//! from that the age of everything it says, whichever way each message took.
 
 use std::{collections::BTreeMap, time::Duration};
 
@@ -13,9 +14,11 @@ use skein_wire::{Echo, State};
 
 use crate::config::Envelope;
 
-/// A neighbour silent for longer than this is not relied on to keep its distance: with three of ten messages lost, that is one in 170 000.
+/// A neighbour silent for longer than this is not relied on to keep its distance: with three of ten messages lost,
+/// that is one in 170 000.
 const SILENT_AFTER: Duration = Duration::from_millis(1000);
-/// Clocks drift apart by no more than this, seconds in a second: a round trip that took this much longer by now tells as much.
+/// Clocks drift apart by no more than this, seconds in a second: a round trip that took this much longer by now tells
+/// as much.
 const DRIFT: f64 = 1e-3;
 /// What was heard longer ago is not told back.
 const ECHO_FOR: Duration = Duration::from_millis(500);
@@ -214,7 +217,8 @@ mod tests {
         neighbours.at(now).next().unwrap().track.age_s
     }
 
-    /// Two vehicles whose clocks are 70 s apart tell one another where they are; a message takes `there` one way and `back` the other.
+    /// Two vehicles whose clocks are 70 s apart tell one another where they are; a message takes `there` one way and
+    /// `back` the other.
     fn converse(there: Duration, back: Duration) -> (Neighbours, Duration) {
         let apart = ms(70_000);
         let (mut one, mut other) = (Neighbours::new(name(1), 1), Neighbours::new(name(2), 1));

@@ -6,8 +6,8 @@ use skein_wire::event::{Catalogue, Goto};
 use crate::bthreads::HOME_LEG;
 use crate::me::Me;
 
-/// What no remote b-thread can block, and only the operator's gateway can request; the waypoint at home is part of it, for
-/// without it `return` would lead nowhere.
+/// What no remote b-thread can block, and only the operator's gateway can request; the waypoint at home is part of
+/// it, for without it `return` would lead nowhere.
 pub(crate) fn safety_events(me: &Me, events: &Catalogue) -> EventSet {
     me.any_in(events.own()).or(me.any::<Goto>().and(Goto::leg(HOME_LEG)))
 }

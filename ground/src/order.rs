@@ -69,7 +69,8 @@ impl SentScript {
     /// Makes a script ready to be sent. Each vehicle checks it again, and more: whether it keeps to its rights there.
     ///
     /// # Errors
-    /// [`UnfitScript`] when an argument is not what its parameter may be, the script is too long, or a trial goes wrong.
+    /// [`UnfitScript`] when an argument is not what its parameter may be, the script is too long, or a trial goes
+    /// wrong.
     pub fn new(assignment: &Assignment) -> Result<Self, UnfitScript> {
         let bound = assignment.bind("uav/1")?;
         bound.bthread.try_out(STATES_TRIED)?;

@@ -148,8 +148,8 @@ impl OrderLog {
     }
 }
 
-/// Whether whoever has not taken in the `old` order need not any more. A launch is about those on the ground: it takes the
-/// place of no order, and only who calls all down calls it off. Scripts are beside all that.
+/// Whether whoever has not taken in the `old` order need not any more. A launch is about those on the ground: it
+/// takes the place of no order, and only who calls all down calls it off. Scripts are beside all that.
 fn supersedes(new: &Order, old: &Order) -> bool {
     match (new, old) {
         (new, _) if new.what().is_launch() => false,

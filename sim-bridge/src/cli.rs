@@ -83,8 +83,8 @@ pub struct Fly {
     /// Factor over real time; `--clock real` only.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
     pub speed: f64,
-    /// Controller on board: behavioural programs, one sequential loop that hears no orders, or none, with which the vehicles
-    /// stay where they are.
+    /// Controller on board: behavioural programs, one sequential loop that hears no orders, or none, with which the
+    /// vehicles stay where they are.
     #[arg(long, value_enum, default_value_t = Controller::Bp)]
     pub controller: Controller,
     /// Folder for summary.json and mission.mcap; made if missing.

@@ -170,8 +170,8 @@ impl Setup {
     }
 }
 
-/// A file that explains its fields, with those of `config` filled in where they stand, commented out or not; what has no
-/// place there follows at the end.
+/// A file that explains its fields, with those of `config` filled in where they stand, commented out or not; what has
+/// no place there follows at the end.
 fn filled_in(example: &str, config: &impl Serialize) -> anyhow::Result<String> {
     let mut config = toml::Table::try_from(config)?;
     let (mut text, mut table) = (String::new(), None);

@@ -1,7 +1,7 @@
 //! One-host runs: scenarios, the lockstep and real-time runners, summaries.
 //!
-//! [`fly`] hosts a whole swarm in one process, or starts one process for each of its nodes; `serve` hosts the world alone,
-//! for agents and MAVLink clients in other processes. All take a [`scenario`].
+//! [`fly`] hosts a whole swarm in one process, or starts one process for each of its nodes; `serve` hosts the world
+//! alone, for agents and MAVLink clients in other processes. All take a [`scenario`].
 
 pub mod check;
 pub mod cli;

@@ -41,7 +41,8 @@ pub struct Summary {
     pub events: EventCounts,
     /// Traffic between nodes.
     pub network: Traffic,
-    /// Hash over every selected event and every pose: equal hashes mean equal runs. Empty for runs in several processes.
+    /// Hash over every selected event and every pose: equal hashes mean equal runs. Empty for runs in several
+    /// processes.
     pub trace_hash: String,
     /// One entry a vehicle, in order.
     pub per_vehicle: Vec<VehicleSummary>,
@@ -151,7 +152,8 @@ pub struct VehicleSummary {
     /// From take-off to landing; 0 if it never flew.
     pub flight_time_s: f64,
     pub path_length_m: f64,
-    /// Set-points made from fresh inputs, and the greatest age of an input to one of them, which must not exceed 200 ms.
+    /// Set-points made from fresh inputs, and the greatest age of an input to one of them, which must not exceed 200
+    /// ms.
     pub set_points: u64,
     /// See `set_points`.
     pub oldest_input_ms: f64,

@@ -380,7 +380,8 @@ fn published_lsc_missions_are_read_with_their_worlds() -> Result<(), Box<dyn std
     Ok(())
 }
 
-/// A plan whose geofence excludes a circle of 5 m at (20, 0) and a triangle around (0, 20), and includes a large circle.
+/// A plan whose geofence excludes a circle of 5 m at (20, 0) and a triangle around (0, 20), and includes a large
+/// circle.
 fn fenced(items: &[String]) -> String {
     let corner = |x: f64, y: f64| {
         let place = HOME.to_geodetic(&Vector3::new(x, y, 0.0));

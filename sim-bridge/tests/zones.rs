@@ -1,4 +1,5 @@
-//! Vehicles keep out of what is known to be closed: on their way, around what they had not known of, and on the way home.
+//! Vehicles keep out of what is known to be closed: on their way, around what they had not known of, and on the way
+//! home.
 
 use nalgebra::Vector3;
 use skein_agent::pipeline::global::{Found, PathFinder, Task};

@@ -6,8 +6,8 @@
 //! [`passage`] finds the places that only one vehicle should be in.
 //! An [`airspace`] holds terrain, threats and no-fly zones that are known beforehand.
 //!
-//! Nothing here reads a clock, and random numbers come from a seed that is given: the same inputs give the same outputs,
-//! bit for bit. Budgets count expansions or evaluations. The world frame is ENU; metres, seconds, radians.
+//! Nothing here reads a clock, and random numbers come from a seed that is given: the same inputs give the same
+//! outputs, bit for bit. Budgets count expansions or evaluations. The world frame is ENU; metres, seconds, radians.
 //!
 //! ```
 //! use nalgebra::Vector3;

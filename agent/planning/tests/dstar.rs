@@ -1,4 +1,5 @@
-//! A way that is repaired is as good as one that is searched for, whatever the map has learnt and wherever the vehicle went.
+//! A way that is repaired is as good as one that is searched for, whatever the map has learnt and wherever the
+//! vehicle went.
 
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;

@@ -125,8 +125,8 @@ proptest! {
         let back = first_passage(&map, &path(&[ends[1], [0.0, 0.0], ends[0]]), 0.0, &PassageConfig::default());
         prop_assert!(there.is_some() && back.is_some(), "{there:?} {back:?}");
         let (there, back) = (there.unwrap(), back.unwrap());
-        // Where a slanted path passes trunks of a few voxels, the points that face it may differ by half a voxel more. Right of way
-        // takes passages within 3 m for one.
+        // Where a slanted path passes trunks of a few voxels, the points that face it may differ by half a voxel
+        // more. Right of way takes passages within 3 m for one.
         prop_assert!((there.centre - back.centre).norm() <= 0.6, "{there:?} {back:?}");
         prop_assert!(there.centre.xy().norm() <= 0.4, "{there:?}");
     }

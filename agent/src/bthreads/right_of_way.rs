@@ -28,8 +28,8 @@ pub const NAME: &str = "right_of_way";
 const SAME_PASSAGE_M: f64 = 3.0;
 /// A vehicle that gave way claims again when it hears that another has left a passage, or after this long.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Claims that were made apart are known to both sides so many leases after they have met again: records are repeated every
-/// tenth of one.
+/// Claims that were made apart are known to both sides so many leases after they have met again: records are repeated
+/// every tenth of one.
 const MEETING_LEASES: f64 = 1.5;
 
 /// Claims a passage, enters it when the claim is confirmed, and lets go behind it.
@@ -68,7 +68,8 @@ enum Phase {
 }
 
 impl RightOfWay {
-    /// The b-thread of vehicle `me`; `others` are the other vehicles and the ground station, `lease` is that of their bids.
+    /// The b-thread of vehicle `me`; `others` are the other vehicles and the ground station, `lease` is that of their
+    /// bids.
     #[must_use]
     pub fn new<'a>(me: Me, others: impl IntoIterator<Item = &'a str>, lease: Duration) -> Self {
         let others = others.into_iter().map(|node| (node.to_owned(), Other::Unheard)).collect();

@@ -1,4 +1,5 @@
-//! Together: the swarm's joint launch and joint abort, which the whole roster learns of before anything else is decided.
+//! Together: the swarm's joint launch and joint abort, which the whole roster learns of before anything else is
+//! decided.
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};

@@ -1,5 +1,5 @@
-//! Evasion: out of a place where no velocity keeps all distances. The vehicle brakes, and if that does not help, one of two climbs and
-//! the other sinks, by rank.
+//! Evasion: out of a place where no velocity keeps all distances. The vehicle brakes, and if that does not help, one
+//! of two climbs and the other sinks, by rank.
 
 use std::time::Duration;
 
@@ -47,8 +47,9 @@ pub struct Evasion {
 impl Evasion {
     /// The way to leave the height at `now`, after the filter said `outcome`; `None` to stay.
     ///
-    /// `rank` is the number of neighbours whose names come before this vehicle's: of two, the one whose name comes first climbs. Both
-    /// judge alike without a word. `room` is asked only when it matters. Who has no room that way takes the other; with none either way it stays and brakes.
+    /// `rank` is the number of neighbours whose names come before this vehicle's: of two, the one whose name comes
+    /// first climbs. Both judge alike without a word. `room` is asked only when it matters. Who has no room that way
+    /// takes the other; with none either way it stays and brakes.
     pub fn decide(
         &mut self,
         now: Duration,

@@ -78,7 +78,8 @@ impl Guidance {
         self.planning.abandon();
     }
 
-    /// A place on the path so far ahead that a vehicle whose leave to move ends now stops well before it; none without a path.
+    /// A place on the path so far ahead that a vehicle whose leave to move ends now stops well before it; none
+    /// without a path.
     #[must_use]
     pub fn place_ahead(&self) -> Option<Vector3<f64>> {
         let following = self.course.following.as_ref()?;
@@ -100,7 +101,8 @@ impl Guidance {
         self.note(report)
     }
 
-    /// Goes on with a plan that the ticks before were not enough for. Once in each tick, before anything else is planned.
+    /// Goes on with a plan that the ticks before were not enough for. Once in each tick, before anything else is
+    /// planned.
     pub fn go_on_planning(&mut self, map: &mut ClearanceMap) -> Option<Report> {
         let report = self.planning.go_on(&mut self.course, map);
         self.note(report)
@@ -125,7 +127,8 @@ impl Guidance {
         self.progress.look_ahead(now, has_leave, &mut self.course, motion, map, neighbours)
     }
 
-    /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles either way.
+    /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles
+    /// either way.
     pub fn steer(&mut self, now: Duration, motion: &Motion, surroundings: &Surroundings<'_>) -> SetPoint {
         let has_leave = now <= self.leave_until;
         // Until there is a new path, a blocked one is not flown.

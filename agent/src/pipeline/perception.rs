@@ -80,8 +80,8 @@ impl Perception {
         Ok(perception.with_keep_out(keep_out))
     }
 
-    /// An empty map of the space between the heights `floor_m` and `ceiling_m` inside the fence, metres ENU: no path leaves
-    /// these heights. A fence too wide for one map is covered by a window that rolls along with the vehicle.
+    /// An empty map of the space between the heights `floor_m` and `ceiling_m` inside the fence, metres ENU: no path
+    /// leaves these heights. A fence too wide for one map is covered by a window that rolls along with the vehicle.
     ///
     /// # Errors
     /// [`MapError`] when the fence is no box in space.
@@ -138,8 +138,8 @@ impl Perception {
         &self.near
     }
 
-    /// All obstacle points within the range of the map, of the newest scan; metres ENU. Neither neighbours are among them nor the
-    /// ground, which a beam meets when the vehicle pitches.
+    /// All obstacle points within the range of the map, of the newest scan; metres ENU. Neither neighbours are among
+    /// them nor the ground, which a beam meets when the vehicle pitches.
     #[must_use]
     pub fn returns(&self) -> &[Vector3<f64>] {
         &self.returns

@@ -51,8 +51,8 @@ impl RouteSearch {
         self.under_way.is_some()
     }
 
-    /// Goes on with the search under way, and takes what that costs from `allowance`. `None` if there is none or it needs
-    /// more; else the leg and its path.
+    /// Goes on with the search under way, and takes what that costs from `allowance`. `None` if there is none or it
+    /// needs more; else the leg and its path.
     pub fn advance(
         &mut self,
         map: &mut ClearanceMap,

@@ -1,8 +1,9 @@
 //! Scripts: b-threads that come to a vehicle as data, with its configuration or from the ground in flight.
 //!
-//! A script runs in the vehicle's program under the name `script/<name>`, so that it is explained like any other b-thread. It
-//! is checked before ([`ScriptRights`]), and can do no harm while it runs ([`Runner`]). What becomes of it is an
-//! event: `uav/3/script{name, state, why}`. Scripts that were sent are kept ([`Store`]) for the agent's next life.
+//! A script runs in the vehicle's program under the name `script/<name>`, so that it is explained like any other
+//! b-thread. It is checked before ([`ScriptRights`]), and can do no harm while it runs ([`Runner`]). What becomes of
+//! it is an event: `uav/3/script{name, state, why}`. Scripts that were sent are kept ([`Store`]) for the agent's next
+//! life.
 
 mod facts;
 mod rights;
@@ -36,8 +37,8 @@ pub const CONFIGURATION: &str = "configuration";
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Begins {
     AtOnce,
-    /// When the vehicle is ready on the ground, or an operator lets it go on or takes it back in the air: one that is there when
-    /// the agent starts cannot know what has become of the vehicle, and must not end its hold by itself.
+    /// When the vehicle is ready on the ground, or an operator lets it go on or takes it back in the air: one that is
+    /// there when the agent starts cannot know what has become of the vehicle, and must not end its hold by itself.
     WhenReleased,
 }
 
@@ -67,8 +68,8 @@ pub struct Scripts {
     retry_at: Duration,
 }
 
-/// How many states of a script a vehicle looks at: no more than there is time for between two ticks. The ground looks at
-/// many more before it sends one, and nothing that is for the vehicle's safety hangs on it.
+/// How many states of a script a vehicle looks at: no more than there is time for between two ticks. The ground looks
+/// at many more before it sends one, and nothing that is for the vehicle's safety hangs on it.
 const STATES_TRIED: usize = 200;
 
 impl Scripts {
@@ -132,8 +133,8 @@ impl Scripts {
         Ok(())
     }
 
-    /// A script with its parameters, once it has passed what can be said of it alone: its rights, and that it neither blocks
-    /// something for ever nor goes round by itself.
+    /// A script with its parameters, once it has passed what can be said of it alone: its rights, and that it neither
+    /// blocks something for ever nor goes round by itself.
     ///
     /// # Errors
     /// Why it is not run.

@@ -18,8 +18,8 @@ pub struct ScriptRights {
 }
 
 impl ScriptRights {
-    /// What every script may do: order its own vehicle about at its gateway, hold it, and have events of its own. It cannot
-    /// keep a vehicle from the way home, from landing, or from anything else that is for its safety.
+    /// What every script may do: order its own vehicle about at its gateway, hold it, and have events of its own. It
+    /// cannot keep a vehicle from the way home, from landing, or from anything else that is for its safety.
     #[must_use]
     pub fn usual(me: &Me, roster: &[String], events: &Catalogue) -> Self {
         let own = EventSet::prefix(own_events(me));

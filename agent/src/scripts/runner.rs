@@ -13,8 +13,8 @@ use crate::{me::Me, precedence};
 /// How often a script may be resumed at one time: far less than the selections that a superstep may take.
 const MOST_AT_ONCE: u32 = 100;
 
-/// A script as a b-thread of a vehicle: with the priority of a mission, blocking nothing beyond its rights, to be withdrawn
-/// at any time, and ended when it does not come to rest. It says how it has ended.
+/// A script as a b-thread of a vehicle: with the priority of a mission, blocking nothing beyond its rights, to be
+/// withdrawn at any time, and ended when it does not come to rest. It says how it has ended.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct Runner {
     me: Me,

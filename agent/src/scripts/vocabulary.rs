@@ -33,7 +33,8 @@ impl Vocabulary {
         self.events.at_vehicle().map(|event| me.event_name(event.name))
     }
 
-    /// Checks that each name in a set is that of an event, each pattern fits one, and that they have the data asked for.
+    /// Checks that each name in a set is that of an event, each pattern fits one, and that they have the data asked
+    /// for.
     ///
     /// # Errors
     /// The first that does not, and what there is.

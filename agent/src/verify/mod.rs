@@ -1,10 +1,11 @@
-//! Verifies the program that flies: the very b-threads that [`load`](crate::bthreads::load) loads, with the world around them abstracted.
+//! Verifies the program that flies: the very b-threads that [`load`](crate::bthreads::load) loads, with the world
+//! around them abstracted.
 //!
-//! The world is a b-thread for each [`Part`] of it, which offers what autopilot, perception, planner, people and other nodes
-//! may tell, in every order. A [`Scene`] puts some parts around the whole program; the verifier of `skein_bp` looks at all
-//! its runs. What must hold are the [`requirements`], who may block a safety event, that every burst of events comes to
-//! rest before an external event would have to come between, that nobody is stuck, and that the ground stays within
-//! reach.
+//! The world is a b-thread for each [`Part`] of it, which offers what autopilot, perception, planner, people and
+//! other nodes may tell, in every order. A [`Scene`] puts some parts around the whole program; the verifier of
+//! `skein_bp` looks at all its runs. What must hold are the [`requirements`], who may block a safety event, that
+//! every burst of events comes to rest before an external event would have to come between, that nobody is stuck, and
+//! that the ground stays within reach.
 
 mod part;
 mod requirement;
@@ -40,8 +41,8 @@ const FLIGHT: &str = "world/flight";
 
 const SAFETY_RULE: &str = "nobody blocks a safety event but who goes before it";
 
-/// Which b-threads may block an event that is for the vehicle's safety; nobody may block those that are not named. `goto` is
-/// that to home.
+/// Which b-threads may block an event that is for the vehicle's safety; nobody may block those that are not named.
+/// `goto` is that to home.
 const MAY_BLOCK: [(&str, &[&str]); 6] = [
     (Hold::NAME, &["pilot"]),
     (Land::NAME, &["pilot"]),
@@ -64,8 +65,8 @@ pub struct VehicleVerifier {
     left_out: Vec<String>,
 }
 
-/// Looks for a fault of a script together with the vehicle's program, in no more than so many states around the vehicle's
-/// first flight.
+/// Looks for a fault of a script together with the vehicle's program, in no more than so many states around the
+/// vehicle's first flight.
 ///
 /// # Errors
 /// What is wrong, with the run that shows it.
@@ -106,7 +107,8 @@ impl VehicleVerifier {
     /// Of the program of this configuration, its scripts included.
     ///
     /// # Errors
-    /// [`AgentError::Script`]: a script is not run, because it exceeds its rights or blocks something for ever by itself.
+    /// [`AgentError::Script`]: a script is not run, because it exceeds its rights or blocks something for ever by
+    /// itself.
     pub fn new(config: &AgentConfig) -> Result<Self, AgentError> {
         let me = Me::new(&config.node);
         let mut left_out = vec![

@@ -65,7 +65,8 @@ impl Requirement {
         Self { name: name.to_owned(), rule: Rule::Absence { never, from, until, is_on: true } }
     }
 
-    /// After each event of `from` one of `answer` happens before the vehicle `me` rests for good, unless a pilot has it.
+    /// After each event of `from` one of `answer` happens before the vehicle `me` rests for good, unless a pilot has
+    /// it.
     #[must_use]
     pub fn response(name: &str, me: &Me, from: EventSet, answer: EventSet) -> Self {
         Self::answered(name, me, from, answer, None)

@@ -1,8 +1,8 @@
 //! The world around a vehicle's program, as far as it is verified: what autopilot, perception, planner, other nodes and
 //! people may tell it, and when.
 //!
-//! Each part is an abstraction of the code or the person that tells these events: it offers all that those can tell, and
-//! perhaps more, with one or two values of data that b-threads tell apart.
+//! Each part is an abstraction of the code or the person that tells these events: it offers all that those can tell,
+//! and perhaps more, with one or two values of data that b-threads tell apart.
 
 use skein_bp::{Event, EventSet};
 use skein_dbp::NodeName;
@@ -83,8 +83,8 @@ pub(super) struct Disturbed {
     pub(super) pilot: bool,
 }
 
-/// Paths and progress along them, as guidance reports them; `hard`: paths are not found or turn out blocked, and the vehicle
-/// gets stuck.
+/// Paths and progress along them, as guidance reports them; `hard`: paths are not found or turn out blocked, and the
+/// vehicle gets stuck.
 pub(super) fn guidance(me: &Me, legs: &[i64], hard: bool) -> Part {
     let to = |leg: i64| format!("heading for {leg}");
     let new_leg = |place: Place| {

@@ -26,13 +26,13 @@ pub enum CoverageError {
     NoVehicles,
 }
 
-/// Routes over an area, one for each vehicle, that together bring every point of it within half a swath of one, measured
-/// across the lines (Choset and Pignon 1998, without their cells).
+/// Routes over an area, one for each vehicle, that together bring every point of it within half a swath of one,
+/// measured across the lines (Choset and Pignon 1998, without their cells).
 ///
-/// `area` has the corners of a simple polygon in order (ENU, metres), either way round. The lines are parallel, at equal
-/// distances of at most `swath_m`, along the direction in which they are fewest, and flown alternately one way and the
-/// other. The way along them is cut into pieces of equal length, so that all vehicles are done at the same time. Where the
-/// area is not convex, a line may cross a gap in it.
+/// `area` has the corners of a simple polygon in order (ENU, metres), either way round. The lines are parallel, at
+/// equal distances of at most `swath_m`, along the direction in which they are fewest, and flown alternately one way
+/// and the other. The way along them is cut into pieces of equal length, so that all vehicles are done at the same
+/// time. Where the area is not convex, a line may cross a gap in it.
 ///
 /// `O(corners^2 + lines corners)`.
 ///
@@ -71,7 +71,8 @@ pub fn cover(
     Ok(cut_evenly(&way, vehicles))
 }
 
-/// The unit direction across which the area is narrowest: that of an edge of its convex hull. `None` if it encloses nothing.
+/// The unit direction across which the area is narrowest: that of an edge of its convex hull. `None` if it encloses
+/// nothing.
 fn direction_of_least_width(area: &[Vector2<f64>]) -> Option<Vector2<f64>> {
     let hull = convex_hull(area);
     let width_along = |direction: &Vector2<f64>| {

@@ -47,10 +47,10 @@ impl Formation {
         (0..vehicles).map(place).collect()
     }
 
-    /// The routes of so many vehicles whose leader flies along `leader` (ENU, metres), the leader's first. The formation heads
-    /// along the leader's first leg that leads anywhere over ground, and is shifted without being turned: all routes are the
-    /// leader's, moved aside. So all are equally long, and vehicles that set out together and are equally fast keep their
-    /// places, around corners too.
+    /// The routes of so many vehicles whose leader flies along `leader` (ENU, metres), the leader's first. The
+    /// formation heads along the leader's first leg that leads anywhere over ground, and is shifted without being
+    /// turned: all routes are the leader's, moved aside. So all are equally long, and vehicles that set out together
+    /// and are equally fast keep their places, around corners too.
     #[must_use]
     pub fn routes(&self, leader: &[Vector3<f64>], vehicles: usize) -> Vec<Vec<Vector3<f64>>> {
         let mut legs = leader.windows(2).map(|leg| (leg[1] - leg[0]).xy());

@@ -121,7 +121,8 @@ fn fleet(planner: impl Fn(&mut RouteProblem<'_>, u64) -> Plan) -> Vec<Plan> {
     plan_in_turn(&mountains(), RouteCost::default(), &ends, WAYPOINTS, plan).unwrap()
 }
 
-/// Where a vehicle is, so many seconds after it set out along a route whose legs it flies so many times slower than at cruise.
+/// Where a vehicle is, so many seconds after it set out along a route whose legs it flies so many times slower than
+/// at cruise.
 fn flown(route: &[Vector3<f64>], slowed: f64, mut seconds: f64, cost: &RouteCost) -> Vector3<f64> {
     for leg in route.windows(2) {
         let way = leg[1] - leg[0];

@@ -64,7 +64,8 @@ impl BThread for Delivery {
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         if let Some(given) = OrderGiven::read(event) {
-            // A launch is about others too, and a script stands beside: neither says anything against what is on its way.
+            // A launch is about others too, and a script stands beside: neither says anything against what is on its
+            // way.
             if !given.what.is_beside_flight() {
                 self.order = self.to_bring(&given);
                 self.until = given.what.sets_going().then(|| cx.now() + GOING_LASTS);

@@ -10,7 +10,8 @@ use skein_dbp::NodeName;
 
 use crate::explain::{Evidence, Explanation, Recorded, explain};
 
-/// Explains one vehicle, or all of them, `at_s` seconds into the mission. Exits with 1 when there is nothing to explain.
+/// Explains one vehicle, or all of them, `at_s` seconds into the mission. Exits with 1 when there is nothing to
+/// explain.
 pub fn run(file: &Path, at_s: Option<f64>, vehicle: Option<&str>, json: bool) -> anyhow::Result<ExitCode> {
     let recorded = Recorded::open(file)?;
     let nothing = |why: &str| {

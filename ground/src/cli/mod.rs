@@ -40,8 +40,8 @@ enum Command {
         #[arg(long)]
         until_over: bool,
     },
-    /// Explain why vehicles of a recorded mission moved or stood still: who requested what, who blocked it, and what would
-    /// have to change.
+    /// Explain why vehicles of a recorded mission moved or stood still: who requested what, who blocked it, and what
+    /// would have to change.
     Explain {
         /// The recording, such as mission.mcap.
         file: PathBuf,

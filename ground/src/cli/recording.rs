@@ -15,8 +15,8 @@ use crate::recorder::{Level, Recorder, RecorderError};
 /// Planned paths are recorded this often.
 const PATH_PERIOD: Duration = Duration::from_millis(500);
 
-/// A `mission.mcap` that grows with the mission. When it cannot grow any more, because the disk is full, the station says
-/// so and goes on without it.
+/// A `mission.mcap` that grows with the mission. When it cannot grow any more, because the disk is full, the station
+/// says so and goes on without it.
 pub struct Recording {
     recorder: Option<Recorder>,
     /// How many vehicles the file shows by now.

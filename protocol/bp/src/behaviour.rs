@@ -78,8 +78,8 @@ pub struct Host<'a> {
     pub roster: Vec<&'a str>,
 }
 
-/// B-threads that are switched on together. The type is their settings, as a configuration states them; fields that it does
-/// not know are refused.
+/// B-threads that are switched on together. The type is their settings, as a configuration states them; fields that
+/// it does not know are refused.
 pub trait Behaviour: DeserializeOwned + Send + Sync + 'static {
     /// Its name in configurations.
     const NAME: &'static str;
@@ -111,8 +111,8 @@ impl<'a> Model<'a> {
         Self { program, rules: Vec::new(), world: Vec::new() }
     }
 
-    /// Adds what must hold, in words, and the b-thread that watches it: it fails when the rule is broken, or is hot while
-    /// something is due.
+    /// Adds what must hold, in words, and the b-thread that watches it: it fails when the rule is broken, or is hot
+    /// while something is due.
     pub fn require(&mut self, rule: &str, watcher: impl BThread) {
         self.rules.push(self.program.add(rule, watcher));
     }

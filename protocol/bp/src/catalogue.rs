@@ -1,5 +1,5 @@
-//! Declarations of events. A name, its meaning, whose it is and its fields stand once; what writes, reads, lists, checks
-//! and documents the event follows from there.
+//! Declarations of events. A name, its meaning, whose it is and its fields stand once; what writes, reads, lists,
+//! checks and documents the event follows from there.
 //!
 //! ```
 //! use skein_bp::catalogue::{Declared as _, Events as _, Whose};
@@ -150,8 +150,8 @@ pub trait Declared: Sized {
     /// Puts the data into an event.
     fn write(self, event: Event) -> Event;
 
-    /// The data of an event of this name, whatever its home. `None` if the name is another, or a datum is missing, of another
-    /// kind, or out of its range.
+    /// The data of an event of this name, whatever its home. `None` if the name is another, or a datum is missing, of
+    /// another kind, or out of its range.
     fn read(event: &Event) -> Option<Self>;
 }
 
@@ -338,7 +338,8 @@ pub fn with_datum(name: &'static str, datum: impl Datum) -> EventSet {
     datum.write().map_or(EventSet::None, |value| EventSet::field_is(name, value))
 }
 
-/// Declares events: a list of them, and for each a type with its data that is [`Declared`]. See [the module](crate::catalogue).
+/// Declares events: a list of them, and for each a type with its data that is [`Declared`]. See [the
+/// module](crate::catalogue).
 #[macro_export]
 macro_rules! events {
     (

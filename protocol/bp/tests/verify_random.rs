@@ -75,8 +75,8 @@ impl Recipe {
     }
 }
 
-/// In a program of this kind the order of b-threads makes no difference between runs: either nobody is added, or only one
-/// b-thread does more than state bids.
+/// In a program of this kind the order of b-threads makes no difference between runs: either nobody is added, or only
+/// one b-thread does more than state bids.
 fn recipe() -> impl Strategy<Value = Recipe> {
     use Selecting::{BThreadPriority, Ordered, Simple, SyncPriority};
     let many_with_effects = prop::collection::vec(body(effect()), 1..5).boxed();
@@ -145,7 +145,8 @@ impl Plain {
         (0..self.programs.len()).filter(|at| is(&self.programs[*at])).map(|at| self.depths[at]).min()
     }
 
-    /// Whether the states of a kind hold a cycle: what is left when those without a way on are taken away, again and again.
+    /// Whether the states of a kind hold a cycle: what is left when those without a way on are taken away, again and
+    /// again.
     fn has_cycle(&self, is: impl Fn(&Program) -> bool) -> bool {
         let mut left: BTreeSet<usize> =
             (0..self.programs.len()).filter(|at| is(&self.programs[*at])).collect();

@@ -1,5 +1,5 @@
-//! The verifier on programs with a world around them: when the world may act, whether the program comes to rest, what stays
-//! within reach, and what was met.
+//! The verifier on programs with a world around them: when the world may act, whether the program comes to rest, what
+//! stays within reach, and what was met.
 
 use crate::support::plain;
 use serde_json::{Value, json};

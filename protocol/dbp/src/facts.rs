@@ -1,4 +1,5 @@
-//! Facts: what a node tells its own b-threads about the fleet. They are events under its own name that have simply happened.
+//! Facts: what a node tells its own b-threads about the fleet. They are events under its own name that have simply
+//! happened.
 //!
 //! Facts cannot be blocked, nor requested from afar. Like all events of their home they are numbered and published.
 
@@ -14,16 +15,16 @@ skein_bp::events! {
     /// Every fact.
     pub const FACTS;
 
-    /// The block of a b-thread is acknowledged by every home it concerns (G3). It is told only while the b-thread is still
-    /// at that point. One that moves on with the same block, or with a part of it, is told anew once that has been
-    /// acknowledged, and may rely on the block all the while, unless `block_lapsed` is told.
+    /// The block of a b-thread is acknowledged by every home it concerns (G3). It is told only while the b-thread is
+    /// still at that point. One that moves on with the same block, or with a part of it, is told anew once that has
+    /// been acknowledged, and may rely on the block all the while, unless `block_lapsed` is told.
     Confirmed = "confirmed", Own {
         bthread: Arc<str>,
         /// Number of the b-thread's synchronisation point.
         sync: u64,
     }
-    /// The block of a b-thread, once confirmed, is not sure any more at `home`, which has not been heard in time, has lifted
-    /// it, or has come into the roster and has yet to acknowledge it (G3).
+    /// The block of a b-thread, once confirmed, is not sure any more at `home`, which has not been heard in time, has
+    /// lifted it, or has come into the roster and has yet to acknowledge it (G3).
     BlockLapsed = "block_lapsed", Own {
         bthread: Arc<str>,
         home: NodeName,
@@ -77,8 +78,8 @@ skein_bp::events! {
         /// Its b-threads whose blocks stay, with blanks between.
         held: Option<Arc<str>>,
     }
-    /// This node has heard all decisions of its term (G8): told after they were, at the start and after each loss of the
-    /// coordinator.
+    /// This node has heard all decisions of its term (G8): told after they were, at the start and after each loss of
+    /// the coordinator.
     InStep = "in_step", Own {
         term: u64,
         /// How many decisions there were.

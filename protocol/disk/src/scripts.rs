@@ -52,9 +52,9 @@ struct OwnedContent {
 }
 
 impl ScriptStore {
-    /// The store of `node` in `folder`, and the scripts that a former life has kept there. A file that cannot be understood
-    /// is set aside as `<node>.scripts.json.damaged` and told of: for its sake no vehicle stays on the ground, or in the
-    /// air without its agent.
+    /// The store of `node` in `folder`, and the scripts that a former life has kept there. A file that cannot be
+    /// understood is set aside as `<node>.scripts.json.damaged` and told of: for its sake no vehicle stays on the
+    /// ground, or in the air without its agent.
     pub fn open(folder: &Path, node: &NodeName) -> (Self, Result<Vec<KeptScript>, ScriptsLost>) {
         let path = node_file::path_of(folder, node, "scripts.json");
         let kept = match node_file::read(&path) {

@@ -108,8 +108,8 @@ impl NodeLink {
         self.stats.sent += 1;
     }
 
-    /// Tells all what is on this node's board, if that is due: when it has changed, but at most a few times a second, and
-    /// now and then when it has not. Returns the board if so.
+    /// Tells all what is on this node's board, if that is due: when it has changed, but at most a few times a second,
+    /// and now and then when it has not. Returns the board if so.
     pub fn put_board(&mut self, now: Duration, link: &mut dyn Link) -> Option<&Board> {
         if now < self.board_due {
             return None;

@@ -8,7 +8,8 @@ use skein_dbp::NodeName;
 
 const FLEET: [&str; 3] = ["uav/1", "uav/2", "uav/3"];
 
-/// Each home's stream as `observer` has seen it must go on from where it was: by one, or over a gap that it was told of.
+/// Each home's stream as `observer` has seen it must go on from where it was: by one, or over a gap that it was told
+/// of.
 fn check_order(swarm: &Swarm) {
     let mut last: BTreeMap<(NodeName, u64, NodeName), u64> = BTreeMap::new();
     for seen in &swarm.seen {

@@ -20,7 +20,8 @@ pub struct Complaints {
 }
 
 impl Complaints {
-    /// A line, if there is something new to complain about and the last one is a second ago. Counts are since the start.
+    /// A line, if there is something new to complain about and the last one is a second ago. Counts are since the
+    /// start.
     pub fn check(&mut self, now: Duration, node: &NodeLink, link: &ZenohLink) -> Option<String> {
         if now < self.due {
             return None;

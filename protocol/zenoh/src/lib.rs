@@ -1,8 +1,8 @@
 //! Zenoh as a [`skein_wire::Link`]: a session behind bounded queues.
 //!
-//! A [`ZenohSession`] does all its work where Zenoh does its own. A [`ZenohLink`] hands messages to it through a bounded
-//! queue and takes what has arrived from a bounded ring, so that no control loop ever waits for the network: what does
-//! not fit is dropped and counted, and the protocol above repeats it. Congested links drop too
+//! A [`ZenohSession`] does all its work where Zenoh does its own. A [`ZenohLink`] hands messages to it through a
+//! bounded queue and takes what has arrived from a bounded ring, so that no control loop ever waits for the network:
+//! what does not fit is dropped and counted, and the protocol above repeats it. Congested links drop too
 //! (`CongestionControl::Drop`). A program that calls [`share_threads`] first has messages wake fewer threads.
 //!
 //! Several nodes of one process share a session; other processes connect to its [`locators`](ZenohSession::locators).

@@ -25,15 +25,16 @@ const OPENING_TRIES: usize = 8;
 const MOST_PUBLISHERS: usize = 1024;
 /// A client looks for its router this often.
 const TRY_AGAIN: Duration = Duration::from_millis(200);
-/// Longer payloads, in bytes, may travel in fragments, for which Zenoh waits up to 50 ms where there is no room; for whole messages
-/// it waits a millisecond, and not again before there is room.
+/// Longer payloads, in bytes, may travel in fragments, for which Zenoh waits up to 50 ms where there is no room; for
+/// whole messages it waits a millisecond, and not again before there is room.
 const MOST_WHOLE: usize = 32 << 10;
 
 /// A session that any number of links of one process share. Cloning gives another handle to the same session, which
 /// closes with its last handle or link.
 ///
-/// All of Zenoh is done on its own threads: whoever puts a message hands it to a bounded queue and never waits, whatever the
-/// network does. The task behind the queue runs where Zenoh sends, so that a message wakes one thread on its way out, not two.
+/// All of Zenoh is done on its own threads: whoever puts a message hands it to a bounded queue and never waits,
+/// whatever the network does. The task behind the queue runs where Zenoh sends, so that a message wakes one thread on
+/// its way out, not two.
 #[derive(Clone, Debug)]
 pub struct ZenohSession(Arc<Shared>);
 
@@ -155,8 +156,8 @@ fn open_at_once(
     answer.send(outcome).ok().and(session)
 }
 
-/// Waits for a client's router, with what is asked for meanwhile: without it there is no session yet, and what is to be put is
-/// dropped. None if nobody asks any more.
+/// Waits for a client's router, with what is asked for meanwhile: without it there is no session yet, and what is to
+/// be put is dropped. None if nobody asks any more.
 fn await_router(
     config: &ZenohConfig,
     queue: &mut Queue,

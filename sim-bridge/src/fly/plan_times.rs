@@ -14,7 +14,8 @@ pub struct PlanTimes {
 }
 
 impl PlanTimes {
-    /// Takes in one tick of a vehicle's agent, from `began` to now, if it planned; `is_planning` if the plan takes another.
+    /// Takes in one tick of a vehicle's agent, from `began` to now, if it planned; `is_planning` if the plan takes
+    /// another.
     pub fn take_in(&mut self, vehicle: usize, began: Instant, selections: &[Happened], is_planning: bool) {
         if self.under_way.len() <= vehicle {
             self.under_way.resize(vehicle + 1, 0.0);

@@ -1,5 +1,5 @@
-//! The clock on the wall: the same swarm, step by step in real time, its events over Zenoh, its vehicles' MAVLink over UDP,
-//! and the console beside it.
+//! The clock on the wall: the same swarm, step by step in real time, its events over Zenoh, its vehicles' MAVLink
+//! over UDP, and the console beside it.
 //!
 //! All vehicles share one session and the ground station has its own, joined over TCP on loopback, so that what passes
 //! between vehicles and ground passes through the network stack.

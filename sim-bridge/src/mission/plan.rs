@@ -93,8 +93,8 @@ impl Reader {
         Ok(Self { datum, home, mission, speed_m_s: None, ended: false, airspace, warnings })
     }
 
-    /// The circles and polygons that exclude; they have no heights. Those that include are not read: the scenario's bounds
-    /// are the fence.
+    /// The circles and polygons that exclude; they have no heights. Those that include are not read: the scenario's
+    /// bounds are the fence.
     fn geofence(&mut self, fence: &Node<'_>) -> Result<(), MissionError> {
         let (floor_m, ceiling_m) = (f64::NEG_INFINITY, f64::INFINITY);
         for list in ["circles", "polygons"] {

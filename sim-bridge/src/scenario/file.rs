@@ -370,8 +370,8 @@ impl ScenarioFile {
         Some(layout)
     }
 
-    /// `[[vehicle]]` tables where there are any, else the task's routes, else the generator's, else blanks for a mission to
-    /// fill.
+    /// `[[vehicle]]` tables where there are any, else the task's routes, else the generator's, else blanks for a
+    /// mission to fill.
     fn plans(
         &self,
         count: usize,

@@ -134,8 +134,8 @@ pub struct Network {
     /// Share of messages that are lost, 0 to below 1.
     #[serde(deserialize_with = "field::share")]
     pub loss: f64,
-    /// How long a node's bids hold elsewhere without being renewed, in milliseconds, 100 to 10000: several times as long as
-    /// a message takes there and back.
+    /// How long a node's bids hold elsewhere without being renewed, in milliseconds, 100 to 10000: several times as
+    /// long as a message takes there and back.
     #[serde(deserialize_with = "field::lease_ms")]
     pub lease_ms: f64,
 }
@@ -341,7 +341,8 @@ impl Scenario {
     ///
     /// # Errors
     /// No vehicles or too many; a start inside an obstacle; a start or waypoint outside of the bounds or under the
-    /// ground; a waypoint in a no-fly zone, in a threat or in known terrain; starts or goals so close that vehicles would touch.
+    /// ground; a waypoint in a no-fly zone, in a threat or in known terrain; starts or goals so close that vehicles
+    /// would touch.
     pub fn validate(&self) -> Result<(), ScenarioError> {
         check_count(&self.name, self.vehicles.len())?;
         let zones = KeepOut::new(self.airspace.clone(), 0.0, 0.0);

@@ -1,5 +1,5 @@
-//! `[targets]`: the vehicles fly through the terrain, threats and no-fly zones of `[airspace]`, and arrive at their targets
-//! together (P3). Their routes are planned before take-off, as the ground plans: each among those before it.
+//! `[targets]`: the vehicles fly through the terrain, threats and no-fly zones of `[airspace]`, and arrive at their
+//! targets together (P3). Their routes are planned before take-off, as the ground plans: each among those before it.
 
 use nalgebra::Vector3;
 use serde::Deserialize;

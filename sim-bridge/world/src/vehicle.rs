@@ -90,7 +90,8 @@ pub enum PositionIntegral {
     None,
     /// The whole error, as a plain PID does.
     Plain,
-    /// The whole error within 1 m, nothing beyond 2 m, and between them a falling share (Zhang 2019, variable integral).
+    /// The whole error within 1 m, nothing beyond 2 m, and between them a falling share (Zhang 2019, variable
+    /// integral).
     Variable,
 }
 

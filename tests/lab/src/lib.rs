@@ -1,7 +1,8 @@
 //! The laboratory: published experiments, campaigns with faults, and benchmarks, over the same agents that fly.
 //!
 //! Each is a [`Task`](task::Task) in a file of its own, which declares its arguments beside its code, and is named once
-//! in the list of its kind: [`experiment::TASKS`], [`campaign::TASKS`], [`bench::TASKS`]. The product knows nothing of it.
+//! in the list of its kind: [`experiment::TASKS`], [`campaign::TASKS`], [`bench::TASKS`]. The product knows nothing
+//! of it.
 
 pub mod bench;
 pub mod campaign;

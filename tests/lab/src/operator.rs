@@ -59,7 +59,8 @@ impl Operator {
         }
     }
 
-    /// Gives an order, to `"all"` or a list of vehicles; returns how long it took until all of them had acknowledged it.
+    /// Gives an order, to `"all"` or a list of vehicles; returns how long it took until all of them had acknowledged
+    /// it.
     ///
     /// # Errors
     /// Somebody has not within two minutes, or refuses it.

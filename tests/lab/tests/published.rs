@@ -1,5 +1,5 @@
-//! A* finds the optimal lengths published with real maps (Sturtevant 2012; Brewer and Sturtevant 2018), on a plain grid and
-//! on a vehicle's map.
+//! A* finds the optimal lengths published with real maps (Sturtevant 2012; Brewer and Sturtevant 2018), on a plain
+//! grid and on a vehicle's map.
 
 use std::fs;
 use std::path::PathBuf;

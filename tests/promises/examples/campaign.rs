@@ -1,5 +1,5 @@
-//! The campaign without the simulator around it: seeds, the first of them, and how many failing stories are shrunk, as in
-//! `cargo run --release -p skein-promises --example campaign -- 1000 1 3`.
+//! The campaign without the simulator around it: seeds, the first of them, and how many failing stories are shrunk,
+//! as in `cargo run --release -p skein-promises --example campaign -- 1000 1 3`.
 
 #![allow(clippy::expect_used)] // An example ends when it is used wrongly.
 

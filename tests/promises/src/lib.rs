@@ -1,9 +1,9 @@
 //! Whether Skein keeps its promises (G1 to G9) on a network that loses, repeats, reorders, delays and cuts, between
 //! nodes that pause, crash, start again and come late.
 //!
-//! A [`Story`] is all that one seed stands for: programs, network and faults, as data. [`run`] plays it in lockstep over
-//! the in-memory network, with the messages really encoded, while observers who see every node and the true time check
-//! each promise at each step. A story that fails is [shrunk](shrink) to one that a person can read.
+//! A [`Story`] is all that one seed stands for: programs, network and faults, as data. [`run`] plays it in lockstep
+//! over the in-memory network, with the messages really encoded, while observers who see every node and the true time
+//! check each promise at each step. A story that fails is [shrunk](shrink) to one that a person can read.
 //!
 //! ```
 //! let outcome = skein_promises::run(&skein_promises::Story::invent(1), &Default::default());

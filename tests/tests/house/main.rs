@@ -1,5 +1,5 @@
-//! The house keeps its shape: crates know only those that ARCHITECTURE.md says, no files import one another in a circle,
-//! and no file is forgotten.
+//! The house keeps its shape: crates know only those that ARCHITECTURE.md says, no files import one another in a
+//! circle, and no file is forgotten.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // A test fails by panicking.
 

@@ -303,8 +303,8 @@ fn refuses(socket: &mut Socket, what: &str) {
     }
 }
 
-/// A browser that never reads. One that is `talking` has been asking for nonsense until its answers fill every buffer on
-/// the way, so that the station's next word to it has to wait.
+/// A browser that never reads. One that is `talking` has been asking for nonsense until its answers fill every buffer
+/// on the way, so that the station's next word to it has to wait.
 fn deaf_browser(flight: &Flight, talking: bool) -> Socket {
     let mut socket = flight.socket();
     if talking {

@@ -1,5 +1,5 @@
-//! The swarm as processes over real Zenoh, and what a fault does to it. `skein-lab campaign processes` runs these at more
-//! moments, and all the others.
+//! The swarm as processes over real Zenoh, and what a fault does to it. `skein-lab campaign processes` runs these at
+//! more moments, and all the others.
 
 use skein_lab::campaign::processes::trial::{Fault, run};
 use skein_sim::cli::Network;

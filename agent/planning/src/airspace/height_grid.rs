@@ -2,8 +2,8 @@
 
 use nalgebra::Vector2;
 
-/// Heights at the nodes of a square grid, with what lies between them interpolated (bilinear). Beyond the border the ground
-/// goes on as high as the border is.
+/// Heights at the nodes of a square grid, with what lies between them interpolated (bilinear). Beyond the border the
+/// ground goes on as high as the border is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeightGrid {
     corner: Vector2<f64>,
@@ -41,8 +41,8 @@ pub enum HeightGridError {
 }
 
 impl HeightGrid {
-    /// The grid whose south-western node is `corner` (ENU, metres), with rows from south to north of heights from west to
-    /// east, metres.
+    /// The grid whose south-western node is `corner` (ENU, metres), with rows from south to north of heights from
+    /// west to east, metres.
     ///
     /// # Errors
     /// [`HeightGridError`] says which number is at fault.

@@ -15,11 +15,12 @@ const FURTHEST_M: f64 = 100.0;
 
 /// An [`Airspace`]'s zones with a margin around them, and the air over its terrain up to a clearance.
 ///
-/// Threats are closed as no-fly zones are, and not merely dear: being seen for a moment is enough, and no detour is so long
-/// that it is worth that. Below the ground a threat goes on, as a ball. The airspace's box counts for nothing here.
+/// Threats are closed as no-fly zones are, and not merely dear: being seen for a moment is enough, and no detour is
+/// so long that it is worth that. Below the ground a threat goes on, as a ball. The airspace's box counts for nothing
+/// here.
 ///
-/// Distances are lower bounds that change by no more than a metre per metre, so a line is searched in long steps far away
-/// from all zones. The time an answer takes grows with the number of zones and their corners.
+/// Distances are lower bounds that change by no more than a metre per metre, so a line is searched in long steps far
+/// away from all zones. The time an answer takes grows with the number of zones and their corners.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeepOut {
     airspace: Airspace,
@@ -32,8 +33,8 @@ pub struct KeepOut {
 }
 
 impl KeepOut {
-    /// The zones of `airspace` with `margin_m` around them, and what is lower than `terrain_clearance_m` above its terrain,
-    /// if it has any.
+    /// The zones of `airspace` with `margin_m` around them, and what is lower than `terrain_clearance_m` above its
+    /// terrain, if it has any.
     #[must_use]
     pub fn new(airspace: Airspace, margin_m: f64, terrain_clearance_m: f64) -> KeepOut {
         let steepness = airspace.steepest().hypot(1.0);
@@ -41,7 +42,8 @@ impl KeepOut {
         KeepOut { airspace, margin_m, terrain_clearance_m, has_terrain, steepness }
     }
 
-    /// Distance to the nearest place that is closed, margin and clearance included, metres: a lower bound. Negative inside.
+    /// Distance to the nearest place that is closed, margin and clearance included, metres: a lower bound. Negative
+    /// inside.
     #[must_use]
     pub fn room_m(&self, point: &Vector3<f64>) -> f64 {
         let zones_m = self.off_zones_m(point) - self.margin_m;
@@ -69,8 +71,8 @@ impl KeepOut {
         (self.airspace.clearance_m(point) - clearance_m) / self.steepness
     }
 
-    /// How much of the straight way between two points is closed, metres; what it cuts off by less than some centimetres
-    /// is not counted.
+    /// How much of the straight way between two points is closed, metres; what it cuts off by less than some
+    /// centimetres is not counted.
     #[must_use]
     pub fn inside_m(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
         let length_m = (to - from).norm();
@@ -84,9 +86,9 @@ impl KeepOut {
         inside_m
     }
 
-    /// The points of zones and ground, without margin, that are nearest to `point`, of those within `reach_m`: one for each
-    /// zone, one for each edge of a polygon. What keeps clear of the points keeps clear of the zones. None from inside a
-    /// zone, so that they do not hold back who leaves it.
+    /// The points of zones and ground, without margin, that are nearest to `point`, of those within `reach_m`: one
+    /// for each zone, one for each edge of a polygon. What keeps clear of the points keeps clear of the zones. None
+    /// from inside a zone, so that they do not hold back who leaves it.
     #[must_use]
     pub fn walls(&self, point: &Vector3<f64>, reach_m: f64) -> Vec<Vector3<f64>> {
         let Airspace { threats, no_fly, prisms, .. } = &self.airspace;
@@ -134,8 +136,8 @@ impl KeepOut {
         (0..rays).filter_map(ray).collect()
     }
 
-    /// A place near `point`, at its height, that is open and that `accepts` takes: `point` itself if it is one, else about
-    /// the nearest.
+    /// A place near `point`, at its height, that is open and that `accepts` takes: `point` itself if it is one, else
+    /// about the nearest.
     #[must_use]
     pub fn nearest_open(
         &self,
@@ -146,8 +148,8 @@ impl KeepOut {
         places_around(point, FURTHEST_M).find(is_open)
     }
 
-    /// Least distance to a zone, margin included, of the way straight down from `point` to the ground, metres: negative where
-    /// it leads through one. The ground is at `ground_m`, or is the terrain.
+    /// Least distance to a zone, margin included, of the way straight down from `point` to the ground, metres:
+    /// negative where it leads through one. The ground is at `ground_m`, or is the terrain.
     #[must_use]
     pub fn room_below_m(&self, point: &Vector3<f64>, ground_m: f64) -> f64 {
         let mut below = *point;

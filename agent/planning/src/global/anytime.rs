@@ -8,8 +8,8 @@ use crate::map::VoxelIndex;
 /// How hard a search tries, and for how long.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// Weight of the heuristic that the search begins with, at least 1: the greater, the sooner there is a first path, which
-    /// costs at most so many times the least.
+    /// Weight of the heuristic that the search begins with, at least 1: the greater, the sooner there is a first
+    /// path, which costs at most so many times the least.
     pub weight: f64,
     /// The search ends once its path is proven to cost at most so many times the least, at least 1.
     pub bound: f64,
@@ -30,8 +30,8 @@ impl Effort {
         Effort { weight: bound, bound, budget: usize::MAX }
     }
 
-    /// Budgeted A*: soon a path, then better ones, until one costs at most `bound` times the least or `budget` cells have
-    /// been expanded.
+    /// Budgeted A*: soon a path, then better ones, until one costs at most `bound` times the least or `budget` cells
+    /// have been expanded.
     #[must_use]
     pub fn budgeted(bound: f64, budget: usize) -> Effort {
         Effort { weight: FIRST_WEIGHT.max(bound), bound, budget }
@@ -73,11 +73,12 @@ pub enum Unsolved {
 /// A search over a [`Lattice`], and the memory that searches reuse, so that the next one allocates little and clears
 /// nothing.
 ///
-/// With weight 1 this is A*: cells are expanded by least `f = g + h`, of equal ones by greatest `g`, `h` being the octile distance, which is consistent, so
-/// that no cell is expanded twice and the first path found is the best. With a greater weight `f = g + w h`; a path so found
-/// costs at most `w` times the least (Pohl 1970). Between rounds the weight falls, what was found is kept, and only cells
-/// whose cost has improved since they were expanded are expanded again. The bound told is the lesser of the weight and the
-/// path's cost over the least `g + h` of what may still be expanded: no path can cost less than that.
+/// With weight 1 this is A*: cells are expanded by least `f = g + h`, of equal ones by greatest `g`, `h` being the
+/// octile distance, which is consistent, so that no cell is expanded twice and the first path found is the best. With
+/// a greater weight `f = g + w h`; a path so found costs at most `w` times the least (Pohl 1970). Between rounds the
+/// weight falls, what was found is kept, and only cells whose cost has improved since they were expanded are expanded
+/// again. The bound told is the lesser of the weight and the path's cost over the least `g + h` of what may still be
+/// expanded: no path can cost less than that.
 ///
 /// Time is `O(n log n)` in the cells expanded, of which there are at most as many in each round as the grid has.
 /// Memory is taken near the cells that were looked at only.
@@ -231,8 +232,8 @@ impl Search {
         self.expanded
     }
 
-    /// Expands cells until no open one promises a better path at this weight, or `limit` cells have been expanded in all.
-    /// Whether the former came first.
+    /// Expands cells until no open one promises a better path at this weight, or `limit` cells have been expanded in
+    /// all. Whether the former came first.
     fn improve(&mut self, lattice: &impl Lattice, limit: usize) -> bool {
         while let Some(next) = self.open.pop() {
             if self.open.rank(self.goal_g) <= next.rank {
@@ -291,7 +292,8 @@ impl Search {
         }
     }
 
-    /// Works out what the path known is proven to cost at most, in the least. With all settled, the weight is a proof too.
+    /// Works out what the path known is proven to cost at most, in the least. With all settled, the weight is a proof
+    /// too.
     fn prove(&mut self, is_settled: bool) {
         if is_settled {
             self.bound = self.bound.min(self.weight);

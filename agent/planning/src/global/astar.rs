@@ -137,8 +137,8 @@ const SPACE_EXPANSIONS: usize = 4;
 /// A diagonal step needs every voxel of the box it sweeps to be passable: no corners are cut. Unknown space
 /// is passable. A start closer to obstacles than required may be left by steps of growing clearance.
 ///
-/// What is closed ([`ClearanceMap::keep_out`]) is not entered. A start inside may be left, no deeper than it is, by the way
-/// out that is about the shortest, for a metre inside costs 20 metres more.
+/// What is closed ([`ClearanceMap::keep_out`]) is not entered. A start inside may be left, no deeper than it is, by
+/// the way out that is about the shortest, for a metre inside costs 20 metres more.
 ///
 /// The layers searched are tracked in `map` from then on.
 ///
@@ -196,7 +196,8 @@ struct Extent {
 }
 
 impl Astar {
-    /// Begins a search, in place of any before. [`Astar::advance`] does the work, given the same request and configuration.
+    /// Begins a search, in place of any before. [`Astar::advance`] does the work, given the same request and
+    /// configuration.
     ///
     /// # Errors
     /// Start or goal is outside the map.
@@ -224,8 +225,8 @@ impl Astar {
         Ok(())
     }
 
-    /// Goes on with a search, for about as long as `allowance` expansions in one layer take, and takes what was used from
-    /// it; a last layer or expansion may cost more than is left. `None` if there is no answer yet.
+    /// Goes on with a search, for about as long as `allowance` expansions in one layer take, and takes what was used
+    /// from it; a last layer or expansion may cost more than is left. `None` if there is no answer yet.
     ///
     /// What the map has learnt meanwhile counts for what is still to be expanded. If its window has moved, begin again.
     pub fn advance(
@@ -387,8 +388,8 @@ impl Rooms<'_> {
         there_room >= self.required || (here_room < self.required && better)
     }
 
-    /// Distance to what is closed, metres; negative inside. Where height changes along the path, that at the worse of the
-    /// heights at its ends: what is closed with its margin is taller than the ends are apart.
+    /// Distance to what is closed, metres; negative inside. Where height changes along the path, that at the worse of
+    /// the heights at its ends: what is closed with its margin is taller than the ends are apart.
     fn open_m(&self, voxel: VoxelIndex) -> f64 {
         let Some(keep_out) = self.map.keep_out() else { return f64::INFINITY };
         let centre = self.map.voxels().centre_of(voxel);

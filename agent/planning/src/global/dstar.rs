@@ -14,8 +14,8 @@ pub struct DstarConfig {
     pub clearance_m: f64,
     /// Most voxels that may be expanded for one plan.
     pub budget: usize,
-    /// Start and goal may differ in height by so much, metres: the search stays in the start's layer, and height changes
-    /// evenly along the path.
+    /// Start and goal may differ in height by so much, metres: the search stays in the start's layer, and height
+    /// changes evenly along the path.
     pub planar_band_m: f64,
 }
 
@@ -28,13 +28,13 @@ const CHANGE: usize = 4;
 /// More changes than this are not taken in: the search begins anew.
 const MOST_CHANGES: usize = 2500;
 
-/// The way through one layer of the map, which is not searched for again but repaired: what was found out for one plan serves
-/// the next, as long as the goal stays. Between two plans the map may learn and forget, the vehicle move and change its height,
-/// and others come to stand in the way.
+/// The way through one layer of the map, which is not searched for again but repaired: what was found out for one
+/// plan serves the next, as long as the goal stays. Between two plans the map may learn and forget, the vehicle move
+/// and change its height, and others come to stand in the way.
 ///
-/// A step costs its length, and by [`StepCosts::FLYING`] more where a voxel next to it is not open. Open is a voxel with the
-/// clearance that is not closed ([`ClearanceMap::keep_out`]) nor in a disc. A potential counts for nothing. A vehicle that does not
-/// stand in the open, and a way that leads over something, are for [`astar`](super::astar).
+/// A step costs its length, and by [`StepCosts::FLYING`] more where a voxel next to it is not open. Open is a voxel
+/// with the clearance that is not closed ([`ClearanceMap::keep_out`]) nor in a disc. A potential counts for nothing.
+/// A vehicle that does not stand in the open, and a way that leads over something, are for [`astar`](super::astar).
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -76,15 +76,15 @@ impl Dstar {
         (self.is_surveyed, self.expanded) = (false, 0);
     }
 
-    /// Goes on with a plan, given the same request and configuration, for about as long as `allowance` expansions of A* take, and
-    /// takes what was used from it. `None` if there is no answer yet. What the map learns before there is one counts for the
-    /// next plan. If the map's window has moved, begin again.
+    /// Goes on with a plan, given the same request and configuration, for about as long as `allowance` expansions of
+    /// A* take, and takes what was used from it. `None` if there is no answer yet. What the map learns before there
+    /// is one counts for the next plan. If the map's window has moved, begin again.
     ///
     /// The layer is tracked in `map` from then on.
     ///
     /// # Errors
-    /// There is no way through the layer: at once, if start or goal is not open or outside the map, or they differ too much in
-    /// height. Or the budget was spent.
+    /// There is no way through the layer: at once, if start or goal is not open or outside the map, or they differ
+    /// too much in height. Or the budget was spent.
     pub fn advance(
         &mut self,
         map: &mut ClearanceMap,
@@ -190,8 +190,8 @@ impl Survey<'_> {
         changed
     }
 
-    /// Blocks what is closed at the height of either end of the path. From voxel to voxel, the distance to what is closed
-    /// changes by no more than the way between them, so few must be asked.
+    /// Blocks what is closed at the height of either end of the path. From voxel to voxel, the distance to what is
+    /// closed changes by no more than the way between them, so few must be asked.
     fn block_closed(&self, y: usize, row: &mut [bool]) {
         let Some(keep_out) = self.map.keep_out() else { return };
         let resolution_m = self.map.voxels().config().resolution_m;

@@ -1,4 +1,5 @@
-//! D* Lite (Koenig and Likhachev 2002): the shortest way again, cheaply, after the grid has changed or the vehicle moved.
+//! D* Lite (Koenig and Likhachev 2002): the shortest way again, cheaply, after the grid has changed or the vehicle
+//! moved.
 
 use super::open_list::{Open, OpenList};
 use super::{Route, Unsolved};
@@ -9,16 +10,16 @@ use crate::map::VoxelIndex;
 ///
 /// It keeps, for every cell, the cost `g` of the way to the goal as it was when last expanded, and `rhs`, what the
 /// neighbours' `g` make of it now. Where the two differ the cell waits in the open list under the key
-/// `(min(g, rhs) + h(start, cell) + km, min(g, rhs))`; `km` grows by the heuristic as the vehicle moves, so that keys from
-/// before stay lower bounds and nothing has to be sorted anew. A change near the vehicle, which is where sensors see,
-/// touches few cells whose distance to the goal depends on it. The costs found are those of a fresh search.
+/// `(min(g, rhs) + h(start, cell) + km, min(g, rhs))`; `km` grows by the heuristic as the vehicle moves, so that keys
+/// from before stay lower bounds and nothing has to be sorted anew. A change near the vehicle, which is where sensors
+/// see, touches few cells whose distance to the goal depends on it. The costs found are those of a fresh search.
 ///
-/// This is the paper's optimised version, its final one, with two differences. Outdated entries stay in the open list until they are met. And
-/// sums of real numbers are rounded, so cells whose keys differ from the vehicle's by no more than rounding
-/// may be expanded too, lest a cell on the way itself be left as it was.
+/// This is the paper's optimised version, its final one, with two differences. Outdated entries stay in the open list
+/// until they are met. And sums of real numbers are rounded, so cells whose keys differ from the vehicle's by no more
+/// than rounding may be expanded too, lest a cell on the way itself be left as it was.
 ///
-/// The first search is `O(n log n)` in all cells nearer to the goal than the vehicle is, by `f`; the next ones in the cells
-/// whose cost changes. Memory is taken near the cells looked at.
+/// The first search is `O(n log n)` in all cells nearer to the goal than the vehicle is, by `f`; the next ones in the
+/// cells whose cost changes. Memory is taken near the cells looked at.
 ///
 /// ```
 /// use skein_planning::global::DStarLite;

@@ -5,20 +5,22 @@ use std::collections::BinaryHeap;
 
 use crate::grid::Packed;
 
-/// Keys are told apart to 2^-32 of the list's unit: sums of the same costs in different order are the same key, so that ties
-/// are ties.
+/// Keys are told apart to 2^-32 of the list's unit: sums of the same costs in different order are the same key, so
+/// that ties are ties.
 const FRACTION_BITS: u32 = 32;
 /// A range is a quarter of the unit wide.
 const RANGE_BITS: u32 = FRACTION_BITS - 2;
 /// More ranges than this are not told apart.
 const MOST_RANGES: usize = 1 << 16;
 
-/// A cell that waits to be expanded: least `rank` first, then least `tie`, then lowest cell, so that ties have one answer.
+/// A cell that waits to be expanded: least `rank` first, then least `tie`, then lowest cell, so that ties have one
+/// answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Open {
     /// The key as a whole number: see [`OpenList::rank`].
     pub rank: i64,
-    /// Bits of a number that is not negative, which are in the numbers' order; all inverted if the greatest comes first.
+    /// Bits of a number that is not negative, which are in the numbers' order; all inverted if the greatest comes
+    /// first.
     pub tie: u64,
     pub cell: Packed,
 }
@@ -37,8 +39,8 @@ impl PartialOrd for Open {
     }
 }
 
-/// The cells that wait, in exact order. Only those whose keys are in the lowest range are kept in a heap; the others wait in
-/// heaps' raw material, a list for each range, because most of what a search opens it never expands.
+/// The cells that wait, in exact order. Only those whose keys are in the lowest range are kept in a heap; the others
+/// wait in heaps' raw material, a list for each range, because most of what a search opens it never expands.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OpenList {
     lowest: BinaryHeap<Open>,

@@ -29,8 +29,8 @@ pub fn elide_collinear(path: &Path) -> Path {
 /// Straightens a path: from each waypoint kept, goes straight to the furthest one in sight.
 ///
 /// In sight means that all voxels of the straight line have `clearance_m`, or as much as the part of the path
-/// that it replaces has, if that is less: the way out of a tight place is not made tighter. Nor does a straight line lead
-/// further through places that are closed ([`ClearanceMap::keep_out`]) than what it replaces.
+/// that it replaces has, if that is less: the way out of a tight place is not made tighter. Nor does a straight line
+/// lead further through places that are closed ([`ClearanceMap::keep_out`]) than what it replaces.
 #[must_use]
 pub fn simplify(map: &ClearanceMap, path: &Path, clearance_m: f64) -> Path {
     simplify_around(map, path, clearance_m, &[])

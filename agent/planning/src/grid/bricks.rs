@@ -2,13 +2,13 @@
 
 use crate::map::VoxelIndex;
 
-/// Bits of a cell's place within its brick, along x, y and z: a brick holds what lies together, so that a search that goes
-/// on in one place finds what it needs together in memory.
+/// Bits of a cell's place within its brick, along x, y and z: a brick holds what lies together, so that a search that
+/// goes on in one place finds what it needs together in memory.
 const DEEP: [u32; 3] = [3, 3, 3];
 /// The same for a grid of one layer.
 const FLAT: [u32; 3] = [5, 5, 0];
-/// Memory kept from one search to the next, at most, in bytes: searches of a huge map that each look elsewhere would in the
-/// end fill memory with all of it.
+/// Memory kept from one search to the next, at most, in bytes: searches of a huge map that each look elsewhere would
+/// in the end fill memory with all of it.
 const KEPT: usize = 128 << 20;
 
 /// A value for each cell of a grid that takes memory only near those that were written to: a search of a map of many
@@ -25,8 +25,8 @@ pub(crate) struct Bricks<T> {
 }
 
 impl<T: Copy + Default> Bricks<T> {
-    /// Fits it to a grid of so many cells along x, y and z. What was there is lost, unless the size is the same and it takes
-    /// little memory.
+    /// Fits it to a grid of so many cells along x, y and z. What was there is lost, unless the size is the same and
+    /// it takes little memory.
     pub fn fit(&mut self, size: [usize; 3]) {
         if self.made * size_of::<T>() > KEPT {
             self.clear();

@@ -1,8 +1,8 @@
-//! Steps that a cheapest way need not take: what A* leaves out of symmetric ways (Harabor and Grastien 2011: pruning rules;
-//! Sturtevant and Rabin 2016: canonical orderings), in space, and where no corner is cut.
+//! Steps that a cheapest way need not take: what A* leaves out of symmetric ways (Harabor and Grastien 2011: pruning
+//! rules; Sturtevant and Rabin 2016: canonical orderings), in space, and where no corner is cut.
 //!
-//! A way comes to a cell by a move and goes on by another. A *detour* leads from where the way came from to where it goes,
-//! past the cell, without being longer. Where one is free, the step on can be left out.
+//! A way comes to a cell by a move and goes on by another. A *detour* leads from where the way came from to where it
+//! goes, past the cell, without being longer. Where one is free, the step on can be left out.
 
 use super::moves::{LENGTHS, bit};
 use super::{MOVES, moves_to};
@@ -24,8 +24,8 @@ pub(super) enum Worth {
     Any,
 }
 
-/// The detours around a cell, for a move to it and one on, as the cells that must be free for them: bits of the neighbourhood
-/// of the cell.
+/// The detours around a cell, for a move to it and one on, as the cells that must be free for them: bits of the
+/// neighbourhood of the cell.
 #[derive(Clone, Copy)]
 struct Detours {
     direct: u32,

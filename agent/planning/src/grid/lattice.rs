@@ -7,9 +7,9 @@ use crate::map::VoxelIndex;
 
 /// A box of cells with steps between neighbours.
 ///
-/// A step is told by the number of its move in [`MOVES`]. No step costs less than [`Lattice::least_costs`], and those must
-/// be such that the octile distance is what the shortest way on an empty grid costs ([`super::octile`]). The cost of the
-/// steps from a cell depends on that cell and its 26 neighbours alone.
+/// A step is told by the number of its move in [`MOVES`]. No step costs less than [`Lattice::least_costs`], and those
+/// must be such that the octile distance is what the shortest way on an empty grid costs ([`super::octile`]). The
+/// cost of the steps from a cell depends on that cell and its 26 neighbours alone.
 pub trait Lattice {
     /// Cells along x, y and z.
     fn size(&self) -> [usize; 3];
@@ -20,12 +20,13 @@ pub trait Lattice {
     /// Tells `visit` every step that leads from `cell`: its move and its cost.
     fn steps_from(&self, cell: VoxelIndex, visit: impl FnMut(usize, f64));
 
-    /// The same without some that a cheapest way which came to `cell` by a move need not take. What is left out leads where
-    /// one also gets from the cell before, without `cell`: for less, or for the same if the last step of that way
+    /// The same without some that a cheapest way which came to `cell` by a move need not take. What is left out leads
+    /// where one also gets from the cell before, without `cell`: for less, or for the same if the last step of that way
     /// is of a lesser kind ([`Move::kind`](super::Move::kind)).
     ///
-    /// A search of least cost finds the same costs with it. For if the cheapest ways to some cell end in steps left out,
-    /// then each also has a neighbour before it whose last step is of a lesser kind, and there are but three kinds.
+    /// A search of least cost finds the same costs with it. For if the cheapest ways to some cell end in steps left
+    /// out, then each also has a neighbour before it whose last step is of a lesser kind, and there are but three
+    /// kinds.
     fn steps_after(&self, cell: VoxelIndex, _arrived_by: usize, visit: impl FnMut(usize, f64)) {
         self.steps_from(cell, visit);
     }
@@ -43,12 +44,12 @@ pub trait ReversibleLattice: Lattice {
 pub struct StepCosts {
     /// Cost of a step through a face, across an edge and across a corner.
     pub lengths: [f64; 3],
-    /// Whether a diagonal step may pass between blocked cells. What flies never may: otherwise every cell of the box that
-    /// the step sweeps must be free.
+    /// Whether a diagonal step may pass between blocked cells. What flies never may: otherwise every cell of the box
+    /// that the step sweeps must be free.
     pub cuts_corners: bool,
-    /// The collision factor `Ob` (Zhang 2019): a step from a cell with a blocked one among its straight neighbours costs so
-    /// much more, with one among its diagonal neighbours half as much more, with both the sum. Zhang searches from the
-    /// goal to the start, so that the *child* of a step is the cell that the vehicle leaves.
+    /// The collision factor `Ob` (Zhang 2019): a step from a cell with a blocked one among its straight neighbours
+    /// costs so much more, with one among its diagonal neighbours half as much more, with both the sum. Zhang
+    /// searches from the goal to the start, so that the *child* of a step is the cell that the vehicle leaves.
     pub collision_factor: f64,
 }
 

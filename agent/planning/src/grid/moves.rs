@@ -71,8 +71,8 @@ const MIDDLE: [u32; 3] = [0o222_222_222, 0o070_070_070, 0o000_777_000];
 /// All 27 cells of a neighbourhood.
 const NEIGHBOURHOOD: u32 = 0o777_777_777;
 
-/// The ends of the moves whose boxes are free ([`Move::swept`]), of a neighbourhood with these cells blocked and its middle
-/// free. Along one axis after the other, what is blocked in the middle blocks what lies further out.
+/// The ends of the moves whose boxes are free ([`Move::swept`]), of a neighbourhood with these cells blocked and its
+/// middle free. Along one axis after the other, what is blocked in the middle blocks what lies further out.
 #[inline]
 pub(crate) fn unswept(blocked: u32) -> u32 {
     let spread = |blocked: u32, middle: u32, apart: u32| {

@@ -101,7 +101,8 @@ impl OccupancyGrid {
     #[inline(always)]
     pub fn blocked_around(&self, cell: VoxelIndex) -> u32 {
         let slab = self.row * self.layer;
-        // Cell (x, y, z) is bit x + 1 of row y + 1 of layer z + 1, so its lowest neighbour is bit x of row y of layer z.
+        // Cell (x, y, z) is bit x + 1 of row y + 1 of layer z + 1, so its lowest neighbour is bit x of row y of layer
+        // z.
         let first = cell.z * slab + cell.y * self.row + cell.x / 8;
         let shift = cell.x % 8;
         let in_row = |byte: usize| {

@@ -1,7 +1,7 @@
 //! Obstacles that move: found in a lidar's returns, followed from scan to scan, and predicted with growing uncertainty.
 //!
-//! Motion is horizontal. The height of a return is that of the lidar's plane, which pitches and climbs with the vehicle: seen from
-//! there every trunk goes up and down.
+//! Motion is horizontal. The height of a return is that of the lidar's plane, which pitches and climbs with the
+//! vehicle: seen from there every trunk goes up and down.
 
 use std::time::Duration;
 
@@ -29,7 +29,8 @@ pub struct MovingConfig {
     pub stays_m: f64,
     /// Slower than this a thing stands still, m/s.
     pub slowest_m_s: f64,
-    /// A thing moves once it is this far from where it was first seen, metres, and the map has nothing there any more ...
+    /// A thing moves once it is this far from where it was first seen, metres, and the map has nothing there any more
+    /// ...
     pub moved_m: f64,
     /// ... or once it is so far from there that no part of a trunk that comes into view could explain it, metres.
     pub surely_moved_m: f64,
@@ -157,10 +158,12 @@ impl Tracker {
         self.tracks.append(&mut lost);
     }
 
-    /// What moves, where it is expected `now`. Its uncertainty has grown since it was last seen, and it keeps no distance.
+    /// What moves, where it is expected `now`. Its uncertainty has grown since it was last seen, and it keeps no
+    /// distance.
     ///
-    /// Whatever moves has left the place where it was first seen: in the `map` what was seen of it there is free, though a map
-    /// takes its time to clear. The centre of what stands may seem to move as more of it comes into view, but not far; its surface does not.
+    /// Whatever moves has left the place where it was first seen: in the `map` what was seen of it there is free,
+    /// though a map takes its time to clear. The centre of what stands may seem to move as more of it comes into
+    /// view, but not far; its surface does not.
     pub fn moving<'a>(
         &'a self,
         now: Duration,

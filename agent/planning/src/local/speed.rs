@@ -1,4 +1,5 @@
-//! How fast the vector field histogram is flown: speed that follows the scene, and never steps (Xu 2023, speed planning).
+//! How fast the vector field histogram is flown: speed that follows the scene, and never steps (Xu 2023, speed
+//! planning).
 
 use nalgebra::Vector3;
 
@@ -22,7 +23,8 @@ pub struct SpeedConfig {
     pub beside_m_s: f64,
     /// Acceleration that the set-point never exceeds, in any direction, m/s^2. 0.86 is a pitch of 5 degrees.
     pub gentle_m_s2: f64,
-    /// Deceleration that slowing down is planned with, m/s^2: what it is less than `gentle_m_s2` is left for turning meanwhile.
+    /// Deceleration that slowing down is planned with, m/s^2: what it is less than `gentle_m_s2` is left for turning
+    /// meanwhile.
     pub brake_m_s2: f64,
     /// Deceleration that the vehicle is capable of in need, m/s^2.
     pub hard_m_s2: f64,
@@ -67,8 +69,8 @@ impl Default for SpeedConfig {
     }
 }
 
-/// The three phases over a leg of which `flown_m` lie behind and `remaining_m` ahead, m/s: from `k v` up to the cruising
-/// speed `v` over the first metres, and down over the last by `v (r / d)^a`.
+/// The three phases over a leg of which `flown_m` lie behind and `remaining_m` ahead, m/s: from `k v` up to the
+/// cruising speed `v` over the first metres, and down over the last by `v (r / d)^a`.
 ///
 /// ```
 /// use skein_planning::local::speed::{SpeedConfig, trapezoid};
@@ -86,13 +88,13 @@ pub fn trapezoid(flown_m: f64, remaining_m: f64, config: &SpeedConfig) -> f64 {
     config.cruise_m_s * up.min(down)
 }
 
-/// Fastest speed, m/s, at which a vehicle at `place` that goes in the unit direction `ahead` has nothing to fear of the safety
-/// [`filter`](crate::separation::filter) for the `obstacles` (ENU, metres; horizontal).
+/// Fastest speed, m/s, at which a vehicle at `place` that goes in the unit direction `ahead` has nothing to fear of
+/// the safety [`filter`](crate::separation::filter) for the `obstacles` (ENU, metres; horizontal).
 ///
-/// An obstacle at the distance `d`, the angle `u` off the way, leaves the gap `g = d - clearance`. The vehicle could still stop
-/// straight before it, `v cos u <= v_stop(g)`, and its stop along its own way, begun when it may have become faster by `a t`,
-/// brings it no nearer than that: `v cos u (t + (v + a t) / 2a) <= g`. The least over all obstacles counts, but never less than
-/// [`SpeedConfig::beside_m_s`].
+/// An obstacle at the distance `d`, the angle `u` off the way, leaves the gap `g = d - clearance`. The vehicle could
+/// still stop straight before it, `v cos u <= v_stop(g)`, and its stop along its own way, begun when it may have
+/// become faster by `a t`, brings it no nearer than that: `v cos u (t + (v + a t) / 2a) <= g`. The least over all
+/// obstacles counts, but never less than [`SpeedConfig::beside_m_s`].
 #[must_use]
 pub fn unhindered_speed(
     place: &Vector3<f64>,
@@ -113,8 +115,8 @@ pub fn unhindered_speed(
     obstacles.iter().map(bound).fold(f64::INFINITY, f64::min).max(config.beside_m_s)
 }
 
-/// Speed, m/s, from which a vehicle at `place` that goes in the unit direction `ahead` stops gently before the first of the
-/// `obstacles` that stands in its way.
+/// Speed, m/s, from which a vehicle at `place` that goes in the unit direction `ahead` stops gently before the first
+/// of the `obstacles` that stands in its way.
 #[must_use]
 pub fn speed_to_stop(
     place: &Vector3<f64>,
@@ -141,8 +143,9 @@ pub fn run_up(speed_m_s: f64, way_m: f64, config: &SpeedConfig) -> f64 {
     ((lag * lag + speed_m_s * speed_m_s + 2.0 * config.brake_m_s2 * way_m).sqrt() - lag).max(speed_m_s)
 }
 
-/// The next velocity of a set-point that was `previous`, on its way to `wanted`, after `step_s`: it turns and changes its
-/// speed by no more than `accel_m_s2`. Slowing down comes first: who turns away from what is ahead has not yet passed it.
+/// The next velocity of a set-point that was `previous`, on its way to `wanted`, after `step_s`: it turns and changes
+/// its speed by no more than `accel_m_s2`. Slowing down comes first: who turns away from what is ahead has not yet
+/// passed it.
 #[must_use]
 pub fn step(previous: &Vector3<f64>, wanted: &Vector3<f64>, step_s: f64, accel_m_s2: f64) -> Vector3<f64> {
     let most = accel_m_s2 * step_s;

@@ -1,5 +1,5 @@
-//! The vector field histogram as a local planner: which bearing to fly, from a lidar's returns (Xu 2023; the cost is that
-//! of VFH+, Ulrich and Borenstein 1998).
+//! The vector field histogram as a local planner: which bearing to fly, from a lidar's returns (Xu 2023; the cost is
+//! that of VFH+, Ulrich and Borenstein 1998).
 
 mod follower;
 
@@ -11,10 +11,11 @@ pub use follower::{Follower, Step};
 
 /// A detour for comfort turns from the target by no more than this, radians.
 const DETOUR: f64 = FRAC_PI_4;
-/// A bearing this near to the one chosen last is the same choice, and may turn from the target by so much more, radians.
+/// A bearing this near to the one chosen last is the same choice, and may turn from the target by so much more,
+/// radians.
 const SAME_CHOICE: f64 = 0.2;
-/// One that stands nearer to something than its safety radius may leave by what is so much nearer still, metres: not every way
-/// out leads straight away.
+/// One that stands nearer to something than its safety radius may leave by what is so much nearer still, metres: not
+/// every way out leads straight away.
 const WAY_OUT_M: f64 = 0.1;
 
 /// How the histogram is made and read.
@@ -172,8 +173,8 @@ impl Opening {
     }
 }
 
-/// Every opening: runs of free sectors that are wide enough to keep `radius_m`, at the distance of the nearest return in the
-/// blocked sectors that bound them.
+/// Every opening: runs of free sectors that are wide enough to keep `radius_m`, at the distance of the nearest return
+/// in the blocked sectors that bound them.
 #[must_use]
 pub fn openings(histogram: &Histogram, blocked: &[bool], radius_m: f64) -> Vec<Opening> {
     let count = blocked.len();
@@ -254,8 +255,8 @@ impl Vfh {
     /// The bearing to fly towards a target at the bearing `target`, while `heading` is flown (none at rest); all in
     /// radians counter-clockwise from east. `None` where no opening is left.
     ///
-    /// The edges of each opening are candidates, and the target if it lies in one; openings that leave the comfort radius come
-    /// first, as long as they lead within about an eighth of a turn of the target. The least
+    /// The edges of each opening are candidates, and the target if it lies in one; openings that leave the comfort
+    /// radius come first, as long as they lead within about an eighth of a turn of the target. The least
     /// `mu1 |c - target| + mu2 |c - heading| + mu3 |c - previous|` wins (Ulrich and Borenstein 1998).
     pub fn steer(&mut self, target: f64, heading: Option<f64>) -> Option<f64> {
         let VfhConfig { target_weight, heading_weight, previous_weight, .. } = self.config;
@@ -282,8 +283,8 @@ impl Vfh {
         self.chosen
     }
 
-    /// Distance that every opening of the newest scan leaves, metres: the safety radius, or less where the vehicle is nearer than
-    /// that to something.
+    /// Distance that every opening of the newest scan leaves, metres: the safety radius, or less where the vehicle is
+    /// nearer than that to something.
     #[must_use]
     pub fn kept_m(&self) -> f64 {
         self.kept_m
@@ -464,8 +465,8 @@ mod tests {
     }
 
     proptest! {
-        /// Straight on along the bearing no trunk that blocks its sector is nearer than the safety radius, but for the width of
-        /// a sector.
+        /// Straight on along the bearing no trunk that blocks its sector is nearer than the safety radius, but for
+        /// the width of a sector.
         #[test]
         fn the_bearing_keeps_the_safety_radius(trunks in prop::collection::vec(trunk(), 0..8), target in -PI..PI) {
             let config = VfhConfig { low_m: 0.0, high_m: 0.0, ..VfhConfig::default() };

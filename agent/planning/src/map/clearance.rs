@@ -215,7 +215,8 @@ impl ClearanceMap {
         self.segment_clearance(from, to) >= self.required(clearance_m)
     }
 
-    /// Whether the stretch of `path` between two stations has at least `clearance_m` in every voxel: no need to plan anew.
+    /// Whether the stretch of `path` between two stations has at least `clearance_m` in every voxel: no need to plan
+    /// anew.
     #[must_use]
     pub fn is_path_clear(&self, path: &Path, from_m: f64, to_m: f64, clearance_m: f64) -> bool {
         let inner = path.points().iter().zip(path.stations()).filter(|(_, at)| **at > from_m && **at < to_m);

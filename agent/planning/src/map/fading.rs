@@ -15,8 +15,8 @@ pub(super) type Stamp = u8;
 
 /// The clock of a map's hits, and the queue in which they wait to be looked up.
 ///
-/// A voxel is queued when its first hit comes, for the earliest time at which this could have faded; twice if it was made
-/// known otherwise meanwhile and is then hit anew, which does no harm.
+/// A voxel is queued when its first hit comes, for the earliest time at which this could have faded; twice if it was
+/// made known otherwise meanwhile and is then hit anew, which does no harm.
 /// Later hits are only stamped; that one came is found out when the voxel is looked up, and it is queued anew.
 /// So a hit costs nothing more, and neither does time in which nothing is due.
 #[derive(Clone, Debug)]

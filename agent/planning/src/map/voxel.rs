@@ -37,9 +37,9 @@ pub struct VoxelMapConfig {
     pub ground_m: f64,
     /// Time constant with which hits fade that no scan sees again, seconds; infinity keeps them for ever.
     ///
-    /// A hit of evidence `e` is given up once `e exp(-t / tau) < 1`, see [`VoxelMap::fade`]. Two minutes keep a single hit for
-    /// nearly three, and what was seen often for five: a dead end should outlast the way around it, for who forgets it on that way
-    /// turns back into it.
+    /// A hit of evidence `e` is given up once `e exp(-t / tau) < 1`, see [`VoxelMap::fade`]. Two minutes keep a
+    /// single hit for nearly three, and what was seen often for five: a dead end should outlast the way around it,
+    /// for who forgets it on that way turns back into it.
     pub fade_tau_s: f64,
 }
 

@@ -64,8 +64,8 @@ impl Default for FilterConfig {
 }
 
 impl FilterConfig {
-    /// Two vehicles that know of one another's place and keep their distance both do not limit one another beyond this, centre to centre, metres:
-    /// `separation + 2 v (t + v / 2a)` at the greatest speed `v`.
+    /// Two vehicles that know of one another's place and keep their distance both do not limit one another beyond
+    /// this, centre to centre, metres: `separation + 2 v (t + v / 2a)` at the greatest speed `v`.
     #[must_use]
     pub fn reach_m(&self) -> f64 {
         self.separation_m + 2.0 * self.max_speed_m_s * stop_s(self.max_speed_m_s, self)
@@ -138,8 +138,8 @@ struct Limit {
 /// A vehicle that is told to brake flies on for the latency `t` and then stops along its own velocity `v` with
 /// the deceleration `a`. On the way it comes nearer to what lies in the unit direction `n` by its *stop*, `S = n . v (t
 /// + |v| / 2a)`, at most. Since it is no faster than `s = min(v_max, |v| + a t)` when it brakes, its stop stays
-/// within the reach `h` if `n . v <= h / (t + s / 2a)`: a half-space. Nor is it told to fly faster than it could stop straight on,
-/// `n . v <= sqrt((a t)^2 + 2 a h) - a t`. With `g` for the gap:
+/// within the reach `h` if `n . v <= h / (t + s / 2a)`: a half-space. Nor is it told to fly faster than it could stop
+/// straight on, `n . v <= sqrt((a t)^2 + 2 a h) - a t`. With `g` for the gap:
 ///
 /// | what, at distance `d` | gap | reach `h` for `g >= 0` |
 /// |---|---|---|
@@ -150,12 +150,13 @@ struct Limit {
 /// For `g < 0` the bound is `g / t` (half that when shared): the vehicle must leave. `D` is widened by what is not
 /// known of the neighbour, see [`distance_kept_m`]. Distances between vehicles are stretched vertically.
 ///
-/// **Guarantee.** As long as `S_i + S_j <= g` for each two vehicles, all of them can brake at once and none comes nearer
-/// to another than `D`: `d` shrinks by no more than both stops, and `a` is needed in one direction only, so all
-/// limits are kept by the same braking. The reaches of two add up to the gap at most, so vehicles that follow the filter stay in
-/// such states; one that cannot take on what satisfies its limits within `t` brakes along its own velocity, by which every stop grows shorter by the way that it flies. Zero velocity satisfies every bound with `g >= 0` against what stands or cooperates: there is a feasible
-/// velocity as long as distances have been kept. What is flown beyond `t` of lag, below `a` of braking and outside
-/// the position errors is not covered.
+/// **Guarantee.** As long as `S_i + S_j <= g` for each two vehicles, all of them can brake at once and none comes
+/// nearer to another than `D`: `d` shrinks by no more than both stops, and `a` is needed in one direction only, so all
+/// limits are kept by the same braking. The reaches of two add up to the gap at most, so vehicles that follow the
+/// filter stay in such states; one that cannot take on what satisfies its limits within `t` brakes along its own
+/// velocity, by which every stop grows shorter by the way that it flies. Zero velocity satisfies every bound with `g
+/// >= 0` against what stands or cooperates: there is a feasible velocity as long as distances have been kept. What is
+/// flown beyond `t` of lag, below `a` of braking and outside the position errors is not covered.
 ///
 /// When no velocity is feasible, limits are relaxed in this order, each by as little as possible and equally:
 /// those of neighbours (obstacles do not give way), then all. The caller should climb or land by rank. If the
@@ -233,9 +234,9 @@ fn led(bound: f64, speed: f64) -> f64 {
 ///
 /// `D = separation + k sqrt(sigma_i^2 + sigma_j^2) + a_j u^2 / 2 + min(g_max, c (age - fresh)) + larger`
 ///
-/// `k` standard deviations for the errors of both positions; what the neighbour may have done since it was heard that straight on does not
-/// foretell, with an acceleration of `a_j` for `u = min(age, fresh)`; the growth `c` of the ghost of one that is silent; and what
-/// the neighbour's hull is larger.
+/// `k` standard deviations for the errors of both positions; what the neighbour may have done since it was heard that
+/// straight on does not foretell, with an acceleration of `a_j` for `u = min(age, fresh)`; the growth `c` of the
+/// ghost of one that is silent; and what the neighbour's hull is larger.
 #[must_use]
 pub fn distance_kept_m(sigma_m: f64, neighbour: &Neighbour, config: &FilterConfig) -> f64 {
     let unheard_s = neighbour.age_s.clamp(0.0, config.fresh_s);
@@ -349,8 +350,8 @@ fn solve(motion: &Motion, limits: &[Limit], config: &FilterConfig) -> Filtered {
 
 type Vector<const D: usize> = nalgebra::SVector<f64, D>;
 
-/// The velocity to fly for one that is flying at `now`: what satisfies the limits, and braking where that cannot be had in
-/// time.
+/// The velocity to fly for one that is flying at `now`: what satisfies the limits, and braking where that cannot be
+/// had in time.
 fn choose<const D: usize>(
     now: Vector<D>,
     wanted: Vector<D>,

@@ -1,4 +1,5 @@
-//! The routes that Zhang 2019 publishes, on a marker grid whose obstacles are a reconstruction: the paper's picture is not legible.
+//! The routes that Zhang 2019 publishes, on a marker grid whose obstacles are a reconstruction: the paper's picture
+//! is not legible.
 
 use nalgebra::Vector3;
 use skein_planning::Path;

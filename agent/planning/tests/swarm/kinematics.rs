@@ -56,7 +56,8 @@ impl Vehicle {
 
 /// Decides where a vehicle wants to go.
 pub trait Pilot {
-    /// The velocity wanted, and the obstacle points known, of a vehicle that believes to be at `position` and truly is at `truth`.
+    /// The velocity wanted, and the obstacle points known, of a vehicle that believes to be at `position` and truly
+    /// is at `truth`.
     fn decide(&mut self, position: &Vector3<f64>, truth: &Vector3<f64>) -> (Vector3<f64>, Vec<Vector3<f64>>);
 }
 

@@ -47,15 +47,15 @@ impl Default for ImprovedConfig {
 ///
 /// * *Inertia.* Let `delta` be the mean distance, as a share of the box's width, between where particles are and where
 ///   they were `k` generations ago. `delta >= lambda1`: `w = wmin`; `delta <= lambda2`: `w = wmax`; between: unchanged.
-/// * *Escape.* While `delta <= lambda2`, `pbest' = rand1 pbest` and `gbest' = rand2 gbest` attract instead of `pbest` and
-///   `gbest`, which are kept. P3 scales about the origin of coordinates, so that the result depends on where that is; here
-///   positions count from the search space's centre, and a shift in proportion to the box's width is added.
-/// * *Modes.* Random numbers are drawn for each mode of a chain of coordinates, not for each coordinate. A random mix of
-///   two smooth routes is then smooth, and an escape smooths; coordinate by coordinate it would be jagged. The shift of
-///   mode `m` goes with `1 / m^2`, as the modes of a taut string do.
+/// * *Escape.* While `delta <= lambda2`, `pbest' = rand1 pbest` and `gbest' = rand2 gbest` attract instead of `pbest`
+///   and `gbest`, which are kept. P3 scales about the origin of coordinates, so that the result depends on where that
+///   is; here positions count from the search space's centre, and a shift in proportion to the box's width is added.
+/// * *Modes.* Random numbers are drawn for each mode of a chain of coordinates, not for each coordinate. A random mix
+///   of two smooth routes is then smooth, and an escape smooths; coordinate by coordinate it would be jagged. The
+///   shift of mode `m` goes with `1 / m^2`, as the modes of a taut string do.
 ///
-/// P3 does not give `wmin` and `wmax`. The shift makes up for the inertia: swarms with `w` above 0.5 do not settle within
-/// 50 generations.
+/// P3 does not give `wmin` and `wmax`. The shift makes up for the inertia: swarms with `w` above 0.5 do not settle
+/// within 50 generations.
 #[derive(Clone, Debug)]
 pub struct Improved {
     config: ImprovedConfig,

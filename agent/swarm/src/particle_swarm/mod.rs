@@ -2,7 +2,8 @@
 //!
 //! One algorithm per file over one [`Swarm`]: an algorithm is a [`Motion`], which says how particles move. All of
 //! them move by the same equation, [`Mover::attract`]; they spend evaluations, not time, can be interrupted after any
-//! number of them, and go on where they stopped. The same seed and the same objective give the same result, bit for bit.
+//! number of them, and go on where they stopped. The same seed and the same objective give the same result, bit for
+//! bit.
 //!
 //! ```
 //! use skein_swarm::particle_swarm::{Improved, ImprovedConfig, Objective, SearchSpace, Swarm};
@@ -37,7 +38,7 @@ pub trait Objective {
     /// Its domain.
     fn space(&self) -> &SearchSpace;
 
-    /// Its value at a position in the space, one number for each dimension; if that is not below `limit`, any number that is
-    /// not. A swarm only needs to know values that are better than what it remembers.
+    /// Its value at a position in the space, one number for each dimension; if that is not below `limit`, any number
+    /// that is not. A swarm only needs to know values that are better than what it remembers.
     fn cost_below(&mut self, limit: f64, position: &[f64]) -> f64;
 }

@@ -70,8 +70,8 @@ impl SearchSpace {
         Ok(SearchSpace { chain, ..self })
     }
 
-    /// The same box with another centre than its middle: where a good position is to be expected, as the direct way is for
-    /// a route. It is brought into the box. [`super::Improved`] escapes towards it.
+    /// The same box with another centre than its middle: where a good position is to be expected, as the direct way
+    /// is for a route. It is brought into the box. [`super::Improved`] escapes towards it.
     ///
     /// # Errors
     /// If it has not one number for each dimension.

@@ -46,9 +46,9 @@ type Feature = (usize, bool);
 
 /// The improved swarm, and a tabu search (Glover 1989) that sets out, turn by turn, from the best it has found.
 ///
-/// A candidate solution changes one mode of one chain of coordinates. Of a few drawn at random the best is moved to, even
-/// if it is worse; to undo one of the last moves is tabu, unless that gives the best position found so far. So the search
-/// climbs out of a local minimum instead of falling back. What it finds leads the swarm.
+/// A candidate solution changes one mode of one chain of coordinates. Of a few drawn at random the best is moved to,
+/// even if it is worse; to undo one of the last moves is tabu, unless that gives the best position found so far. So
+/// the search climbs out of a local minimum instead of falling back. What it finds leads the swarm.
 #[derive(Clone, Debug)]
 pub struct TabuSwarm {
     config: TabuConfig,

@@ -18,8 +18,8 @@ pub struct Arrival {
 /// Lets vehicles arrive together as soon as possible. `times_s` has what each route takes at cruise
 /// ([`super::Assessment::time_s`]).
 ///
-/// The last one flies at cruise. The others fly as much slower as their routes take less time, but at most `slowest` times
-/// slower: who would have to arrives early, and the spread says by how much.
+/// The last one flies at cruise. The others fly as much slower as their routes take less time, but at most `slowest`
+/// times slower: who would have to arrives early, and the spread says by how much.
 #[must_use]
 pub fn arrive_together(times_s: &[f64], slowest: f64) -> Arrival {
     let time_s = times_s.iter().copied().fold(0.0, f64::max);
@@ -29,8 +29,8 @@ pub fn arrive_together(times_s: &[f64], slowest: f64) -> Arrival {
     Arrival { time_s, slowed, spread_s: time_s - first_s }
 }
 
-/// Places around a target for so many vehicles to arrive at, in a line across the way to it, `spacing_m` apart. The line is
-/// moved into the airspace where the target is at its edge.
+/// Places around a target for so many vehicles to arrive at, in a line across the way to it, `spacing_m` apart. The
+/// line is moved into the airspace where the target is at its edge.
 #[must_use]
 pub fn arrival_slots(
     target: &Vector3<f64>,

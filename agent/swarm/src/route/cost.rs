@@ -44,8 +44,8 @@ impl RouteCost {
         self.assess_below(f64::INFINITY, route, airspace, traffic)
     }
 
-    /// The same, as far as it is needed to know whether the cost is below a limit. All its parts only ever add to it, so what
-    /// has reached the limit is left there.
+    /// The same, as far as it is needed to know whether the cost is below a limit. All its parts only ever add to it,
+    /// so what has reached the limit is left there.
     #[must_use]
     pub(super) fn assess_below(
         &self,

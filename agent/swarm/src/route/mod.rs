@@ -1,8 +1,8 @@
 //! Routes of several vehicles through an airspace that is known beforehand (P3).
 //!
-//! Vehicles plan one after another, each among those who have planned before it ([`Traffic`]), and fly so that all arrive
-//! together ([`arrive_together`]). With a link the ground plans for all ([`Planner::Ground`]) and sends waypoints; without,
-//! each vehicle plans for itself ([`Planner::Onboard`]) among the routes that it has last heard of.
+//! Vehicles plan one after another, each among those who have planned before it ([`Traffic`]), and fly so that all
+//! arrive together ([`arrive_together`]). With a link the ground plans for all ([`Planner::Ground`]) and sends
+//! waypoints; without, each vehicle plans for itself ([`Planner::Onboard`]) among the routes that it has last heard of.
 //!
 //! ```
 //! use nalgebra::{Vector2, Vector3};

@@ -96,8 +96,8 @@ impl Plan {
     }
 }
 
-/// Plans for vehicles one after another, each among those before it. `plan` is given the vehicle's number, from 0, and its
-/// problem.
+/// Plans for vehicles one after another, each among those before it. `plan` is given the vehicle's number, from 0,
+/// and its problem.
 ///
 /// # Errors
 /// The first error of [`RouteProblem::new`], or that `plan` gives.

@@ -24,8 +24,8 @@ struct Extent {
     upper: Vector3<f64>,
 }
 
-/// The routes of vehicles that set out and arrive together ([`super::arrive_together`]): at any moment all have spent the
-/// same share of the time that their routes take.
+/// The routes of vehicles that set out and arrive together ([`super::arrive_together`]): at any moment all have spent
+/// the same share of the time that their routes take.
 ///
 /// Between the cuts vehicles are taken to move straight, so that their least distance there is known exactly.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,8 +49,8 @@ impl Traffic {
         least
     }
 
-    /// Tells, for every part of the flight and every vehicle that comes nearer than `reach_m` in it, the least distance in
-    /// that part, metres.
+    /// Tells, for every part of the flight and every vehicle that comes nearer than `reach_m` in it, the least
+    /// distance in that part, metres.
     pub(super) fn encounters(&self, own: &Track, reach_m: f64, mut tell: impl FnMut(f64)) {
         for other in &self.tracks {
             for stretch in 0..own.stretches.len() {

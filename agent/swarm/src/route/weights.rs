@@ -2,20 +2,20 @@
 
 use nalgebra::Vector3;
 
-/// The weights of P3's cost, `f = sum_i (phi1 L_i + phi2 t_i + phi3 H_i)` over a route's legs, plus the repulsion between
-/// vehicles. P3 gives none of them. The cost is in metres: what it would cost to fly so much further.
+/// The weights of P3's cost, `f = sum_i (phi1 L_i + phi2 t_i + phi3 H_i)` over a route's legs, plus the repulsion
+/// between vehicles. P3 gives none of them. The cost is in metres: what it would cost to fly so much further.
 ///
 /// * `L`: length.
 /// * `t`: time flown. P3's `t` is what is left of the endurance, which a cost must not reward spending. A leg takes as
 ///   long as its length at cruise or its climb at the rate of climb, whichever is longer.
-/// * `H`: `max(0, 1 - c / c0)^2` summed along the route, with the clearance `c` above the terrain and the comfortable one,
-///   `c0`.
+/// * `H`: `max(0, 1 - c / c0)^2` summed along the route, with the clearance `c` above the terrain and the comfortable
+///   one, `c0`.
 /// * Repulsion: `1/2 eta (1/rho - 1/rho0)^2` for `rho <= rho0`, summed along the route, with the distance `rho` of each
 ///   other vehicle at that time.
-/// * Endurance: nothing while more than the reserve is left, then a penalty that grows with the square of what is used of
-///   the reserve.
-/// * Violation: metres flown in threat or no-fly zones, too low, or too near another vehicle, and what is flown after the
-///   endurance is spent. A route without any is feasible.
+/// * Endurance: nothing while more than the reserve is left, then a penalty that grows with the square of what is
+///   used of the reserve.
+/// * Violation: metres flown in threat or no-fly zones, too low, or too near another vehicle, and what is flown after
+///   the endurance is spent. A route without any is feasible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RouteCost {
     /// `phi1`.

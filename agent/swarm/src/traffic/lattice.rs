@@ -1,8 +1,9 @@
 //! Places and speeds: what a double integrator with limits on each axis reaches exactly in equal steps of time.
 //!
-//! In each step an axis is at rest, or accelerates, cruises or brakes across half a cell or a whole one. With cells of length `c`
-//! and steps of `T`, speeds are `c / T` and accelerations `c / T^2` at most, on each axis. A vehicle at rest is in the
-//! middle of a cell; one that moves along an axis crosses the border of two cells exactly between two steps.
+//! In each step an axis is at rest, or accelerates, cruises or brakes across half a cell or a whole one. With cells
+//! of length `c` and steps of `T`, speeds are `c / T` and accelerations `c / T^2` at most, on each axis. A vehicle at
+//! rest is in the middle of a cell; one that moves along an axis crosses the border of two cells exactly between two
+//! steps.
 
 use std::ops::RangeInclusive;
 
@@ -55,8 +56,9 @@ impl State {
         self.then([0; 3])
     }
 
-    /// Every state a step later that the limits allow: no axis turns round without a rest, two at most move, and one at most
-    /// cruises. More would carry a vehicle farther in a step than it can answer for within the range of its radio.
+    /// Every state a step later that the limits allow: no axis turns round without a rest, two at most move, and one
+    /// at most cruises. More would carry a vehicle farther in a step than it can answer for within the range of its
+    /// radio.
     pub fn successors(&self) -> impl Iterator<Item = Self> + '_ {
         let [x, y, z] = self.speed.map(speeds_after);
         z.flat_map(move |z| {
@@ -126,8 +128,8 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// All cells whose middles lie between `least` and `greatest` (world ENU, m), with one in the middle of which is `through`.
-    /// An axis with as little room as for one middle has one cell.
+    /// All cells whose middles lie between `least` and `greatest` (world ENU, m), with one in the middle of which is
+    /// `through`. An axis with as little room as for one middle has one cell.
     #[must_use]
     pub fn new(least: Vector3<f64>, greatest: Vector3<f64>, through: Vector3<f64>, cell_m: f64) -> Self {
         let slack = 1e-6;
@@ -169,9 +171,10 @@ impl Lattice {
 
     /// The greatest way from where a vehicle is when it commits itself to where it will have come to rest, m.
     ///
-    /// `ahead_steps` is how long before the beginning of the step in question the commitment is made, counted back to where
-    /// the vehicle really is, which lags behind its commands; at most one. Two vehicles that do not hear one another cannot have
-    /// commitments that meet, if the range of radio is at least twice this and the distance to be kept.
+    /// `ahead_steps` is how long before the beginning of the step in question the commitment is made, counted back to
+    /// where the vehicle really is, which lags behind its commands; at most one. Two vehicles that do not hear one
+    /// another cannot have commitments that meet, if the range of radio is at least twice this and the distance to be
+    /// kept.
     #[must_use]
     pub fn reach_m(&self, ahead_steps: f64) -> f64 {
         let speeds = || (0..27_i8).map(|code| [code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1]);

@@ -11,7 +11,8 @@ const PLACES: u8 = 8;
 
 /// The moves on a lattice that keep clear of everything fixed, and from whose ends a vehicle can brake as clear.
 ///
-/// Building looks at the clearance of at most eight places for each state and speed: some ten thousand for a room of 10 m.
+/// Building looks at the clearance of at most eight places for each state and speed: some ten thousand for a room of
+/// 10 m.
 #[derive(Debug, Clone)]
 pub struct Roads {
     lattice: Lattice,
@@ -29,7 +30,8 @@ pub struct Distances {
 const UNREACHABLE: u16 = u16::MAX;
 
 impl Roads {
-    /// `clearance` is the distance from a point (world ENU, m) to the nearest obstacle, m; a move must keep `least_m` of it.
+    /// `clearance` is the distance from a point (world ENU, m) to the nearest obstacle, m; a move must keep `least_m`
+    /// of it.
     #[must_use]
     pub fn new(lattice: Lattice, clearance: impl Fn(&Vector3<f64>) -> f64, least_m: f64) -> Self {
         let is_clear = |from: State, to: State| {
@@ -115,8 +117,8 @@ impl Roads {
         Distances { goal, steps }
     }
 
-    /// The way from `state` to the goal of `distances`, as the cells it passes through in order. Where several are as short,
-    /// the one that moves least.
+    /// The way from `state` to the goal of `distances`, as the cells it passes through in order. Where several are as
+    /// short, the one that moves least.
     #[must_use]
     pub fn route(&self, state: State, distances: &Distances) -> Vec<[i16; 3]> {
         let mut state = state;

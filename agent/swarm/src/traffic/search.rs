@@ -1,14 +1,15 @@
 //! A way through space and time, around what others have announced: A* over states and steps (Silver 2005, "Cooperative
 //! pathfinding"), on the lattice of [`Roads`].
 //!
-//! Costs, in the order in which they count: meeting the plan of one that goes before, being where it will be a step later, time,
-//! passing over one that rests at its goal, way. A meeting is dear and not forbidden: whoever cannot escape gets as far away as it can,
-//! and plans again a step later. What *is* forbidden is a first step that is not compatible with what the others are
-//! committed to. Who makes way at the last moment would have the one that goes before wait for its commitment, and plan to go a
-//! step later, for which the last moment is a step later too; so making way early is cheaper.
+//! Costs, in the order in which they count: meeting the plan of one that goes before, being where it will be a step
+//! later, time, passing over one that rests at its goal, way. A meeting is dear and not forbidden: whoever cannot
+//! escape gets as far away as it can, and plans again a step later. What *is* forbidden is a first step that is not
+//! compatible with what the others are committed to. Who makes way at the last moment would have the one that goes
+//! before wait for its commitment, and plan to go a step later, for which the last moment is a step later too; so
+//! making way early is cheaper.
 //!
-//! After the last announced move the search no longer tells steps apart, so its effort is bounded by states times announced steps; it
-//! ends at its budget of expansions with the best that it has.
+//! After the last announced move the search no longer tells steps apart, so its effort is bounded by states times
+//! announced steps; it ends at its budget of expansions with the best that it has.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -1,12 +1,14 @@
 //! Who goes before whom.
 //!
-//! A vehicle that has been at its goal goes behind all that have not. Among the others the one with the longest way goes first, so
-//! that the last to arrive arrives early; and whoever goes the same way through the same narrow places goes with it, in its *convoy*:
-//! it takes over the leader's rank, and keeps it until it has arrived. So a corridor is used in one direction by many before it is
-//! used in the other, and a vehicle in the middle of it is not sent back because the one ahead of it has arrived.
+//! A vehicle that has been at its goal goes behind all that have not. Among the others the one with the longest way
+//! goes first, so that the last to arrive arrives early; and whoever goes the same way through the same narrow places
+//! goes with it, in its *convoy*: it takes over the leader's rank, and keeps it until it has arrived. So a corridor
+//! is used in one direction by many before it is used in the other, and a vehicle in the middle of it is not sent
+//! back because the one ahead of it has arrived.
 //!
-//! Standings that never changed could let all wait for ever: the first for one in its way, and that one for another, which goes
-//! before it and has time. So a vehicle that has waited for long is lent another for a while; see [`Traveller`](super::Traveller).
+//! Standings that never changed could let all wait for ever: the first for one in its way, and that one for another,
+//! which goes before it and has time. So a vehicle that has waited for long is lent another for a while; see
+//! [`Traveller`](super::Traveller).
 
 use std::cmp::Reverse;
 

@@ -1,4 +1,5 @@
-//! One vehicle in traffic: hears the others' words, plans for itself, commits itself by one step in its turn, and says so.
+//! One vehicle in traffic: hears the others' words, plans for itself, commits itself by one step in its turn, and
+//! says so.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,7 +16,8 @@ use super::standing::{Rank, Standing};
 
 /// A vehicle that has not been heard of for so many steps has changed its mind since.
 const FORGOTTEN_AFTER: u32 = 8;
-/// A vehicle that cannot escape is gone around for so many steps: enough to let another out of a corridor that both want.
+/// A vehicle that cannot escape is gone around for so many steps: enough to let another out of a corridor that both
+/// want.
 const CORNERED_FOR: u32 = 12;
 /// A vehicle at its goal is believed to stay there for so many steps by those that it goes before.
 const STAYS_FOR: u32 = 20;
@@ -242,7 +244,8 @@ impl Traveller {
             .collect();
         let (before, behind): (Vec<&Word>, Vec<&Word>) =
             self.heard.values().partition(|word| word.standing < self.word.standing);
-        // Who rests at its goal stays there, for those behind it; and whoever cannot make way is waited for, whatever its standing.
+        // Who rests at its goal stays there, for those behind it; and whoever cannot make way is waited for, whatever
+        // its standing.
         let settled = before.iter().filter(|word| word.is_settled()).map(|word| (word, step + STAYS_FOR));
         let cornered =
             behind.iter().map(|word| (word, word.cornered_until)).filter(|(_, until)| *until > step);
@@ -275,9 +278,10 @@ impl Traveller {
         self.lent.map_or(self.standing, |(lent, _)| lent.min(self.standing))
     }
 
-    /// The standing that it has for a while after it has rested for long away from its goal. In the way of one that goes before it
-    /// has that one's, but for that one itself: who is in its own way out makes way in turn (priority inheritance: Sha 1990).
-    /// Else, if it has been at its goal, it has its own from before: who rests at its own goal in front of it makes way.
+    /// The standing that it has for a while after it has rested for long away from its goal. In the way of one that
+    /// goes before it has that one's, but for that one itself: who is in its own way out makes way in turn (priority
+    /// inheritance: Sha 1990). Else, if it has been at its goal, it has its own from before: who rests at its own
+    /// goal in front of it makes way.
     fn lent_standing(&self, step: u32, start: State) -> Standing {
         let rest = Move { from: start, to: start };
         let crosses = |word: &&Word| {

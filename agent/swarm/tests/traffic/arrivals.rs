@@ -20,7 +20,8 @@ fn all_pass_through_mazes_of_narrow_corridors_in_both_directions() {
 
 #[test]
 fn knots_that_others_once_could_not_undo_come_undone() {
-    // A way out behind those who cannot move; a goal in front of the only door; two that wait for one another to go first.
+    // A way out behind those who cannot move; a goal in front of the only door; two that wait for one another to go
+    // first.
     for seed in [1020, 1099, 1145] {
         assert_all_arrive(seed, &fly(&Place::maze(seed), MOST_STEPS));
     }

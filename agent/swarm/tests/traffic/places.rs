@@ -33,8 +33,8 @@ pub struct Place {
 }
 
 impl Place {
-    /// A maze of corridors of one cell between two halls; half of the vehicles fly through it one way, half the other, each from
-    /// and to any cell of the halls.
+    /// A maze of corridors of one cell between two halls; half of the vehicles fly through it one way, half the
+    /// other, each from and to any cell of the halls.
     pub fn maze(seed: u64) -> Self {
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
         let open = carve(rng);
@@ -83,7 +83,8 @@ impl Place {
     }
 }
 
-/// The open cells of a maze of nine by nine: a tree that grows at random from the entrance in the west, and a few cells more.
+/// The open cells of a maze of nine by nine: a tree that grows at random from the entrance in the west, and a few
+/// cells more.
 fn carve(rng: &mut ChaCha8Rng) -> BTreeSet<(i16, i16)> {
     let beside = |(x, y): (i16, i16)| [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)];
     let is_inside = |(x, y): (i16, i16)| (1..8).contains(&x) && (1..8).contains(&y);

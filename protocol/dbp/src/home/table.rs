@@ -112,8 +112,8 @@ impl BidTable {
         changes(node, &before, &bidder.bids)
     }
 
-    /// Takes in a record of a roster member in its present life. One that is older than what is known, or whose sender has
-    /// to catch up first, does not count.
+    /// Takes in a record of a roster member in its present life. One that is older than what is known, or whose
+    /// sender has to catch up first, does not count.
     pub(super) fn take_in(&mut self, now: Duration, record: &BidRecord, past: &Past<'_>) -> Option<TakenIn> {
         let for_this_life = record.home_incarnation == Some(self.incarnation);
         let mut since = Vec::new();

@@ -1,8 +1,8 @@
 //! The catalogue of events that vehicles and ground stations agree on, a file for each subject.
 //!
-//! An event's home is its first two name chunks: `uav/3/takeoff` is decided on `uav/3`, whoever asks for it. Each event is
-//! declared once, with its fields; from there come its constructor, its reader, its sets and its line in `docs/events.md`.
-//! Lengths are in metres, positions ENU.
+//! An event's home is its first two name chunks: `uav/3/takeoff` is decided on `uav/3`, whoever asks for it. Each
+//! event is declared once, with its fields; from there come its constructor, its reader, its sets and its line in
+//! `docs/events.md`. Lengths are in metres, positions ENU.
 //!
 //! ```
 //! use skein_wire::event::{Arrived, Declared as _, Events as _, Goto};

@@ -1,8 +1,8 @@
 //! The outer loops: a wished position or velocity becomes an attitude and a thrust (P4, cascade PID).
 //!
-//! Position error -> velocity (proportional, braking in time, with an integral where the vehicle's file says so) -> a reference that moves with limited
-//! acceleration and jerk -> acceleration (PI on velocity, reference acceleration ahead) -> thrust vector
-//! within the tilt limit.
+//! Position error -> velocity (proportional, braking in time, with an integral where the vehicle's file says so) -> a
+//! reference that moves with limited acceleration and jerk -> acceleration (PI on velocity, reference acceleration
+//! ahead) -> thrust vector within the tilt limit.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3};
 use skein_mav::axes;

@@ -1,5 +1,5 @@
-//! Behavioural programs: how many events a second of one processor's time gives, beside BPpy's on the same programs, and
-//! how many states a second are verified.
+//! Behavioural programs: how many events a second of one processor's time gives, beside BPpy's on the same programs,
+//! and how many states a second are verified.
 
 use std::io::Write as _;
 use std::process::{Command, Stdio};

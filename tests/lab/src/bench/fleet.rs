@@ -1,7 +1,7 @@
 //! The cost of a node as the fleet grows: memory and messages, over the network in memory.
 //!
-//! Every vehicle asks leave to move ten times a second at its own home, claims a passage of its own from time to time by
-//! a block at every other home, and tells its state ten times a second; the ground station launches them one after
+//! Every vehicle asks leave to move ten times a second at its own home, claims a passage of its own from time to time
+//! by a block at every other home, and tells its state ten times a second; the ground station launches them one after
 //! another and holds them all for a while. Each size runs in a process of its own, so that its memory is its own.
 
 use std::process::{Command, Stdio};

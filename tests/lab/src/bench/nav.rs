@@ -1,5 +1,5 @@
-//! Navigation: what one tick of a vehicle's pipeline costs, from a scan of 720 rays to the set-point, with 20 neighbours; and
-//! where the time goes. In CPU time, so that what else the computer does is not in it.
+//! Navigation: what one tick of a vehicle's pipeline costs, from a scan of 720 rays to the set-point, with 20
+//! neighbours; and where the time goes. In CPU time, so that what else the computer does is not in it.
 
 use std::time::Duration;
 

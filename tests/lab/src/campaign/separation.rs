@@ -1,4 +1,5 @@
-//! `campaign separation`: swarms that hear one another late and not always, in lockstep; nobody may touch anybody, or anything.
+//! `campaign separation`: swarms that hear one another late and not always, in lockstep; nobody may touch anybody, or
+//! anything.
 
 use std::ops::RangeInclusive;
 

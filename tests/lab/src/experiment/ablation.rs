@@ -29,8 +29,9 @@ use crate::statistics::mean;
 
 /// Worlds of the first scenario.
 const RUNS: usize = 50;
-/// In forests vehicles fly side by side, so others show what keeps them apart: in one all meet in the middle, in one all want
-/// through the same window. A number beside each says how many times fewer worlds of it are flown, for these differ little.
+/// In forests vehicles fly side by side, so others show what keeps them apart: in one all meet in the middle, in one
+/// all want through the same window. A number beside each says how many times fewer worlds of it are flown, for these
+/// differ little.
 const SCENARIOS: [(&str, usize); 3] = [("forest", 1), ("antipodal", 5), ("window", 5)];
 /// A vehicle that has not arrived by then has failed, s: three times what one needs.
 const TIME_LIMIT_S: f64 = 120.0;

@@ -28,7 +28,8 @@ const HEIGHT_M: f64 = 2.0;
 const AWAY_M: f64 = 6.0;
 /// The circle's first point is waited at for so long, s.
 const JOINING_S: f64 = 8.0;
-/// Errors count from when the vehicle is first this near to where it shall be, m: overshoot counts, the way there does not.
+/// Errors count from when the vehicle is first this near to where it shall be, m: overshoot counts, the way there
+/// does not.
 const JOINED_M: f64 = 0.5;
 /// Steps of the world between two set-points: 50 a second.
 const STEPS_PER_TICK: u32 = 5;

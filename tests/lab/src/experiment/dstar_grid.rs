@@ -160,8 +160,8 @@ impl World {
         }
     }
 
-    /// Changes in a run. In rooms, where nearly all of the map is nearer than the goal, searches from scratch take so long
-    /// that there are fewer.
+    /// Changes in a run. In rooms, where nearly all of the map is nearer than the goal, searches from scratch take so
+    /// long that there are fewer.
     fn changes(self) -> usize {
         match self {
             Self::Rooms => 250,
@@ -287,8 +287,8 @@ impl Flight {
         Ok(())
     }
 
-    /// Blocks or frees a cube of 1 to 3 m within reach of the vehicle, every second time on the way ahead. Returns the cells
-    /// that are not as they were.
+    /// Blocks or frees a cube of 1 to 3 m within reach of the vehicle, every second time on the way ahead. Returns
+    /// the cells that are not as they were.
     fn change(&mut self, route: &[VoxelIndex]) -> Vec<VoxelIndex> {
         let blocks = self.rng.random::<bool>();
         let edge = self.rng.random_range(1..=3_usize);

@@ -1,5 +1,5 @@
-//! Right of way: `window` flown by blocks that are confirmed before a vehicle enters, and by the naive rule that enters where
-//! nobody is heard, over the network of the scenario and over a slow one that loses messages.
+//! Right of way: `window` flown by blocks that are confirmed before a vehicle enters, and by the naive rule that
+//! enters where nobody is heard, over the network of the scenario and over a slow one that loses messages.
 
 use std::collections::BTreeMap;
 

@@ -112,8 +112,8 @@ fn fly(scenario: &Scenario) -> anyhow::Result<Flight> {
     Ok(Flight { summary: flown.summary, track })
 }
 
-/// How far the thrust leans from the direction that keeps a vehicle at its velocity, in still air, degrees. Pitch and roll
-/// are parts of it, so neither is more.
+/// How far the thrust leans from the direction that keeps a vehicle at its velocity, in still air, degrees. Pitch and
+/// roll are parts of it, so neither is more.
 fn tilt_from_trim_deg(motion: &RigidState, model: &VehicleModel) -> f64 {
     let velocity = motion.velocity;
     let drag = velocity * ((model.linear_drag + model.quadratic_drag * velocity.norm()) / model.mass_kg);

@@ -98,8 +98,8 @@ impl Observer {
         if known.is_some_and(|known| known.incarnation > incarnation) {
             return Err(format!("{fact} goes back to a life that is over"));
         }
-        // Of a home that was known, or that has started after this node's first step, nothing may be missed. A process that
-        // has not run yet cannot know that others have started meanwhile.
+        // Of a home that was known, or that has started after this node's first step, nothing may be missed. A
+        // process that has not run yet cannot know that others have started meanwhile.
         let ran = knowledge.member(me).present().and_then(|life| life.ran);
         let from_start = known.is_some() || ran.is_some_and(|ran| life.began >= ran);
         self.positions.insert(home, Position { incarnation, at: from_start.then_some(0) });

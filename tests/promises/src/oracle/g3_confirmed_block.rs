@@ -178,8 +178,8 @@ impl ConfirmedBlock {
 }
 
 impl Sure {
-    /// Its holder has moved on to a synchronisation point with this bid: whether the block goes on, as far as the bid still
-    /// states it.
+    /// Its holder has moved on to a synchronisation point with this bid: whether the block goes on, as far as the bid
+    /// still states it.
     fn goes_on(&mut self, bid: &Bid, sync: u64) -> bool {
         let blocks = !bid.blocks().is_none() && bid.blocks().is_within(&self.set);
         (self.sync, self.set) = (sync, bid.blocks().clone());

@@ -118,8 +118,8 @@ fn came_after(observer: usize, home: usize, knowledge: &Knowledge) -> bool {
     present(home).zip(ran).is_some_and(|(life, ran)| life.began < ran)
 }
 
-/// Whether a node takes no part since it is in a former term, of its own doing: its b-threads block the order that would
-/// tell it of the new one.
+/// Whether a node takes no part since it is in a former term, of its own doing: its b-threads block the order that
+/// would tell it of the new one.
 fn keeps_to_a_former_term(node: usize, home: usize, knowledge: &Knowledge) -> bool {
     let member = knowledge.member(node);
     let term = |member: &Member| member.roster.as_ref().map_or(0, |roster| roster.term);

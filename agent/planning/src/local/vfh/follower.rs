@@ -11,7 +11,8 @@ use crate::path::Path;
 /// Slower than this the vehicle has no heading of its own, m/s.
 const AT_REST_M_S: f64 = 0.3;
 
-/// The path ahead is looked at so far, metres: as far as it takes to slow down from any speed that is flown among obstacles.
+/// The path ahead is looked at so far, metres: as far as it takes to slow down from any speed that is flown among
+/// obstacles.
 const PREVIEW_M: f64 = 8.0;
 /// Between two places on the path that are looked at, metres.
 const PREVIEW_STEP_M: f64 = 0.5;
@@ -61,8 +62,8 @@ impl Follower {
 
     /// The velocity that follows `path` from about `station_m` (where the last call was), no faster than `cap_m_s`.
     ///
-    /// It leads through the opening that is best for reaching the path ahead, at the speed that the phase of the leg, the
-    /// scene and the cap allow. Without an opening it is zero.
+    /// It leads through the opening that is best for reaching the path ahead, at the speed that the phase of the leg,
+    /// the scene and the cap allow. Without an opening it is zero.
     pub fn follow(
         &mut self,
         path: &Path,

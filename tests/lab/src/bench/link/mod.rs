@@ -119,7 +119,8 @@ impl Task for Extent {
     }
 }
 
-/// Times in microseconds over plain Zenoh, over Zenoh on the threads that ours works on, through our queues, and as events.
+/// Times in microseconds over plain Zenoh, over Zenoh on the threads that ours works on, through our queues, and as
+/// events.
 fn round_trips(count: usize) -> anyhow::Result<[Times; 4]> {
     let each = count.div_ceil(TURNS);
     let mut plain = Plain::start(each, Some(AS_IT_COMES))?;
@@ -144,7 +145,8 @@ fn round_trips(count: usize) -> anyhow::Result<[Times; 4]> {
     Ok(times.map(Times::of))
 }
 
-/// A put, and a reply through a subscriber: between two other processes, whose Zenoh can be set up differently from ours.
+/// A put, and a reply through a subscriber: between two other processes, whose Zenoh can be set up differently from
+/// ours.
 struct Plain {
     asks: Peer,
     _echoes: Peer,

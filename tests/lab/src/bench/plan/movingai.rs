@@ -166,8 +166,8 @@ fn counts<const N: usize>(line: &str) -> Option<[usize; N]> {
 /// Reads the problems of a scenario for a map: of a `.scen` if the map has one layer, else of a `.3dscen`.
 ///
 /// # Errors
-/// The first line at fault; also one that begins or ends where the map is blocked, or that is meant for a map of another
-/// size.
+/// The first line at fault; also one that begins or ends where the map is blocked, or that is meant for a map of
+/// another size.
 pub fn problems(text: &str, grid: &OccupancyGrid) -> Result<Vec<Problem>, FormatError> {
     let mut lines = Lines::of(text);
     let version = lines.expect("`version 1`")?;

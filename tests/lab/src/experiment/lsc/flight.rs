@@ -1,9 +1,9 @@
 //! One mission: a world, its vehicles, their radio, and what came of it.
 //!
-//! Nobody plans for anybody else. The only things vehicles share are the map, the clock that starts with the mission, and what they
-//! say to whoever is within range. Within each step they speak in turn, one every 4 ms: first all say what they are committed to, for
-//! those who have come into range, then twice each plans, commits itself and says so. The last word is said just before the
-//! step begins.
+//! Nobody plans for anybody else. The only things vehicles share are the map, the clock that starts with the mission,
+//! and what they say to whoever is within range. Within each step they speak in turn, one every 4 ms: first all say
+//! what they are committed to, for those who have come into range, then twice each plans, commits itself and says so.
+//! The last word is said just before the step begins.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,8 +22,8 @@ use skein_sim::mission::{LscAgent, LscMission};
 
 /// Cells of the lattice, as of the missions' starts and goals, m.
 const CELL_M: f64 = 0.5;
-/// A step of the lattice lasts as many ticks. With 28 a vehicle moves at 0.89 m/s and 1.59 m/s^2 at most: what is left of
-/// the limits corrects.
+/// A step of the lattice lasts as many ticks. With 28 a vehicle moves at 0.89 m/s and 1.59 m/s^2 at most: what is
+/// left of the limits corrects.
 const TICKS_PER_STEP: u64 = 28;
 /// The agents' tick in steps of the world: 20 ms.
 const STEPS_PER_TICK: u64 = 5;

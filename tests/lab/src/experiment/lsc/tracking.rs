@@ -1,8 +1,9 @@
 //! From an itinerary to velocity commands within their limits.
 //!
-//! A vehicle answers a velocity command late. All answer alike, so all are late together, and where they are relative to one another
-//! is as planned. The tracker therefore corrects towards where the vehicle should be by now, late as it is: the itinerary seen
-//! through a model of the answer, a dead time and then a damped oscillator of second order on each axis.
+//! A vehicle answers a velocity command late. All answer alike, so all are late together, and where they are relative
+//! to one another is as planned. The tracker therefore corrects towards where the vehicle should be by now, late as
+//! it is: the itinerary seen through a model of the answer, a dead time and then a damped oscillator of second order
+//! on each axis.
 
 use std::collections::VecDeque;
 

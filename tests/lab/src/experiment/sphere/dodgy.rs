@@ -15,8 +15,8 @@ const MOST_NEIGHBOURS: usize = 10;
 /// Collisions are avoided this far ahead, seconds.
 const HORIZON_S: f32 = 10.0;
 
-/// The crate's avoidance, agent by agent: its own `Simulator` passes over those who are near (0.5.2) and finds neighbours by comparing all
-/// pairs, so they are found here as for ours.
+/// The crate's avoidance, agent by agent: its own `Simulator` passes over those who are near (0.5.2) and finds
+/// neighbours by comparing all pairs, so they are found here as for ours.
 pub(super) struct Dodgy;
 
 impl Avoidance for Dodgy {

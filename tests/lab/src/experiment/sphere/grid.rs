@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 
 /// Vehicles by the cell that they are in; made anew when they have moved.
 ///
-/// A uniform grid (Green 2010, "Particle simulation using CUDA", with the cells sorted rather than hashed). Making it takes `O(n log n)`
-/// steps. Looking around a place costs nine searches of `O(log n)`, and one comparison for each vehicle in the 27 cells
-/// there: with an edge of the distance that is looked at, about as many as are near.
+/// A uniform grid (Green 2010, "Particle simulation using CUDA", with the cells sorted rather than hashed). Making it
+/// takes `O(n log n)` steps. Looking around a place costs nine searches of `O(log n)`, and one comparison for each
+/// vehicle in the 27 cells there: with an edge of the distance that is looked at, about as many as are near.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     edge_m: f64,

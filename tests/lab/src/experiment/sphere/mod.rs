@@ -1,9 +1,9 @@
-//! `sphere`: all vehicles start on a sphere and fly through its middle to the other side (the `Sphere` example of RVO2-3D, van den
-//! Berg 2011): the crowd in which separation shows what it can do.
+//! `sphere`: all vehicles start on a sphere and fly through its middle to the other side (the `Sphere` example of
+//! RVO2-3D, van den Berg 2011): the crowd in which separation shows what it can do.
 //!
-//! Vehicles are points that fly what the repulsion and the safety filter make of "straight to the goal", no more: the two that fly
-//! on vehicles, with the example's size, speed and time step. They change their velocity by no more than [`ACCEL_M_S2`]
-//! allows; those of the peer take on any velocity at once, as in the example.
+//! Vehicles are points that fly what the repulsion and the safety filter make of "straight to the goal", no more: the
+//! two that fly on vehicles, with the example's size, speed and time step. They change their velocity by no more than
+//! [`ACCEL_M_S2`] allows; those of the peer take on any velocity at once, as in the example.
 
 #[cfg(feature = "peers")]
 mod dodgy;
@@ -22,7 +22,8 @@ use crate::numbers::one_or_more;
 use crate::report::{Bound, Report};
 use crate::reported::Experiment;
 
-/// Vehicles, if none are asked for, and the radius of their sphere, metres. More vehicles have as much of the sphere each.
+/// Vehicles, if none are asked for, and the radius of their sphere, metres. More vehicles have as much of the sphere
+/// each.
 const PUBLISHED: (usize, f64) = (100, 35.0);
 /// Vehicles of the larger sphere that is flown beside it.
 const MANY: usize = 1000;
@@ -167,8 +168,8 @@ impl Flight {
     }
 }
 
-/// Vehicles spread evenly over a sphere (on a spiral by the golden angle, Swinbank and Purser 2006) that stands 5 m above the
-/// ground, each with its goal opposite.
+/// Vehicles spread evenly over a sphere (on a spiral by the golden angle, Swinbank and Purser 2006) that stands 5 m
+/// above the ground, each with its goal opposite.
 fn on_sphere(count: usize, radius_m: f64) -> Vec<Vehicle> {
     let golden_rad = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let centre = Vector3::new(0.0, 0.0, radius_m + 5.0);

@@ -19,8 +19,8 @@ pub struct Baseline {
 impl Baseline {
     /// The standard swarm: `w = 0.9`, `c1 = c2 = 2` (P3).
     pub const STANDARD: Self = Self { inertia: 0.9, attraction: 2.0, max_step: 0.5 };
-    /// The swarm with constriction (Clerc and Kennedy 2002): `chi = 0.729`, `c1 = c2 = 1.494`, which `phi = 4.1` gives and
-    /// with which a swarm contracts by itself.
+    /// The swarm with constriction (Clerc and Kennedy 2002): `chi = 0.729`, `c1 = c2 = 1.494`, which `phi = 4.1`
+    /// gives and with which a swarm contracts by itself.
     pub const CONSTRICTION: Self = Self { inertia: 0.729, attraction: 1.494, max_step: 0.5 };
 
     /// Searches for a route, as [`Planner::plan`](skein_swarm::route::Planner::plan) does.

@@ -1,10 +1,11 @@
-//! Twenty vehicles plan routes to ten targets among mountains and threats, to arrive together (P3): the improved particle
-//! swarm, alone and with tabu search, against the standard one, the one with constriction, and a reference that is near the
-//! best there is.
+//! Twenty vehicles plan routes to ten targets among mountains and threats, to arrive together (P3): the improved
+//! particle swarm, alone and with tabu search, against the standard one, the one with constriction, and a reference
+//! that is near the best there is.
 //!
-//! All swarms search in the same space, the coordinates of [`WAYPOINTS`] waypoints anywhere in the world; they begin with
-//! the same particles, drawn evenly from it, may move as far at once, and spend as many evaluations of the same cost,
-//! `Ns T = 30 x 50`. What P3 leaves open was chosen on seeds 1 to 150; the runs have the seeds from [`FIRST_SEED`] on.
+//! All swarms search in the same space, the coordinates of [`WAYPOINTS`] waypoints anywhere in the world; they begin
+//! with the same particles, drawn evenly from it, may move as far at once, and spend as many evaluations of the same
+//! cost, `Ns T = 30 x 50`. What P3 leaves open was chosen on seeds 1 to 150; the runs have the seeds from
+//! [`FIRST_SEED`] on.
 
 pub mod any_angle;
 pub mod baseline;
@@ -193,8 +194,8 @@ fn objectives(done: &[Run], report: &mut Report) {
     }
 }
 
-/// The same share over those vehicles only for which both the planner's and the standard swarm's route are feasible, so that
-/// no weight of a violation has a part in it.
+/// The same share over those vehicles only for which both the planner's and the standard swarm's route are feasible,
+/// so that no weight of a violation has a part in it.
 fn below_among_feasible(done: &[Run], who: usize) -> f64 {
     let (mut ours, mut theirs) = (0.0, 0.0);
     for run in done {
@@ -248,8 +249,8 @@ fn arrivals(done: &[Run], report: &mut Report) {
     report.goal("onboard: from the first to the last arrival, worst run (s)", most_s, Bound::AtMost(1.0));
 }
 
-/// How the figure depends on what P3 leaves open of the baseline: the speed bound, the number of waypoints, and where the
-/// particles begin.
+/// How the figure depends on what P3 leaves open of the baseline: the speed bound, the number of waypoints, and where
+/// the particles begin.
 fn variants(
     airspace: &Airspace,
     vehicles: usize,

@@ -49,8 +49,8 @@ pub fn airspace() -> Airspace {
     }
 }
 
-/// Start and goal of each vehicle. They set out along the western edge, each from a place of its own that is drawn from the
-/// seed, and arrive at slots around the targets, so assigned that the straight ways are shortest together.
+/// Start and goal of each vehicle. They set out along the western edge, each from a place of its own that is drawn
+/// from the seed, and arrive at slots around the targets, so assigned that the straight ways are shortest together.
 pub fn ends(airspace: &Airspace, vehicles: usize, seed: u64) -> Option<Vec<(Vector3<f64>, Vector3<f64>)>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let lane_m = (airspace.upper.y - airspace.lower.y) / vehicles as f64;
