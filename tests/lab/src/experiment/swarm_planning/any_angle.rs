@@ -30,8 +30,8 @@ impl Default for AnyAngleConfig {
 /// 1. A* on a cubic lattice, 26 neighbours, by the cost of each leg without the other vehicles: its best way is found.
 /// 2. Pulled taut: of all routes through some of that way's points in order, the best, by dynamic programming.
 /// 3. Refined, now by the whole cost, others included: legs are divided until none is longer than asked, then
-///   waypoints are moved, alone and together with their neighbours, as long as that makes the route cheaper, with
-///   steps that get finer.
+///    waypoints are moved, alone and together with their neighbours, as long as that makes the route cheaper, with
+///    steps that get finer.
 ///
 /// It is free in the number of waypoints and in its effort: `O(V log V)` for `V` lattice points, then some thousand
 /// evaluations of the cost.
