@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use skein_dbp::NodeName;
 use skein_mav::{Companion, CompanionConfig, Landed, SetPoint};
 use skein_planning::map::MapError;
-use skein_wire::{Scan, State};
+use skein_wire::{Limits, Scan, State};
 
 use crate::{
     config::AgentConfig,
@@ -17,6 +17,7 @@ use crate::{
     instruction::Instruction,
     neighbours::{Neighbour, Neighbours},
     pipeline::{
+        allowed::Allowed,
         guidance::Guidance,
         layers::Layers,
         perception::{Perception, Pose},
@@ -159,6 +160,7 @@ impl Control {
             has_sound_failsafes: self.failsafes.are_sound(),
             is_clear_overhead: !around.iter().any(|neighbour| neighbour.may_be_over(&home, envelope)),
             is_taking_off: self.flight.is_taking_off(),
+            has_somewhere_to_fly: self.guidance.has_somewhere_to_fly(),
         };
         reports.extend(self.watches.preflight(telemetry, checks));
         if let (true, Some(motion)) = (self.is_airborne(), estimate.motion) {
@@ -179,11 +181,12 @@ impl Control {
         self.guidance.look_ahead(now, &motion, map, around)
     }
 
-    /// What scripts may be told of a vehicle that this agent flies.
+    /// What whoever listens may be told, once the vehicle's place is known.
     #[must_use]
     pub fn circumstances(&self) -> Option<Circumstances<'_>> {
         Some(Circumstances {
-            position: self.flown_motion()?.position,
+            position: self.motion()?.position,
+            is_flown: self.flown_motion().is_some(),
             ahead: self.guidance.place_ahead(),
             battery: self.companion.telemetry().battery.map(|battery| battery.value.fraction),
             neighbours: self.neighbours.around(),
@@ -211,8 +214,19 @@ impl Control {
         })
     }
 
+    /// Keeps to these limits from now on.
+    pub fn limit(&mut self, limits: &Limits) {
+        let ([.., low_m], [.., high_m]) = limits.region();
+        self.perception.reach([low_m, high_m]);
+        self.guidance.limit(Allowed::from(limits));
+    }
+
     /// Carries out an instruction.
     pub fn carry_out(&mut self, now: Duration, instruction: Instruction) -> Option<Report> {
+        if instruction == Instruction::TakeOff {
+            let height_m = self.guidance.takeoff_height_m(self.config.takeoff_height_m, self.config.home[2]);
+            self.flight.climb_to(height_m);
+        }
         self.flight.carry_out(now, instruction, &mut self.companion);
         match instruction {
             Instruction::GoTo(waypoint) => self.guidance.head_for(waypoint),
@@ -223,7 +237,8 @@ impl Control {
             Instruction::GrantLeave => self.guidance.grant_leave(now),
             Instruction::Land => self.settle(now),
             Instruction::EndFlight => self.guidance.forget(),
-            Instruction::TakeOff | Instruction::Hold | Instruction::TakeBack | Instruction::Resume => {}
+            Instruction::Hold => self.guidance.hold(),
+            Instruction::TakeOff | Instruction::TakeBack | Instruction::Resume => {}
         }
         None
     }

@@ -187,6 +187,7 @@ impl AgentCore {
             }
             self.mission.record(decided);
         }
+        self.control.limit(self.mission.limits());
     }
 
     /// Whether this agent has the vehicle in the air, or on its way there.

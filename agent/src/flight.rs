@@ -71,6 +71,11 @@ impl Flight {
         }
     }
 
+    /// Takes off to this height above home from now on, m.
+    pub fn climb_to(&mut self, takeoff_height_m: f64) {
+        self.takeoff_height_m = takeoff_height_m;
+    }
+
     /// Where the vehicle is between two stands on the ground.
     #[must_use]
     pub fn phase(&self) -> FlightPhase {

@@ -12,7 +12,7 @@ use skein_wire::event::{
     self, Advance, Complete, Declared as _, Enter, Failed, Goto, Hold, Land, Load, OrderTaken, Return,
     ScriptNews, Takeoff, Unload, What,
 };
-use skein_wire::{Fleet, KeptScript, Link, MissionState, NodeLink, State, Store, joint_roster};
+use skein_wire::{Fleet, KeptScript, Limits, Link, MissionState, NodeLink, State, Store, joint_roster};
 
 use crate::{
     agent_error::AgentError,
@@ -54,6 +54,9 @@ pub struct Mission {
     task: String,
     outcome: Option<Outcome>,
     selections: Vec<Happened>,
+    limits: Limits,
+    /// The revision of the program that these are of.
+    limits_of: Option<u64>,
     fault: Option<String>,
 }
 
@@ -94,6 +97,8 @@ impl Mission {
             task: "on the ground".to_owned(),
             outcome: None,
             selections: Vec::new(),
+            limits: Limits::default(),
+            limits_of: None,
             fault: None,
             name,
             me,
@@ -155,12 +160,18 @@ impl Mission {
         if matches!(report, Report::Planned { .. } | Report::Unplannable { .. }) {
             self.script_facts.forget_path();
         }
+        // A script that has slept so far begins to listen now.
+        if matches!(report, Report::Ready | Report::Airborne) {
+            self.script_facts.forget();
+        }
         self.mind.hear(now, report.into_event(&self.me), self.node.node_mut());
     }
 
-    /// Tells scripts what they listen to.
+    /// Tells whoever listens what is told to nobody else.
     pub fn tell_scripts(&mut self, circumstances: &Circumstances<'_>) {
-        for event in self.script_facts.tell(&self.me, &self.scripts, circumstances) {
+        let is_heard =
+            |fact: &str| self.scripts.listen_to(fact) || self.config.behaviours.hear(self.me.name(), fact);
+        for event in self.script_facts.tell(&self.me, is_heard, circumstances) {
             self.node.node_mut().enqueue(event);
         }
     }
@@ -177,6 +188,16 @@ impl Mission {
             self.fault = Some(error.to_string());
         }
         self.mind.decide(now, self.node.node_mut())
+    }
+
+    /// The limits on the vehicle's motion that its b-threads state now.
+    pub fn limits(&mut self) -> &Limits {
+        let program = self.node.node().program();
+        if self.limits_of != Some(program.revision()) {
+            self.limits_of = Some(program.revision());
+            self.limits = Limits::of(self.me.name(), program.stated());
+        }
+        &self.limits
     }
 
     /// Takes in one thing that happened; gives back what control has to do then.
@@ -283,6 +304,9 @@ impl Mission {
     pub fn waiting_for(&self, complaint: Option<&str>) -> String {
         if let Some(fault) = self.fault.as_deref().or(complaint) {
             return fault.to_owned();
+        }
+        if let Some(contradiction) = self.limits.contradiction() {
+            return contradiction;
         }
         let question = self.me.any::<(Advance, Enter, Takeoff)>();
         let explanation = self.node.node().explain(question).local;

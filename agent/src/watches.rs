@@ -54,6 +54,8 @@ pub struct Checks {
     pub is_clear_overhead: bool,
     /// This agent has armed it.
     pub is_taking_off: bool,
+    /// The limits on its motion do not contradict one another.
+    pub has_somewhere_to_fly: bool,
 }
 
 /// Everything that is watched on one vehicle.
@@ -80,6 +82,7 @@ impl Watches {
                 || self.ready.0 && telemetry.armed && checks.is_taking_off)
             && charged
             && checks.is_located
+            && checks.has_somewhere_to_fly
             && checks.has_sound_failsafes;
         self.ready.turns(ready).map(|ready| if ready { Report::Ready } else { Report::Unready })
     }

@@ -5,6 +5,7 @@
 mod behaviours;
 mod bthreads;
 mod evasion;
+mod limits;
 mod scripts;
 mod verify;
 mod verify_command;

@@ -18,16 +18,17 @@ use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_bp::{Event, Program, ProgramConfig};
 use skein_mav::Datum;
 use skein_wire::event::*;
-use skein_wire::{KeptScript, MemoryStore, Network, NetworkConfig, Store};
+use skein_wire::{KeptScript, Limits, MemoryStore, Network, NetworkConfig, Store};
 
 const ME: &str = "uav/1";
 const ROSTER: [&str; 4] = ["uav/1", "uav/2", "ground/main", "script/operator"];
 const SENDER: &str = "ground/main#scripts for uav/1";
-const SHIPPED: [(&str, &str); 4] = [
+const SHIPPED: [(&str, &str); 5] = [
     ("patrol", include_str!("../scripts/patrol.toml")),
     ("curfew", include_str!("../scripts/curfew.toml")),
     ("alternate", include_str!("../scripts/alternate.toml")),
     ("follow", include_str!("../scripts/follow.toml")),
+    ("keep-low", include_str!("../scripts/keep-low.toml")),
 ];
 
 fn config() -> AgentConfig {
@@ -199,6 +200,33 @@ fn a_script_speaks_of_fields_that_there_are_and_of_what_they_may_be() {
     let order = order(json!({"what": "goto", "x": "$x", "y": 2, "z": 3.0, "by": "script/test"}));
     let wait = json!({"wait": {"any_data": "uav/1/neighbour", "data_has": {"node": "uav/2"}}});
     Vehicle::in_the_air().load(&script(json!([{"sync": wait}, {"sync": order}]))).unwrap();
+}
+
+#[test]
+fn a_script_states_nothing_but_limits_on_its_own_vehicle() {
+    let limit = |data: Value| json!({"name": "uav/1/limit", "data": data});
+    let states = |stated: Value| json!([{"sync": {"state": stated, "wait": "uav/1/alone"}}]);
+    for (stated, why) in [
+        (json!("uav/1/land"), "it states `uav/1/land`; scripts may state nothing but `uav/1/limit`"),
+        (json!({"name": "uav/2/limit", "data": {"max_z": 4}}), "it states `uav/2/limit`"),
+        (json!("uav/1/limit"), "without a bound"),
+        (limit(json!({"height": 4})), "`limit` has `speed_m_s`"),
+        (limit(json!({"speed_m_s": 0.1})), "expected number in m/s, at least 0.3"),
+        (limit(json!({"max_z": "low"})), "expected number in m"),
+    ] {
+        let error = refusal(states(stated));
+        assert!(error.contains(why), "{error} does not say {why}");
+    }
+    let mut vehicle = Vehicle::in_the_air();
+    vehicle.load(&script(states(limit(json!({"max_z": 4, "speed_m_s": 1.5}))))).unwrap();
+    vehicle.moves();
+    let limits = Limits::of(ME, vehicle.program.stated());
+    assert_eq!(
+        limits.in_words(),
+        ["script/test limits speed to at most 1.5 m/s", "script/test limits z to at most 4 m"]
+    );
+    vehicle.hears(mine(Alone::NAME));
+    assert!(Limits::of(ME, vehicle.program.stated()).is_none());
 }
 
 #[test]

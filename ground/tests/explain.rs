@@ -9,7 +9,7 @@ use skein_dbp::{Board, BoardLease, BoardRow, Happened, NodeName};
 use skein_ground::bthreads::Hold;
 use skein_ground::explain::{Evidence, Explanation, Recorded, RecordedError, explain};
 use skein_ground::recorder::Recorder;
-use skein_wire::event::{Events as _, OrderGiven, What};
+use skein_wire::event::{Declared as _, Events as _, Limit, OrderGiven, What};
 use skein_wire::{MissionState, State};
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -378,4 +378,22 @@ fn what_is_no_recording_is_named() {
     );
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
     assert!(matches!(Recorded::open(&own), Err(RecordedError::Unreadable { .. })));
+}
+
+#[test]
+fn limits_on_motion_are_named_with_whose_they_are_and_a_contradiction_is_a_reason() {
+    let limit = |bound| Bid::new().wait_for("uav/3/alone").state(Limit { ..bound }.at("uav/3"));
+    let low = limit(Limit { max_z: Some(4.0), ..Limit::NONE });
+    let slow = limit(Limit { speed_m_s: Some(1.0), max_z: Some(9.0), ..Limit::NONE });
+    let bids: [Bidding<'_>; 2] = [("script/low", low, &[]), ("careful", slow, &[])];
+    let explanation = explain(&hovering(vec![board("uav/3", &bids)]), NOW, &node("uav/3")).unwrap();
+    let limits = ["careful limits speed to at most 1 m/s", "script/low limits z to at most 4 m"];
+    assert_eq!(explanation.limits, limits);
+    assert!(explanation.to_string().contains("limits on its motion\n    careful limits"), "{explanation}");
+
+    let high = limit(Limit { min_z: Some(6.0), ..Limit::NONE });
+    let bids: [Bidding<'_>; 2] = [(bids[0].0, bids[0].1.clone(), &[]), ("script/high", high, &[])];
+    let explanation = explain(&hovering(vec![board("uav/3", &bids)]), NOW, &node("uav/3")).unwrap();
+    let why = "script/high says `z not below 6 m`, and script/low says `z not above 4 m`";
+    assert_eq!(explanation.changes[0].because, [why]);
 }

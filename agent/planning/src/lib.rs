@@ -11,6 +11,7 @@
 //!
 //! ```
 //! use nalgebra::Vector3;
+//! use skein_planning::Region;
 //! use skein_planning::global::{Potential, astar, simplify};
 //! use skein_planning::map::{ClearanceMap, RayEnd, VoxelMapConfig};
 //!
@@ -19,7 +20,7 @@
 //! map.integrate(eye, &[RayEnd { point: Vector3::new(4.1, 0.1, 3.1), hit: true }]);
 //!
 //! let (goal, config) = (Vector3::new(8.1, 0.1, 3.1), astar::AstarConfig::default());
-//! let request = astar::Request { start: eye, goal, potential: &Potential::default(), discs: &[] };
+//! let request = astar::Request { start: eye, goal, potential: &Potential::default(), discs: &[], within: Region::EVERYWHERE };
 //! let plan = astar::plan(&mut map, &request, &config, &mut astar::Astar::default())?;
 //! let path = simplify(&map, &plan.path, config.clearance_m);
 //! assert!(path.length_m() > 8.0 && path.points().len() <= 5);
@@ -33,6 +34,8 @@ pub mod local;
 pub mod map;
 pub mod passage;
 mod path;
+mod region;
 pub mod separation;
 
 pub use path::{Corner, Path, Projection};
+pub use region::Region;

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use skein_planning::Path;
 use skein_planning::airspace::{Airspace, KeepOut, NoFlyZone};
 use skein_planning::global::astar::{Astar, AstarConfig, Disc, Plan, PlanError, Request, plan};
 use skein_planning::global::{Potential, PotentialObstacle, elide_collinear, simplify};
 use skein_planning::map::{ClearanceMap, VoxelMapConfig};
+use skein_planning::{Path, Region};
 
 /// A map of cells of one metre, `size` long, wide and high, whose lowest corner is the origin.
 fn grid(size: [usize; 3], blocked: &[[usize; 3]]) -> ClearanceMap {
@@ -43,7 +43,13 @@ fn run(
     config: &AstarConfig,
 ) -> Result<Plan, PlanError> {
     let potential = Potential::default();
-    let request = Request { start: centre(from), goal: centre(to), potential: &potential, discs: &[] };
+    let request = Request {
+        start: centre(from),
+        goal: centre(to),
+        potential: &potential,
+        discs: &[],
+        within: Region::EVERYWHERE,
+    };
     plan(map, &request, config, &mut Astar::default())
 }
 
@@ -136,7 +142,7 @@ proptest! {
         let config = AstarConfig { comfort_m: 2.0, comfort_weight: 1.5, ..shortest() };
         let obstacle = PotentialObstacle { centre: Vector3::new(x, y, 0.5), influence_m: 3.0 };
         let potential = Potential::gated(&centre(from), &Vector3::new(1.0, 1.0, 0.0), &[obstacle], 4.0);
-        let request = Request { start: centre(from), goal: centre(to), potential: &potential, discs: &[] };
+        let request = Request { start: centre(from), goal: centre(to), potential: &potential, discs: &[], within: Region::EVERYWHERE };
         let found = plan(&mut grid(FLAT, &blocked), &request, &config, &mut Astar::default());
         let clearance = |cell: [usize; 3]| blocked.iter()
             .map(|other| (centre(*other) - centre(cell)).norm() - 0.5).fold(5.0, f64::min);
@@ -164,6 +170,7 @@ proptest! {
             goal: Vector3::new(19.5, 10.0, 2.1),
             potential: &potential,
             discs: &[],
+            within: Region::EVERYWHERE,
         };
         let config = AstarConfig { clearance_m, ..AstarConfig::default() };
         if let Ok(plan) = plan(&mut map, &request, &config, &mut Astar::default()) {
@@ -226,8 +233,13 @@ fn discs_are_gone_round_and_can_be_left() {
     let potential = Potential::default();
     let go = |start: [usize; 3], centre_cell: [usize; 3]| {
         let discs = [Disc { centre: centre(centre_cell), radius_m: 3.0 }];
-        let request =
-            Request { start: centre(start), goal: centre([28, 15, 0]), potential: &potential, discs: &discs };
+        let request = Request {
+            start: centre(start),
+            goal: centre([28, 15, 0]),
+            potential: &potential,
+            discs: &discs,
+            within: Region::EVERYWHERE,
+        };
         plan(&mut grid([30, 30, 1], &[]), &request, &shortest(), &mut Astar::default())
     };
     let round = go([1, 15, 0], [15, 15, 0]).unwrap();
@@ -267,7 +279,7 @@ fn a_change_of_height_within_the_band_is_spread_along_the_path() {
     let mut map = ClearanceMap::new(VoxelMapConfig::default(), Vector3::new(0.0, 0.0, 5.0), 2.5).unwrap();
     let potential = Potential::default();
     let (start, goal) = (Vector3::new(0.1, 0.1, 3.0), Vector3::new(8.1, 0.1, 3.8));
-    let request = Request { start, goal, potential: &potential, discs: &[] };
+    let request = Request { start, goal, potential: &potential, discs: &[], within: Region::EVERYWHERE };
     let path = plan(&mut map, &request, &AstarConfig::default(), &mut Astar::default()).unwrap().path;
     assert_eq!(path.end(), goal);
     assert!((path.point_at(path.length_m() / 2.0).z - 3.4).abs() < 0.03);
@@ -293,7 +305,13 @@ fn a_search_does_not_remember_the_last_one() {
     let mut scratch = Astar::default();
     let mut map = grid([20, 20, 1], &[[5, 5, 0], [6, 6, 0]]);
     let mut go = |from, to| {
-        let request = Request { start: centre(from), goal: centre(to), potential: &potential, discs: &[] };
+        let request = Request {
+            start: centre(from),
+            goal: centre(to),
+            potential: &potential,
+            discs: &[],
+            within: Region::EVERYWHERE,
+        };
         plan(&mut map, &request, &shortest(), &mut scratch).unwrap()
     };
     let first = go([0, 0, 0], [19, 17, 0]);

@@ -3,6 +3,7 @@
 
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
+use skein_planning::Region;
 use skein_planning::airspace::{Airspace, KeepOut, NoFlyZone};
 use skein_planning::global::astar::{Disc, Plan, Request};
 use skein_planning::global::dstar::{Dstar, DstarConfig};
@@ -116,7 +117,7 @@ proptest! {
             let goal = goals[number * goals.len() / turns.len()];
             let discs: Vec<Disc> = turn.discs.iter().map(|&centre| Disc { centre, radius_m: 1.6 }).collect();
             let potential = Potential::default();
-            let request = Request { start: turn.start, goal, potential: &potential, discs: &discs };
+            let request = Request { start: turn.start, goal, potential: &potential, discs: &discs, within: Region::EVERYWHERE };
             let found = plan(&mut search, &mut map, &request, turn.clearance_m, slice);
             match (found, searched(&map, &request, turn.clearance_m)) {
                 (Ok(plan), Some(least)) => {
@@ -133,7 +134,13 @@ proptest! {
 
 /// A request without potential and discs, from one end of the middle layer to the other.
 fn across(potential: &Potential) -> Request<'_> {
-    Request { start: centre(0, 6, 1), goal: centre(13, 6, 1), potential, discs: &[] }
+    Request {
+        start: centre(0, 6, 1),
+        goal: centre(13, 6, 1),
+        potential,
+        discs: &[],
+        within: Region::EVERYWHERE,
+    }
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The course: the waypoint that a vehicle flies to, and the path that leads there.
 
 use nalgebra::Vector3;
-use skein_planning::{Path, map::ClearanceMap, passage::Passage};
+use skein_planning::{Path, Region, map::ClearanceMap, passage::Passage};
 
 use super::global::Found;
 use crate::instruction::Waypoint;
@@ -27,6 +27,8 @@ pub struct Following {
     pub path: Path,
     /// The clearance to keep, m; as in [`Found::clearance_m`].
     clearance_m: Option<f64>,
+    /// The region that it was planned to stay in.
+    within: Region,
     pub station_m: f64,
     /// It runs into something, and is not flown any more.
     pub is_blocked: bool,
@@ -67,10 +69,10 @@ impl Course {
 }
 
 impl Following {
-    /// A path from its beginning.
+    /// A path from its beginning, planned to stay within a region.
     #[must_use]
-    pub fn new(Found { path, clearance_m }: Found) -> Self {
-        Self { path, clearance_m, station_m: 0.0, is_blocked: false }
+    pub fn new(Found { path, clearance_m }: Found, within: Region) -> Self {
+        Self { path, clearance_m, within, station_m: 0.0, is_blocked: false }
     }
 
     /// The place so far ahead of the vehicle, or the path's end.
@@ -79,9 +81,13 @@ impl Following {
         self.path.point_at((self.station_m + reach_m).min(self.path.length_m()))
     }
 
-    /// Whether a vehicle at `position` can fly on along the path, as far as the map tells.
+    /// Whether a vehicle at `position` that is to stay `within` a region can fly on along the path, as far as the map
+    /// tells.
     #[must_use]
-    pub fn can_be_flown(&self, position: &Vector3<f64>, map: &ClearanceMap) -> bool {
+    pub fn can_be_flown(&self, position: &Vector3<f64>, within: &Region, map: &ClearanceMap) -> bool {
+        if *within != self.within {
+            return false;
+        }
         let Some(planned_m) = self.clearance_m else { return true };
         // Less than what was planned with, so that a voxel more or less does not make a new plan.
         let clearance_m = (planned_m - REPLAN_SLACK_M).max(0.0);
@@ -97,6 +103,6 @@ impl Following {
             }
             from = to;
         }
-        (here - position).norm() <= OFF_PATH_M
+        (here - within.clamp_height(position)).norm() <= OFF_PATH_M
     }
 }

@@ -10,6 +10,7 @@ use skein_mav::SetPoint;
 use skein_planning::map::ClearanceMap;
 
 use super::{
+    allowed::Allowed,
     course::Course,
     layers::Layers,
     planning::Planning,
@@ -31,6 +32,9 @@ const ROOM_AHEAD_M: f64 = 1.5;
 pub struct Guidance {
     envelope: Envelope,
     leave_until: Duration,
+    /// An operator or a b-thread has told it to hover, and since then nobody to move.
+    is_held: bool,
+    allowed: Allowed,
     pub course: Course,
     pub planning: Planning,
     progress: Progress,
@@ -45,6 +49,8 @@ impl Guidance {
         Self {
             envelope,
             leave_until: Duration::ZERO,
+            is_held: false,
+            allowed: Allowed::ANYTHING,
             course: Course::default(),
             planning: Planning::new(envelope, finder),
             progress: Progress::new(envelope.separation_m, passages, escape),
@@ -61,6 +67,39 @@ impl Guidance {
     /// Gives leave to move for one navigation cycle.
     pub fn grant_leave(&mut self, now: Duration) {
         self.leave_until = now + LEAVE_LASTS;
+        self.is_held = false;
+    }
+
+    /// Hovers where it is, until there is leave to move.
+    pub fn hold(&mut self) {
+        self.is_held = true;
+    }
+
+    /// Keeps to these limits from now on.
+    pub fn limit(&mut self, allowed: Allowed) {
+        self.allowed = allowed;
+    }
+
+    /// The limits that count now: none on the way home, nor for a vehicle that is held.
+    fn allowed(&self) -> Allowed {
+        let goes_home = self.course.waypoint.is_some_and(|waypoint| waypoint.is_home);
+        if goes_home || self.is_held { Allowed::ANYTHING } else { self.allowed }
+    }
+
+    /// Whether the limits leave a place to fly.
+    #[must_use]
+    pub fn has_somewhere_to_fly(&self) -> bool {
+        !self.allowed.nowhere
+    }
+
+    /// The height above home to take off to, where `wanted_m` is, m.
+    #[must_use]
+    pub fn takeoff_height_m(&self, wanted_m: f64, home_z_m: f64) -> f64 {
+        self.allowed.takeoff_height_m(wanted_m, home_z_m)
+    }
+
+    fn has_leave(&self, now: Duration) -> bool {
+        now <= self.leave_until && !self.allowed().nowhere
     }
 
     /// Where a vehicle that moves like this would come to a stop if it were told to now, metres ENU, at its height.
@@ -73,6 +112,7 @@ impl Guidance {
     /// The flight is over.
     pub fn forget(&mut self) {
         self.steering.rest();
+        self.is_held = false;
         self.course = Course::default();
         self.progress.forget();
         self.planning.abandon();
@@ -97,7 +137,8 @@ impl Guidance {
         map: &mut ClearanceMap,
         neighbours: &[Neighbour],
     ) -> Option<Report> {
-        let report = self.planning.begin(is_stuck, &mut self.course, motion, map, neighbours);
+        let within = self.allowed().region;
+        let report = self.planning.begin(is_stuck, &mut self.course, within, motion, map, neighbours);
         self.note(report)
     }
 
@@ -123,18 +164,19 @@ impl Guidance {
         map: &ClearanceMap,
         neighbours: &[Neighbour],
     ) -> Vec<Report> {
-        let has_leave = now <= self.leave_until;
-        self.progress.look_ahead(now, has_leave, &mut self.course, motion, map, neighbours)
+        let (has_leave, allowed) = (self.has_leave(now), self.allowed());
+        let moves_at = has_leave.then_some(now);
+        self.progress.look_ahead(moves_at, &mut self.course, &allowed, motion, map, neighbours)
     }
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles
     /// either way.
     pub fn steer(&mut self, now: Duration, motion: &Motion, surroundings: &Surroundings<'_>) -> SetPoint {
-        let has_leave = now <= self.leave_until;
+        let (has_leave, allowed) = (self.has_leave(now), self.allowed());
         // Until there is a new path, a blocked one is not flown.
         let following = self.course.following.as_mut().filter(|path| has_leave && !path.is_blocked);
         let attraction = self.progress.attraction();
         let lead = following.map(|following| Lead { following, attraction });
-        self.steering.steer(now, motion, lead, surroundings)
+        self.steering.steer(now, motion, lead, &allowed, surroundings)
     }
 }

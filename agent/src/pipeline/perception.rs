@@ -38,6 +38,8 @@ const ABOVE_WAYPOINTS_M: f64 = 4.0;
 const BELOW_WAYPOINTS_M: f64 = 1.0;
 /// No path is lower than this above the take-off place, m.
 const LEAST_HEIGHT_M: f64 = 0.6;
+/// Beyond every map, m.
+const FAR_CORNER: Vector3<f64> = Vector3::new(1e9, 1e9, 1e9);
 /// Paths keep this far out of zones, m: what a vehicle strays from its path, the error of its position, and its hull.
 const ZONE_MARGIN_M: f64 = 1.0;
 /// Paths keep this high above terrain that is known, m.
@@ -56,6 +58,10 @@ pub struct Pose {
 #[derive(Clone, Debug)]
 pub struct Perception {
     map: ClearanceMap,
+    fence: Fence,
+    home: Vector3<f64>,
+    /// Floor and ceiling of the map, m.
+    heights_m: [f64; 2],
     last_scan: Option<Duration>,
     ends: Vec<RayEnd>,
     near: Vec<Vector3<f64>>,
@@ -106,6 +112,9 @@ impl Perception {
         };
         Ok(Self {
             map: ClearanceMap::new(config, centre, CLEARANCE_RANGE_M)?,
+            fence: *fence,
+            home,
+            heights_m: [floor_m, ceiling_m],
             last_scan: None,
             ends: Vec::new(),
             near: Vec::new(),
@@ -120,6 +129,32 @@ impl Perception {
     #[must_use]
     pub fn with_keep_out(self, keep_out: KeepOut) -> Self {
         Self { map: self.map.with_keep_out(keep_out), ..self }
+    }
+
+    /// Lets paths come as low and as high as these heights too, m ENU; where the map does not reach so far it is made
+    /// anew, and keeps what it has seen.
+    pub fn reach(&mut self, heights_m: impl IntoIterator<Item = f64>) {
+        let least_m = self.home.z + LEAST_HEIGHT_M;
+        let [mut floor_m, mut ceiling_m] = self.heights_m;
+        for height_m in heights_m.into_iter().filter(|height_m| height_m.is_finite()) {
+            floor_m = floor_m.min((height_m - BELOW_WAYPOINTS_M).max(least_m));
+            ceiling_m = ceiling_m.max(height_m);
+        }
+        if [floor_m, ceiling_m] == self.heights_m {
+            return;
+        }
+        let Ok(mut wider) = Self::new(&self.fence, self.home, [floor_m, ceiling_m]) else { return };
+        if let Some(keep_out) = self.map.keep_out() {
+            wider = wider.with_keep_out(keep_out.clone());
+        }
+        if self.rolls {
+            let voxels = self.map.voxels();
+            wider.map.recentre(&((voxels.clamp(&FAR_CORNER) + voxels.clamp(&-FAR_CORNER)) / 2.0));
+        }
+        for point in self.map.voxels().hits() {
+            wider.map.integrate(point, &[RayEnd { point, hit: true }]);
+        }
+        (self.map, self.heights_m) = (wider.map, wider.heights_m);
     }
 
     #[must_use]

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use skein_planning::{
+    Region,
     global::{Potential, PotentialObstacle, astar::Disc},
     map::ClearanceMap,
     separation::{self, FilterConfig},
@@ -31,6 +32,8 @@ pub struct Planning {
     envelope: Envelope,
     filter: FilterConfig,
     routes: RouteSearch,
+    /// The region that the plan under way is to stay in.
+    within: Region,
     /// What the search for a path may still do in this tick.
     allowance: usize,
 }
@@ -40,7 +43,7 @@ impl Planning {
     #[must_use]
     pub fn new(envelope: Envelope, finder: Box<dyn PathFinder>) -> Self {
         let (filter, routes) = (envelope.filter(), RouteSearch::new(finder));
-        Self { envelope, filter, routes, allowance: ALLOWANCE }
+        Self { envelope, filter, routes, within: Region::EVERYWHERE, allowance: ALLOWANCE }
     }
 
     /// Gives up the plan that is under way.
@@ -54,24 +57,30 @@ impl Planning {
         self.routes.is_under_way()
     }
 
-    /// Begins to plan a path to the waypoint. Where the vehicle is stuck, neighbours that stand around are obstacles
+    /// Begins to plan a path to the waypoint, `within` a region. Where the vehicle is stuck, neighbours that stand around are obstacles
     /// too. One that has fallen silent always is, as large as its ghost will be. The answer comes at once if this
     /// tick's allowance is enough for it, else from [`Planning::go_on`].
     pub fn begin(
         &mut self,
         is_stuck: bool,
         course: &mut Course,
+        within: Region,
         motion: &Motion,
         map: &mut ClearanceMap,
         neighbours: &[Neighbour],
     ) -> Option<Report> {
+        self.within = within;
         let Some(waypoint) = &mut course.waypoint else {
             return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() });
         };
         // Outside the map, as beyond the fence, the way begins and ends where the map does.
-        let goal = open_goal(waypoint, map);
-        let is_inside = map.voxels().index_of(&motion.position).is_some();
-        let start = if is_inside { motion.position } else { map.voxels().clamp(&motion.position) };
+        let inside = |place: Vector3<f64>| match map.voxels().index_of(&place) {
+            Some(_) => place,
+            None => map.voxels().clamp(&place),
+        };
+        let goal = inside(within.clamp_height(&open_goal(waypoint, map)));
+        // The vehicle comes to an allowed height first.
+        let start = inside(within.clamp_height(&motion.position));
         let standing: Vec<Vector3<f64>> = neighbours
             .iter()
             .filter(|neighbour| neighbour.armed && neighbour.track.cooperative)
@@ -89,7 +98,7 @@ impl Planning {
         let discs = discs.chain(self.ghosts(neighbours, motion, [start, goal])).collect();
         let potential = self.potential(&standing, motion, &goal);
         let Envelope { hull_m, margin_m, .. } = self.envelope;
-        let task = Task { start, goal, potential, discs, hull_m, margin_m };
+        let task = Task { start, goal, potential, discs, within, hull_m, margin_m };
         self.routes.begin(waypoint.leg, task, map);
         self.search(course, map)
     }
@@ -106,7 +115,7 @@ impl Planning {
         Some(match found {
             Ok(found) => {
                 let length_m = found.path.length_m();
-                course.following = Some(Following::new(found));
+                course.following = Some(Following::new(found, self.within));
                 Report::Planned { leg, length_m }
             }
             Err(error) => {

@@ -8,7 +8,7 @@ use skein_planning::{
     passage::{Passage, PassageConfig, first_passage},
 };
 
-use super::course::Course;
+use super::{allowed::Allowed, course::Course};
 use crate::{neighbours::Neighbour, positioning::Motion, report::Report};
 
 /// The last waypoint is reached within this distance, m.
@@ -54,32 +54,34 @@ impl Progress {
         self.escape.attraction()
     }
 
-    /// Looks along the path; once in each navigation cycle.
+    /// Looks along the path, once in each navigation cycle; `moves_at` is the time, if there is leave to move now.
     pub fn look_ahead(
         &mut self,
-        now: Duration,
-        has_leave: bool,
+        moves_at: Option<Duration>,
         course: &mut Course,
+        allowed: &Allowed,
         motion: &Motion,
         map: &ClearanceMap,
         neighbours: &[Neighbour],
     ) -> Vec<Report> {
         let mut reports = Vec::new();
-        reports.extend(self.check_arrival(course, motion, neighbours));
-        reports.extend(check_path(course, motion, map));
+        reports.extend(self.check_arrival(course, allowed, motion, neighbours));
+        reports.extend(check_path(course, allowed, motion, map));
         reports.extend(self.check_passage(course, motion, map));
-        reports.extend(self.check_progress(now, has_leave, course));
+        reports.extend(self.check_progress(moves_at, course));
         reports
     }
 
     fn check_arrival(
         &self,
         course: &mut Course,
+        allowed: &Allowed,
         motion: &Motion,
         neighbours: &[Neighbour],
     ) -> Option<Report> {
         let waypoint = course.waypoint?;
-        let offset = waypoint.target - motion.position;
+        // A place that is too high or too low to be flown to is reached over or under it.
+        let offset = allowed.region.clamp_height(&waypoint.target) - motion.position;
         let is_taken = neighbours.iter().any(|neighbour| {
             neighbour.armed && (neighbour.position() - waypoint.target).norm() < self.separation_m
         });
@@ -111,9 +113,10 @@ impl Progress {
         Some(Report::Passage(passage.centre))
     }
 
-    fn check_progress(&mut self, now: Duration, has_leave: bool, course: &Course) -> Option<Report> {
+    fn check_progress(&mut self, moves_at: Option<Duration>, course: &Course) -> Option<Report> {
         let is_bound = course.waypoint.is_some() && !course.has_arrived;
-        let Some(following) = course.following.as_ref().filter(|_| has_leave && is_bound) else {
+        let following = course.following.as_ref().filter(|_| is_bound);
+        let Some((now, following)) = moves_at.zip(following) else {
             self.escape.reset();
             return None;
         };
@@ -121,8 +124,8 @@ impl Progress {
     }
 }
 
-fn check_path(course: &mut Course, motion: &Motion, map: &ClearanceMap) -> Option<Report> {
+fn check_path(course: &mut Course, allowed: &Allowed, motion: &Motion, map: &ClearanceMap) -> Option<Report> {
     let following = course.following.as_mut().filter(|following| !following.is_blocked)?;
-    following.is_blocked = !following.can_be_flown(&motion.position, map);
+    following.is_blocked = !following.can_be_flown(&motion.position, &allowed.region, map);
     following.is_blocked.then_some(Report::PathBlocked)
 }

@@ -74,6 +74,7 @@ fn window_of(map: &ClearanceMap) -> Vector3<f64> {
 
 #[cfg(test)]
 mod tests {
+    use skein_planning::Region;
     use skein_planning::global::{Potential, astar::Disc};
     use skein_planning::map::VoxelMapConfig;
 
@@ -99,7 +100,8 @@ mod tests {
     fn task(goal: Vector3<f64>) -> Task {
         let start = Vector3::new(0.0, 0.0, 3.0);
         let potential = Potential::default();
-        Task { start, goal, potential, discs: Vec::new(), hull_m: 0.25, margin_m: 0.25 }
+        let within = Region::EVERYWHERE;
+        Task { start, goal, potential, discs: Vec::new(), within, hull_m: 0.25, margin_m: 0.25 }
     }
 
     /// Both planners: what holds for one holds for the other.

@@ -15,6 +15,7 @@ use skein_planning::{
 };
 
 use super::{
+    allowed::Allowed,
     course::Following,
     local::{PathFollower, Place},
     safety_filter::{Kept, VelocityFilter},
@@ -57,9 +58,9 @@ pub struct Lead<'a> {
 
 /// The velocity wanted before others are considered (ENU, m/s), and the height it leads to (m).
 #[derive(Clone, Copy, Debug)]
-struct Wish {
-    velocity: Vector3<f64>,
-    height_m: f64,
+pub(super) struct Wish {
+    pub(super) velocity: Vector3<f64>,
+    pub(super) height_m: f64,
 }
 
 impl Steering {
@@ -101,18 +102,22 @@ impl Steering {
         position + velocity * (velocity.norm() / (2.0 * self.follower.braking().decel_m_s2))
     }
 
-    /// The set-point for now: to where the vehicle settles, or along the path with a lead, else at a place.
+    /// The set-point for now: to where the vehicle settles, or along the path with a lead, else at a place; the latter
+    /// two as far as that is `allowed`.
     pub fn steer(
         &mut self,
         now: Duration,
         motion: &Motion,
         lead: Option<Lead<'_>>,
+        allowed: &Allowed,
         surroundings: &Surroundings<'_>,
     ) -> SetPoint {
+        let envelope = self.envelope;
+        let part_of = |wish| allowed.part_of(wish, &motion.position, &envelope);
         let wish = match (self.settles_at, lead) {
             (Some(place), _) => self.aside(place, motion),
-            (None, Some(lead)) => self.along_path(lead, motion, surroundings.map),
-            (None, None) => self.keep_station(motion, surroundings.map),
+            (None, Some(lead)) => part_of(self.along_path(lead, motion, allowed, surroundings.map)),
+            (None, None) => part_of(self.keep_station(motion, surroundings.map)),
         };
         let unheard = self.moving.moving(now, surroundings.map);
         let others: Vec<_> = surroundings.neighbours.iter().copied().chain(unheard).collect();
@@ -145,14 +150,14 @@ impl Steering {
         Wish { velocity, height_m: place.z }
     }
 
-    fn along_path(&mut self, lead: Lead<'_>, motion: &Motion, map: &ClearanceMap) -> Wish {
+    fn along_path(&mut self, lead: Lead<'_>, motion: &Motion, allowed: &Allowed, map: &ClearanceMap) -> Wish {
         let Lead { following: Following { path, station_m, .. }, attraction } = lead;
         self.hover_at = None;
         let ahead = path.direction_at(*station_m);
         let sensed_free_m = map.voxels().sensed_free_m(&motion.position, &ahead, SENSED_AHEAD_M);
         let (cap_m_s, _) = braking::speed_cap(path, *station_m, sensed_free_m, self.follower.braking());
         let place = Place { path, station_m: *station_m, position: &motion.position };
-        let step = self.follower.follow(&place, cap_m_s, attraction, map);
+        let step = self.follower.follow(&place, cap_m_s.min(allowed.speed_m_s), attraction, map);
         *station_m = step.station_m;
         Wish { velocity: step.velocity, height_m: step.carrot.z }
     }

@@ -3,7 +3,7 @@
 use skein_bp::script::Script;
 use skein_bp::{Bid, Event, EventSet};
 use skein_dbp::Grant;
-use skein_wire::event::{Advance, Catalogue, Declared as _, Goto, OrderTaken, Takeoff, What};
+use skein_wire::event::{Advance, Catalogue, Declared as _, Goto, Limit, OrderTaken, Takeoff, What};
 
 use crate::bthreads::HOME_LEG;
 use crate::me::Me;
@@ -18,7 +18,8 @@ pub struct ScriptRights {
 }
 
 impl ScriptRights {
-    /// What every script may do: order its own vehicle about at its gateway, hold it, and have events of its own. It
+    /// What every script may do: order its own vehicle about at its gateway, hold it, limit its motion, and have
+    /// events of its own. It
     /// cannot keep a vehicle from the way home, from landing, or from anything else that is for its safety.
     #[must_use]
     pub fn usual(me: &Me, roster: &[String], events: &Catalogue) -> Self {
@@ -53,6 +54,9 @@ impl ScriptRights {
         for request in bid.requests() {
             self.check_request(request)?;
         }
+        for stated in bid.stated() {
+            self.check_stated(stated)?;
+        }
         self.check_blocks(bid.blocks())?;
         for (verb, set) in
             [("waits for", bid.waits()), ("blocks", bid.blocks()), ("is ended by", bid.interrupts())]
@@ -74,6 +78,17 @@ impl ScriptRights {
             orders.join(", "),
             own_events(&self.me)
         ))
+    }
+
+    fn check_stated(&self, stated: &Event) -> Result<(), String> {
+        if !self.me.heard::<Limit>(stated) {
+            let limit = self.me.event_name(Limit::NAME);
+            return Err(format!("it states `{}`; scripts may state nothing but `{limit}`", stated.name()));
+        }
+        if stated.data().len() == 0 {
+            return Err(format!("it states `{}` without a bound", stated.name()));
+        }
+        self.vocabulary.check_event(stated).map_err(|fault| format!("it states {fault}"))
     }
 
     fn check_blocks(&self, blocks: &EventSet) -> Result<(), String> {

@@ -104,6 +104,7 @@ impl BThread for Runner {
             .wait_for(self.withdrawal())
             .interrupt(script.interrupts())
             .priority(precedence::MISSION);
+        bid = script.stated().iter().fold(bid, |bid, event| bid.state(event.clone()));
         if !script.blocks().is_none() {
             bid = bid.block(script.blocks().clone().and(self.may_block.clone()));
         }

@@ -126,6 +126,10 @@ events: Array<EventNote>,
  */
 requests: Array<Request>,
 /**
+ * The limits on its motion, and whose they are.
+ */
+limits: Array<string>,
+/**
  * What would let it move: one will do. Empty while it moves.
  */
 changes: Array<Change>,

@@ -277,6 +277,7 @@ function readWhy(json: Raw<Told<'why'>>): Why {
       cycle: strings(cycle),
     })),
     events: list(json.events, readPastEvent),
+    limits: strings(json.limits),
     doubts: strings(json.doubts),
   };
 }

@@ -46,6 +46,7 @@ export class WhyPanel {
       ...section('Because', why.changes.map(changeItem)),
       ...section('Requested now', why.requests.map(requestItem)),
       ...section('Last events', why.events.map(eventItem)),
+      ...section('Limits on its motion', why.limits.map((limit) => html('li', {}, limit))),
       ...why.doubts.map((doubt) => html('p', { class: 'reason-note' }, `Not sure: ${doubt}.`)),
     ];
     const frame = html('div', {}, ...parts);

@@ -23,6 +23,8 @@ pub struct Explanation {
     pub events: Vec<EventNote>,
     /// What is requested of it now, by its own b-threads and by others.
     pub requests: Vec<Request>,
+    /// The limits on its motion, and whose they are.
+    pub limits: Vec<String>,
     /// What would let it move: one will do. Empty while it moves.
     pub changes: Vec<Change>,
     /// What all this cannot be sure of.
@@ -149,6 +151,12 @@ impl fmt::Display for Explanation {
         }
         for request in &self.requests {
             writeln!(f, "    {request}")?;
+        }
+        if !self.limits.is_empty() {
+            writeln!(f, "  limits on its motion")?;
+        }
+        for limit in &self.limits {
+            writeln!(f, "    {limit}")?;
         }
         if !self.changes.is_empty() {
             writeln!(f, "  it stands still because")?;

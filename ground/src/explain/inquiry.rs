@@ -62,6 +62,9 @@ impl<'a> Inquiry<'a> {
     /// Every reason that is known for which the vehicle stands still.
     pub(super) fn what_would_move_it(mut self) -> Vec<Change> {
         let Some(board) = self.board(self.vehicle) else { return Vec::new() };
+        if let Some(contradiction) = super::limits(board).contradiction() {
+            self.say(vec![contradiction], vec!["one of them gives way".to_owned()]);
+        }
         let mut blocked: Vec<(&BoardRow, &BoardRequest)> = board
             .rows
             .iter()

@@ -36,7 +36,7 @@ mod waits;
 use std::time::Duration;
 
 use skein_dbp::{Board, NodeName};
-use skein_wire::MissionState;
+use skein_wire::{Limits, MissionState};
 
 pub use self::evidence::Evidence;
 pub use self::explanation::{Blocker, Change, EventNote, Explanation, Request, Situation};
@@ -80,6 +80,7 @@ pub fn explain(evidence: &Evidence, now: Duration, vehicle: &NodeName) -> Option
         situation,
         events: known.latest_events().map(EventNote::from).collect(),
         requests: board.map(|board| requests(&board.what)).unwrap_or_default(),
+        limits: board.map(|board| limits(&board.what).in_words()).unwrap_or_default(),
         changes,
         doubts: doubts(evidence, now, vehicle),
     })
@@ -98,6 +99,13 @@ fn requests(board: &Board) -> Vec<Request> {
         row.requests.iter().map(request).collect::<Vec<_>>()
     };
     board.rows.iter().flat_map(of_row).collect()
+}
+
+/// The limits that are stated at a node by its own b-threads.
+fn limits(board: &Board) -> Limits {
+    let rows = board.rows.iter();
+    let stated = rows.flat_map(|row| row.states.iter().map(|event| (row.bthread.as_str(), event)));
+    Limits::of(board.node.as_str(), stated)
 }
 
 /// Who blocks under this name at a node.

@@ -87,6 +87,8 @@ pub trait Behaviour: DeserializeOwned + Send + Sync + 'static {
     const NODES: &'static str;
     /// The events that it brings.
     const EVENTS: &'static [Declaration] = &[];
+    /// The names of events that its b-threads wait for and that a node tells only while somebody listens.
+    const HEARS: &'static [&'static str] = &[];
 
     /// Adds its b-threads to a node's program.
     fn load(&self, host: &Host<'_>, program: &mut Program);
@@ -156,6 +158,7 @@ impl<B: Behaviour> Ready for B {
 struct Known {
     nodes: &'static str,
     events: &'static [Declaration],
+    hears: &'static [&'static str],
     read: fn(&Value) -> Result<Arc<dyn Ready>, BehaviourError>,
 }
 
@@ -177,7 +180,7 @@ impl Behaviours {
     /// Adds a behaviour, in place of another of its name.
     pub fn add<B: Behaviour>(&mut self) {
         let read = |settings: &Value| read::<B>(settings).map(|ready| Arc::new(ready) as Arc<dyn Ready>);
-        self.0.insert(B::NAME, Known { nodes: B::NODES, events: B::EVENTS, read });
+        self.0.insert(B::NAME, Known { nodes: B::NODES, events: B::EVENTS, hears: B::HEARS, read });
     }
 
     /// Switches on what these settings name.
@@ -276,6 +279,12 @@ impl Chosen {
     pub fn events(&self, node: &str, whose: Whose) -> EventSet {
         let declared = self.declarations(node).flatten().filter(|event| event.whose == whose);
         declared.fold(EventSet::None, |set, event| set.or(EventSet::named(format!("{node}/{}", event.name))))
+    }
+
+    /// Whether one of those that are for `node` waits for the event of this name.
+    #[must_use]
+    pub fn hear(&self, node: &str, event: &str) -> bool {
+        self.of(node).any(|choice| choice.known.hears.contains(&event))
     }
 
     /// The lists of events that they bring to `node`.

@@ -43,6 +43,8 @@ struct Statement {
     priority: Option<i32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     deadline: Option<Duration>,
+    #[serde(rename = "state", deserialize_with = "many_events", skip_serializing_if = "Vec::is_empty")]
+    states: Vec<Event>,
 }
 
 impl Bid {
@@ -117,6 +119,14 @@ impl Bid {
         self
     }
 
+    /// States something that holds while the b-thread stays here, in the form of an event that never happens. The
+    /// program does nothing with it but tell it to who asks: see [`Program::stated`](crate::Program::stated).
+    #[must_use]
+    pub fn state(mut self, event: impl Into<Event>) -> Self {
+        self.statement().states.push(event.into());
+        self
+    }
+
     /// The requested events, in the order they were asked for.
     pub fn requests(&self) -> &[Event] {
         &self.0.requests
@@ -155,10 +165,17 @@ impl Bid {
         self.0.deadline
     }
 
-    /// The same bid with other requests in the place of each.
-    pub(crate) fn map_requests(mut self, map: impl FnMut(&Event) -> Event) -> Self {
-        let requests = self.0.requests.iter().map(map).collect();
-        self.statement().requests = requests;
+    /// The statements that hold while the b-thread stays here.
+    pub fn stated(&self) -> &[Event] {
+        &self.0.states
+    }
+
+    /// The same bid with other events in the place of each that it requests or states.
+    pub(crate) fn map_events(mut self, mut map: impl FnMut(&Event) -> Event) -> Self {
+        let requests = self.0.requests.iter().map(&mut map).collect();
+        let states = self.0.states.iter().map(map).collect();
+        let statement = self.statement();
+        (statement.requests, statement.states) = (requests, states);
         self
     }
 
@@ -219,6 +236,10 @@ impl fmt::Display for Bid {
             if !set.is_none() {
                 parts.push(format!("{verb} {set}"));
             }
+        }
+        if !self.0.states.is_empty() {
+            let states: Vec<String> = self.0.states.iter().map(Event::to_string).collect();
+            parts.push(format!("state {}", states.join(", ")));
         }
         if self.0.hot {
             parts.push("hot".to_owned());

@@ -34,6 +34,8 @@ pub struct BoardRow {
     pub blocks: EventSet,
     /// The events that end it; not known of b-threads elsewhere.
     pub interrupts: EventSet,
+    /// What it states to hold meanwhile.
+    pub states: Vec<Event>,
     /// The priority of its requests.
     pub priority: Option<i32>,
     /// When it goes on by itself, on the node's clock.
@@ -124,6 +126,7 @@ impl BoardRow {
             waits: plain(bid.waits()),
             blocks: plain(bid.blocks()),
             interrupts: plain(bid.interrupts()),
+            states: bid.stated().to_vec(),
             priority: bid.given_priority(),
             deadline: bid.given_deadline(),
             lease: None,
@@ -142,8 +145,8 @@ impl BoardRow {
                 earlier.cut,
                 length(earlier),
             )
-            && (&self.waits, &self.blocks, &self.interrupts)
-                == (&earlier.waits, &earlier.blocks, &earlier.interrupts)
+            && (&self.waits, &self.blocks, &self.interrupts, &self.states)
+                == (&earlier.waits, &earlier.blocks, &earlier.interrupts, &earlier.states)
     }
 
     /// As much of the row as there is room for, and about how many bytes that is.
@@ -158,6 +161,10 @@ impl BoardRow {
             }
             cut |= shorten_event(&mut request.event);
         }
+        cut |= truncate(&mut self.states);
+        for stated in &mut self.states {
+            cut |= shorten_event(stated);
+        }
         for set in [&mut self.waits, &mut self.blocks, &mut self.interrupts] {
             cut |= shorten_set(set);
         }
@@ -165,7 +172,8 @@ impl BoardRow {
             size_of_event(&request.event) + request.blocked_by.iter().map(String::len).sum::<usize>()
         });
         let sets = [&self.waits, &self.blocks, &self.interrupts].into_iter().map(size_of_set);
-        let size = self.bthread.len() + requests.sum::<usize>() + sets.sum::<usize>();
+        let states = self.states.iter().map(size_of_event);
+        let size = self.bthread.len() + requests.chain(states).sum::<usize>() + sets.sum::<usize>();
         (Self { cut, ..self }, size)
     }
 }

@@ -32,6 +32,7 @@ mod authority;
 mod decode_error;
 pub mod event;
 mod key;
+mod limits;
 mod link;
 mod message;
 mod network;
@@ -46,6 +47,7 @@ pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "
 pub use authority::{joint_roster, standard_authority};
 pub use decode_error::DecodeError;
 pub use key::{Fleet, Key, KeyError};
+pub use limits::Limits;
 pub use link::Link;
 pub use message::*;
 pub use network::{MemoryLink, Network, NetworkConfig, NetworkStats};

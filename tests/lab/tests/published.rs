@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 use skein_lab::bench::plan::movingai::{self, Problem};
+use skein_planning::Region;
 use skein_planning::global::astar::{Astar, AstarConfig, Request, plan};
 use skein_planning::global::{DStarLite, Effort, Potential, Search};
 use skein_planning::grid::{Grid, OccupancyGrid, StepCosts};
@@ -76,7 +77,7 @@ fn check_clearance_map(map: &str, scenario: &str, stride: usize) {
     let (potential, mut search) = (Potential::default(), Astar::default());
     for problem in problems.iter().step_by(stride) {
         let (start, goal) = (centre(problem.start), centre(problem.goal));
-        let request = Request { start, goal, potential: &potential, discs: &[] };
+        let request = Request { start, goal, potential: &potential, discs: &[], within: Region::EVERYWHERE };
         assert_published(plan(&mut map, &request, &config, &mut search).unwrap().cost, problem);
     }
 }

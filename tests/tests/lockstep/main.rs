@@ -8,6 +8,7 @@ mod explain;
 mod faults;
 mod gazebo_worlds;
 mod landing;
+mod limits;
 mod scenarios;
 mod scripts;
 mod tasks;

@@ -8,6 +8,7 @@ use super::{Effort, Potential, Search, Unsolved};
 use crate::grid::{Lattice, MOVES, SQRT_3, moved};
 use crate::map::{ClearanceMap, VoxelIndex};
 use crate::path::Path;
+use crate::region::Region;
 
 /// How [`plan`] searches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,6 +65,8 @@ pub struct Request<'a> {
     pub potential: &'a Potential,
     /// Places that are blocked though the map is free there.
     pub discs: &'a [Disc],
+    /// The box that the path stays in, and enters if it begins outside.
+    pub within: Region,
 }
 
 /// A path found.
@@ -101,6 +104,13 @@ pub enum PlanError {
         /// How deep it is inside, metres.
         inside_m: f64,
     },
+    /// The goal is outside the box that the path is to stay in.
+    #[error("goal ({:.2}, {:.2}, {:.2}) is outside what limits allow, by {outside_m:.2} m", .goal.x, .goal.y, .goal.z)]
+    GoalBeyondLimits {
+        goal: Vector3<f64>,
+        /// How far outside it is, metres.
+        outside_m: f64,
+    },
     /// No path exists in what is known.
     #[error("no path: everything reachable from the start was searched ({expanded} voxels)")]
     Unreachable { expanded: usize },
@@ -119,6 +129,8 @@ const BLOCKED: i32 = i32::MIN;
 const CLOSED_WEIGHT: f64 = 20.0;
 /// How finely depth in a disc is told apart.
 const DISC_STEPS: f64 = 64.0;
+/// So much of a voxel may stick out of the box that a path stays in: half of it, whatever the rounding.
+pub(super) const HALF_A_VOXEL: f64 = 0.501;
 /// Beginning to track a layer takes as long as so many expansions in one layer.
 pub(super) const LAYER_EXPANSIONS: usize = 4000;
 /// An expansion with 26 neighbours takes as long as so many with 8.
@@ -147,6 +159,7 @@ const SPACE_EXPANSIONS: usize = 4;
 ///
 /// ```
 /// use nalgebra::Vector3;
+/// use skein_planning::Region;
 /// use skein_planning::global::{Potential, astar};
 /// use skein_planning::map::{ClearanceMap, VoxelMapConfig};
 ///
@@ -156,6 +169,7 @@ const SPACE_EXPANSIONS: usize = 4;
 ///     goal: Vector3::new(6.1, 0.1, 3.1),
 ///     potential: &Potential::default(),
 ///     discs: &[],
+///     within: Region::EVERYWHERE,
 /// };
 /// let plan = astar::plan(&mut map, &request, &astar::AstarConfig::default(), &mut astar::Astar::default()).unwrap();
 /// assert!((plan.cost - 6.0).abs() < 1e-9);
@@ -344,6 +358,10 @@ impl Rooms<'_> {
         if self.start == goal {
             return Ok(());
         }
+        let room_m = self.request.within.room_m(&self.request.goal);
+        if room_m < 0.0 {
+            return Err(PlanError::GoalBeyondLimits { goal: self.request.goal, outside_m: -room_m });
+        }
         let open_m = self.open_m(goal);
         if open_m < 0.0 {
             return Err(PlanError::GoalClosed { goal: self.request.goal, inside_m: -open_m });
@@ -388,13 +406,28 @@ impl Rooms<'_> {
         there_room >= self.required || (here_room < self.required && better)
     }
 
-    /// Distance to what is closed, metres; negative inside. Where height changes along the path, that at the worse of
+    /// Distance to what is closed or beyond the request's box, metres; negative inside of that. Where height changes along the path, that at the worse of
     /// the heights at its ends: what is closed with its margin is taller than the ends are apart.
     fn open_m(&self, voxel: VoxelIndex) -> f64 {
-        let Some(keep_out) = self.map.keep_out() else { return f64::INFINITY };
+        let within = self.room_within_m(voxel);
+        let Some(keep_out) = self.map.keep_out() else { return within };
         let centre = self.map.voxels().centre_of(voxel);
         let at = |z: f64| keep_out.room_m(&Vector3::new(centre.x, centre.y, z));
-        if self.planar { at(self.request.start.z).min(at(self.request.goal.z)) } else { at(centre.z) }
+        let open_m =
+            if self.planar { at(self.request.start.z).min(at(self.request.goal.z)) } else { at(centre.z) };
+        open_m.min(within)
+    }
+
+    /// How far inside the request's box a voxel is, metres; one that reaches inside is. A way through one layer changes
+    /// its height on the way from start to goal, not here.
+    fn room_within_m(&self, voxel: VoxelIndex) -> f64 {
+        let within = &self.request.within;
+        if *within == Region::EVERYWHERE {
+            return f64::INFINITY;
+        }
+        let centre = self.map.voxels().centre_of(voxel);
+        let room_m = if self.planar { within.level_room_m(&centre) } else { within.room_m(&centre) };
+        room_m + HALF_A_VOXEL * self.resolution_m()
     }
 
     /// What is closed is entered from inside alone, and no deeper than the start is.

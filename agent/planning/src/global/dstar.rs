@@ -2,10 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::astar::{Disc, LAYER_EXPANSIONS, Plan, Request, path_through};
+use super::astar::{Disc, HALF_A_VOXEL, LAYER_EXPANSIONS, Plan, Request, path_through};
 use super::{DStarLite, Route, Unsolved};
 use crate::grid::{Grid, OccupancyGrid, StepCosts};
 use crate::map::{ClearanceMap, VoxelIndex};
+use crate::region::Region;
 
 /// How [`Dstar`] plans.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,11 +34,12 @@ const MOST_CHANGES: usize = 2500;
 /// and change its height, and others come to stand in the way.
 ///
 /// A step costs its length, and by [`StepCosts::FLYING`] more where a voxel next to it is not open. Open is a voxel
-/// with the clearance that is not closed ([`ClearanceMap::keep_out`]) nor in a disc. A potential counts for nothing.
+/// with the clearance that is not closed ([`ClearanceMap::keep_out`]), nor in a disc, nor beyond the request's box. A potential counts for nothing.
 /// A vehicle that does not stand in the open, and a way that leads over something, are for [`astar`](super::astar).
 ///
 /// ```
 /// use nalgebra::Vector3;
+/// use skein_planning::Region;
 /// use skein_planning::global::{Potential, astar::Request, dstar::{Dstar, DstarConfig}};
 /// use skein_planning::map::{ClearanceMap, VoxelMapConfig};
 ///
@@ -47,6 +49,7 @@ const MOST_CHANGES: usize = 2500;
 ///     goal: Vector3::new(6.1, 0.1, 3.1),
 ///     potential: &Potential::default(),
 ///     discs: &[],
+///     within: Region::EVERYWHERE,
 /// };
 /// let config = DstarConfig { clearance_m: 0.5, budget: 10_000, planar_band_m: 1.0 };
 /// let mut search = Dstar::default();
@@ -177,6 +180,7 @@ impl Survey<'_> {
             seen.extend(self.map.row_squared(y, self.layer).map(|squared| squared < self.required));
             self.block_closed(y, &mut seen);
             self.block_taken(y, &mut seen);
+            self.block_beyond(y, &mut seen);
             if row == seen {
                 continue;
             }
@@ -216,6 +220,17 @@ impl Survey<'_> {
                 row.iter_mut().enumerate().for_each(|(x, blocked)| *blocked |= is_taken(x));
             }
         }
+    }
+
+    /// Blocks what does not reach into the request's box.
+    fn block_beyond(&self, y: usize, row: &mut [bool]) {
+        let within = &self.request.within;
+        if *within == Region::EVERYWHERE {
+            return;
+        }
+        let half_m = HALF_A_VOXEL * self.map.voxels().config().resolution_m;
+        let is_beyond = |x: usize| within.level_room_m(&self.centre(x, y)) + half_m < 0.0;
+        row.iter_mut().enumerate().for_each(|(x, blocked)| *blocked |= is_beyond(x));
     }
 
     fn centre(&self, x: usize, y: usize) -> Vector3<f64> {

@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use skein_planning::Path;
 use skein_planning::global::{Potential, astar, simplify};
 use skein_planning::local::{apf, braking};
 use skein_planning::map::{ClearanceMap, RayEnd, Sectors, VoxelMapConfig};
+use skein_planning::{Path, Region};
 
 use super::kinematics::{Flight, Pilot, Swarm, Vehicle, gaussian, uniform};
 
@@ -101,6 +101,7 @@ impl Navigator {
             goal: self.goal,
             potential: &Potential::default(),
             discs: &[],
+            within: Region::EVERYWHERE,
         };
         self.path = astar::plan(&mut self.map, &request, &config, &mut self.scratch)
             .ok()

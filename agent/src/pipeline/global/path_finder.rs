@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use skein_planning::{
-    Path,
+    Path, Region,
     global::{
         Potential,
         astar::{Disc, Plan, PlanError, Request},
@@ -25,6 +25,8 @@ pub struct Task {
     pub potential: Potential,
     /// Standing vehicles and ghosts, to be gone around if that is possible.
     pub discs: Vec<Disc>,
+    /// The box that the path stays in.
+    pub within: Region,
     /// Radius of the sphere around the vehicle, m.
     pub hull_m: f64,
     /// Clearance wanted between hull and obstacles, m.
@@ -35,7 +37,7 @@ impl Task {
     /// The request of one search, around these of its discs.
     #[must_use]
     pub fn request<'a>(&'a self, discs: &'a [Disc]) -> Request<'a> {
-        Request { start: self.start, goal: self.goal, potential: &self.potential, discs }
+        Request { start: self.start, goal: self.goal, potential: &self.potential, discs, within: self.within }
     }
 }
 

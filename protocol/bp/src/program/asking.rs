@@ -25,6 +25,11 @@ impl Program {
         self.board.get(self.board.bthread(name)?).map(|entry| &entry.bid)
     }
 
+    /// What b-threads that run here [state](Bid::state) at present, by their names; proxies state nothing.
+    pub fn stated(&self) -> impl Iterator<Item = (&str, &Event)> {
+        self.bids().flat_map(|(name, bid, _)| bid.stated().iter().map(move |event| (name, event)))
+    }
+
     /// The proxies by name, with what is left of their bids.
     pub fn proxies(&self) -> impl Iterator<Item = (&str, &Bid)> {
         self.board.proxies().map(|entry| (&*entry.name, &entry.bid))

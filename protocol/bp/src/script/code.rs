@@ -158,7 +158,12 @@ impl Compiler<'_> {
         Step::Sync {
             bid: sets.fold(bid.clone(), |bid, set| bid.wait_for(set)),
             scopes: self.open.clone(),
-            refers: bid.requests().iter().flat_map(Event::data).any(|(_, value)| reference(value).is_some()),
+            refers: bid
+                .requests()
+                .iter()
+                .chain(bid.stated())
+                .flat_map(Event::data)
+                .any(|(_, value)| reference(value).is_some()),
         }
     }
 
@@ -209,12 +214,12 @@ pub(super) fn reference(value: &Value) -> Option<&str> {
     }
 }
 
-/// A request in which each `$key` is replaced by what the event `last` has under `key`, or left out where it has
+/// The event in which each `$key` is replaced by what the event `last` has under `key`, or left out where it has
 /// nothing.
-pub(super) fn refer(request: &Event, last: Option<&Event>) -> Event {
-    let data = request.data().filter_map(|(key, value)| match reference(value) {
+pub(super) fn refer(event: &Event, last: Option<&Event>) -> Event {
+    let data = event.data().filter_map(|(key, value)| match reference(value) {
         Some(wanted) => Some((key, last?.get(wanted)?)),
         None => Some((key, value)),
     });
-    data.fold(Event::new(request.name()), |event, (key, value)| event.with(key, value.clone()))
+    data.fold(Event::new(event.name()), |event, (key, value)| event.with(key, value.clone()))
 }

@@ -4,7 +4,7 @@
 //!
 //! | op | does |
 //! |---|---|
-//! | `{"sync": {"request": [..], "wait": .., "block": .., "interrupt": .., "hot": true, "prio": 5}}` | states a bid |
+//! | `{"sync": {"request": [..], "wait": .., "block": .., "interrupt": .., "state": [..], "hot": true, "prio": 5}}` | states a bid |
 //! | `{"repeat": 3, "do": [..]}`, `{"repeat": "forever", "do": [..]}` | repeats |
 //! | `{"until": set, "within_s": 5.0, "do": [..]}` | runs the body until an event of the set, or for so long; one of both suffices |
 //! | `{"on": {"name": [..], ..}}` | goes on by the name of the event that ended the last sync |
@@ -15,7 +15,7 @@
 //! | `{"on_interrupt_enqueue": ["$event", ..]}` | from here on, enqueues these when interrupted; `$event` is what interrupts |
 //! | `{"stop": true}` | ends |
 //!
-//! Events and sets are written as in [`crate::notation`]. A datum `"$x"` of a requested event stands for the datum `x`
+//! Events and sets are written as in [`crate::notation`]. A datum `"$x"` of a requested or stated event stands for the datum `x`
 //! of the event that ended the last sync; `timeout` is the event by which time ends a block.
 //!
 //! A [`ScriptFile`] is a script for people: with a name, a purpose and parameters, and without the ops that only a
@@ -260,7 +260,7 @@ impl BThread for Script {
         let Step::Sync { bid, refers, .. } = self.code.steps.get(self.at)? else { return None };
         let mut bid = bid.clone();
         if *refers {
-            bid = bid.map_requests(|request| code::refer(request, self.last.as_ref()));
+            bid = bid.map_events(|event| code::refer(event, self.last.as_ref()));
         }
         Some(self.deadlines.iter().flatten().fold(bid, |bid, at| bid.deadline(*at)))
     }

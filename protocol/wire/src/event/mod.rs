@@ -14,6 +14,7 @@
 //! ```
 
 mod catalogue;
+mod limit;
 mod mission;
 mod motion;
 mod order;
@@ -28,6 +29,7 @@ pub use skein_bp::catalogue::{Declaration, Declared, Events, Field, Kind, Whose}
 use skein_bp::{Event, EventSet};
 
 pub use self::catalogue::{Catalogue, Subject, any_of};
+pub use self::limit::{Limit, STATED};
 pub use self::mission::{
     Airborne, CommandFailed, Complete, Failed, FoundAirborne, Landed, MISSION, PilotTook, Ready, Slept,
     Unready,
@@ -37,7 +39,8 @@ pub use self::motion::{
 };
 pub use self::order::{Declined, HandBack, Heeded, ORDERS, OrderTaken, What};
 pub use self::script::{
-    Ahead, At, BatteryLevel, Load, NeighbourAt, SCRIPT_FACTS, SCRIPTS, ScriptNews, ScriptState, Unload,
+    Ahead, Alone, At, BatteryLevel, Load, Nearest, NeighbourAt, SCRIPT_FACTS, SCRIPTS, ScriptNews,
+    ScriptState, Unload,
 };
 pub use self::sense::{
     Arrived, BatteryCritical, BatteryLow, Clear, FenceBreached, Leave, Passage, PathBlocked, Planned, SENSES,

@@ -42,7 +42,7 @@ skein_bp::events! {
 }
 
 skein_bp::events! {
-    /// What is told only while a script listens. Places are told in the air, when they have changed by a metre.
+    /// What is told only while a script, or a behaviour that names it, listens. Places are told in the air, when they have changed by a metre.
     pub const SCRIPT_FACTS;
 
     /// Where the vehicle is.
@@ -67,6 +67,15 @@ skein_bp::events! {
         /// From this vehicle.
         distance_m: f64 ["m", 0.0..=f64::INFINITY],
     }
+    /// Which of the other vehicles in the air is nearest; one that has fallen silent counts as where it was last.
+    Nearest = "nearest", Own {
+        /// Which one.
+        node: Text,
+        /// From this vehicle.
+        distance_m: f64 ["m", 0.0..=f64::INFINITY],
+    }
+    /// No other vehicle is known to be in the air any more.
+    Alone = "alone", Own;
     /// What is left in the battery has passed a multiple of 5 %.
     BatteryLevel = "battery", Own {
         percent: i64 ["%", 0.0..=100.0],

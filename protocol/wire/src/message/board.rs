@@ -60,6 +60,7 @@ impl From<&BoardRow> for proto::BoardRow {
             waits: some(&row.waits),
             blocks: some(&row.blocks),
             interrupts: some(&row.interrupts),
+            states: row.states.iter().map(Into::into).collect(),
             priority: row.priority,
             deadline_ns: row.deadline.map(ns),
             lease_age_ns: row.lease.map(|lease| ns(lease.age)),
@@ -85,6 +86,7 @@ impl TryFrom<proto::BoardRow> for BoardRow {
             waits: set(row.waits)?,
             blocks: set(row.blocks)?,
             interrupts: set(row.interrupts)?,
+            states: row.states.into_iter().map(TryInto::try_into).collect::<Result<_>>()?,
             priority: row.priority,
             deadline: row.deadline_ns.map(Duration::from_nanos),
             lease: lease.map(|(age, length)| BoardLease {
