@@ -65,7 +65,7 @@ fn fly(script: &str, seed: u64) -> Flown {
                 flown.is_high_elsewhere |= place.z > CEILING_M + 1.0;
             }
         }
-        if lockstep.swarm.now().as_millis() % 1000 == 0 {
+        if lockstep.swarm.now().as_millis().is_multiple_of(1000) {
             for (index, vehicle) in lockstep.nodes[..4].iter().enumerate() {
                 let explanation = lockstep.swarm.ground().explain(vehicle);
                 let names_it = |limit: &String| limit == "script/keep-low limits z to at most 4 m";
