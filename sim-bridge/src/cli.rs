@@ -9,6 +9,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use skein_bp::behaviour::Behaviours;
 
+use crate::autopilots::Autopilots;
 use crate::scenario::{Overrides, Scenario, ScenarioError};
 
 /// The end of a program.
@@ -176,6 +177,8 @@ pub struct WorldArgs {
     pub scenario: String,
     #[command(flatten)]
     pub overrides: Overrides,
+    #[command(flatten)]
+    pub autopilots: Autopilots,
     /// Seed of every random number.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
@@ -187,7 +190,9 @@ impl WorldArgs {
     /// # Errors
     /// The first fault in them.
     pub fn open(&self, known: &Behaviours) -> Result<Scenario, ScenarioError> {
-        Scenario::open_with(&self.scenario, &self.overrides, self.seed, known)
+        let mut scenario = Scenario::open_with(&self.scenario, &self.overrides, self.seed, known)?;
+        self.autopilots.assign(&mut scenario);
+        Ok(scenario)
     }
 }
 

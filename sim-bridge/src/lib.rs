@@ -3,7 +3,8 @@
 //! [`fly`] hosts a whole swarm in one process, or starts one process for each of its nodes; `serve` hosts the world
 //! alone, for agents and MAVLink clients in other processes. All take a [`scenario`].
 
-pub mod check;
+pub mod autopilots;
+mod check;
 pub mod cli;
 #[cfg(feature = "zenoh")]
 pub mod configure;

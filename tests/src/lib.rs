@@ -17,7 +17,12 @@ use skein_world::Simulation;
 #[must_use]
 pub fn flight(scenario: &str, seed: u64) -> Fly {
     Fly {
-        world: WorldArgs { scenario: scenario.to_owned(), overrides: Overrides::default(), seed },
+        world: WorldArgs {
+            scenario: scenario.to_owned(),
+            overrides: Overrides::default(),
+            autopilots: Autopilots::default(),
+            seed,
+        },
         clock: Clock::Lockstep,
         speed: 1.0,
         controller: Controller::Bp,

@@ -42,6 +42,7 @@ mod mode;
 mod parameter;
 mod patience;
 mod set_point;
+pub mod simulator;
 mod telemetry;
 
 pub use command::{Command, CommandResult};

@@ -31,6 +31,7 @@ pub use self::{
     trial::{Flown, Trial},
 };
 use crate::{
+    autopilots::Autopilots,
     cli::{self, Clock},
     scenario::Scenario,
     summary::{Summary, Traffic},
@@ -66,12 +67,12 @@ pub fn run(args: &cli::Fly, known: &Behaviours) -> anyhow::Result<Summary> {
     let summary = match args.clock {
         Clock::Lockstep => {
             let table = (!args.headless).then_some(table);
-            in_lockstep(&scenario, args.controller, Some(recording(&out)?), table)?
+            in_lockstep(&scenario, args, recording(&out)?, table, &out)?
         }
         #[cfg(feature = "zenoh")]
         Clock::Real if args.processes => apart::fly(&scenario, args, &out, table)?,
         #[cfg(feature = "zenoh")]
-        Clock::Real => real::fly(&scenario, args, recording(&out)?, table)?,
+        Clock::Real => real::fly(&scenario, args, recording(&out)?, table, &out)?,
         #[cfg(not(feature = "zenoh"))]
         Clock::Real => {
             anyhow::bail!("--clock real: built without the cargo feature `zenoh`; use --clock lockstep")
@@ -84,14 +85,17 @@ pub fn run(args: &cli::Fly, known: &Behaviours) -> anyhow::Result<Summary> {
 
 fn in_lockstep(
     scenario: &Scenario,
-    controller: cli::Controller,
-    recording: Option<Recording>,
+    args: &cli::Fly,
+    recording: Recording,
     table: Option<LiveTable<std::io::Stderr>>,
+    out: &Path,
 ) -> anyhow::Result<Summary> {
     let network = memory_network(scenario);
     let links = memory_links(&network, scenario);
-    let agents = Agents::of(scenario, controller);
-    Flight::new(scenario, agents, links, recording, table)?.fly(&mut Lockstep(network))
+    let agents = Agents::of(scenario, args.controller);
+    let mut flight = Flight::new(scenario, agents, links, Some(recording), table)?;
+    flight.seat(&args.world.autopilots, out)?;
+    flight.fly(&mut Lockstep(network))
 }
 
 /// `out/<scenario>-<seed>`, under the current folder.
@@ -188,6 +192,13 @@ impl<'a> Flight<'a> {
         let ground = ground_config(scenario, Fleet::new(setup::FLEET)?, controller);
         let swarm = Swarm::with_parts(simulation, configs, &*parts, ground, links)?;
         Ok(Self { scenario, swarm, recording, table, began: Instant::now(), called_off: None })
+    }
+
+    /// Lets the autopilots fly that the scenario's vehicles have.
+    fn seat(&mut self, autopilots: &Autopilots, out: &Path) -> anyhow::Result<()> {
+        self.swarm.seat(|simulation| autopilots.seat(simulation, self.scenario, out))?;
+        self.began = Instant::now();
+        Ok(())
     }
 
     /// Steps until the mission is over.

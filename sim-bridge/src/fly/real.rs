@@ -5,6 +5,7 @@
 //! between vehicles and ground passes through the network stack.
 
 use std::net::SocketAddr;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
@@ -39,6 +40,7 @@ pub fn fly(
     args: &cli::Fly,
     recording: Recording,
     mut table: LiveTable<std::io::Stderr>,
+    out: &Path,
 ) -> anyhow::Result<Summary> {
     let fleet = Fleet::new(FLEET)?;
     let open = |network| ZenohSession::open(ZenohConfig::new(fleet.clone(), network));
@@ -70,7 +72,8 @@ pub fn fly(
     }
     let table = (!args.headless).then_some(table);
     let agents = Agents::of(scenario, args.controller);
-    let flight = Flight::new(scenario, agents, links, Some(recording), table)?;
+    let mut flight = Flight::new(scenario, agents, links, Some(recording), table)?;
+    flight.seat(&args.world.autopilots, out)?;
     flight.fly(&mut RealTime {
         began: Instant::now(),
         speed: args.speed,

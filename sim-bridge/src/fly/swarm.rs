@@ -101,6 +101,14 @@ impl Swarm {
         })
     }
 
+    /// Lets others fly vehicles of the world in place of their built-in autopilots. Such a run does not replay.
+    ///
+    /// # Errors
+    /// As `seat`.
+    pub fn seat<E>(&mut self, seat: impl FnOnce(&mut Simulation) -> Result<(), E>) -> Result<(), E> {
+        seat(&mut self.simulation)
+    }
+
     /// Moves world, agents and ground on by one step of 4 ms.
     pub fn step(&mut self) -> Happenings {
         self.simulation.step();

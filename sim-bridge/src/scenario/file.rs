@@ -29,6 +29,7 @@ use super::{
     DEFAULT_TIME_LIMIT_S, Network, Order, Scenario, ScenarioError, VehiclePlan, VehicleScript, Who,
     check_count, read, read_world, stated_datum,
 };
+use crate::autopilots::make::Make;
 use crate::mission;
 
 const DEFAULT_VEHICLES: usize = 4;
@@ -53,6 +54,7 @@ struct FileTable {
     generator: Option<Generator>,
     vehicles: Option<usize>,
     model: Option<String>,
+    autopilot: Option<Make>,
     #[serde(default, deserialize_with = "field::optional_positive")]
     cruise_speed_m_s: Option<f64>,
     #[serde(default)]
@@ -162,6 +164,7 @@ struct VehicleTable {
     #[serde(default, deserialize_with = "field::points")]
     waypoints_m: Vec<Vector3<f64>>,
     model: Option<String>,
+    autopilot: Option<Make>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -393,6 +396,7 @@ impl ScenarioFile {
                 waypoints: vec![route.goal],
                 pace: 1.0,
                 model: model.clone(),
+                autopilot: self.table.autopilot,
             };
             return Ok(layout.routes.iter().map(plan).collect());
         }
@@ -400,8 +404,14 @@ impl ScenarioFile {
             let message = "expected a generator, a task, a mission or [[vehicle]] tables: the vehicles have nowhere to go";
             return Err(self.contradiction("vehicles", message));
         }
-        let blank =
-            VehiclePlan { start: Vector3::zeros(), yaw: 0.0, waypoints: Vec::new(), pace: 1.0, model };
+        let blank = VehiclePlan {
+            start: Vector3::zeros(),
+            yaw: 0.0,
+            waypoints: Vec::new(),
+            pace: 1.0,
+            model,
+            autopilot: self.table.autopilot,
+        };
         Ok(vec![blank; count])
     }
 
@@ -439,6 +449,7 @@ impl ScenarioFile {
                 waypoints: table.waypoints_m.clone(),
                 pace: 1.0,
                 model: table.model.as_deref().map_or_else(|| Ok(model.clone()), |name| self.model(name))?,
+                autopilot: table.autopilot.or(self.table.autopilot),
             })
         };
         tables.iter().take(count).map(plan).collect()
@@ -583,5 +594,6 @@ fn from_under(PacedRoute { route, pace }: PacedRoute, model: &VehicleModel) -> V
         waypoints: route,
         pace,
         model: model.clone(),
+        autopilot: None,
     }
 }

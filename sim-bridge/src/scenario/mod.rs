@@ -38,6 +38,7 @@ pub use layout::SPACING_M;
 pub use missions::apply_missions;
 pub use world_file::read_world;
 
+use crate::autopilots::make::Make;
 use crate::mission::{self, MissionSet};
 
 /// Largest swarm: MAVLink numbers systems from 1 to 255, and the ground takes the last.
@@ -115,9 +116,16 @@ pub struct VehiclePlan {
     /// Its speed as a share of the scenario's cruise speed: above 0, at most 1.
     pub pace: f64,
     pub model: VehicleModel,
+    /// Who flies it; none for whoever the command line names.
+    pub autopilot: Option<Make>,
 }
 
 impl VehiclePlan {
+    /// Who flies it.
+    pub fn make(&self) -> Make {
+        self.autopilot.unwrap_or_default()
+    }
+
     /// The last waypoint; the start where there is none.
     pub fn goal(&self) -> Vector3<f64> {
         self.waypoints.last().copied().unwrap_or(self.start)

@@ -9,6 +9,7 @@ use skein_wire::Scan;
 use crate::autopilot::{Autopilot, AutopilotConfig};
 use crate::lidar::{Hull, Lidar, Surroundings};
 use crate::noise::Noise;
+use crate::pilot::{BuiltIn, Fixed, Pilot};
 use crate::quadrotor::{MotorCommands, Quadrotor, RigidState, STEP};
 use crate::scene::Scene;
 use crate::sensors::{SensorReadings, Sensors, is_due};
@@ -71,7 +72,7 @@ struct Vehicle {
     quadrotor: Quadrotor,
     sensors: Sensors,
     readings: SensorReadings,
-    pilot: Pilot,
+    pilot: Box<dyn Pilot>,
     lidar: Lidar,
     /// Shifts the instruments in time, in steps.
     phase: u64,
@@ -79,12 +80,6 @@ struct Vehicle {
     path_length_m: f64,
     lifted_off: Option<Duration>,
     last_airborne: Duration,
-}
-
-/// The source of motor commands.
-enum Pilot {
-    BuiltIn(Box<Autopilot>),
-    External(MotorCommands),
 }
 
 impl Simulation {
@@ -122,6 +117,9 @@ impl Simulation {
         let wind = self.wind.step();
         self.tick += 1;
         let after = self.now();
+        for Vehicle { pilot, readings, quadrotor, .. } in &mut self.vehicles {
+            pilot.sense(now, readings, quadrotor);
+        }
         for vehicle in &mut self.vehicles {
             if vehicle.fly(now, after, &wind) {
                 self.referee.count_hard_landing();
@@ -168,23 +166,27 @@ impl Simulation {
         vehicles.filter_map(|(index, vehicle)| Some((index, vehicle.scan.take()?))).collect()
     }
 
-    /// Sends MAVLink bytes to the autopilot of vehicle `index`. Without a built-in autopilot
-    /// there, nobody hears them.
+    /// Sends MAVLink bytes to the autopilot of vehicle `index`.
     pub fn send(&mut self, index: usize, bytes: &[u8]) {
-        if let Some(autopilot) = self.autopilot(index) {
-            autopilot.receive(bytes);
+        if let Some(vehicle) = self.vehicles.get_mut(index) {
+            vehicle.pilot.receive(bytes);
         }
     }
 
     /// Takes the MAVLink bytes that the autopilot of vehicle `index` has sent since the last call.
     pub fn receive(&mut self, index: usize) -> Vec<u8> {
-        self.autopilot(index).map_or_else(Vec::new, Autopilot::take_output)
+        self.vehicles.get_mut(index).map_or_else(Vec::new, |vehicle| vehicle.pilot.take_output())
     }
 
     /// Flies vehicle `index` by these commands from now on, in place of its built-in autopilot.
     pub fn drive(&mut self, index: usize, commands: MotorCommands) {
+        self.seat(index, Box::new(Fixed(commands)));
+    }
+
+    /// Lets `pilot` fly vehicle `index` from now on, in place of its built-in autopilot.
+    pub fn seat(&mut self, index: usize, pilot: Box<dyn Pilot>) {
         if let Some(vehicle) = self.vehicles.get_mut(index) {
-            vehicle.pilot = Pilot::External(commands);
+            vehicle.pilot = pilot;
         }
     }
 
@@ -199,13 +201,6 @@ impl Simulation {
     /// The record of collisions, separation and clearance so far.
     pub fn truth(&self) -> Truth {
         self.referee.truth()
-    }
-
-    fn autopilot(&mut self, index: usize) -> Option<&mut Autopilot> {
-        match &mut self.vehicles.get_mut(index)?.pilot {
-            Pilot::BuiltIn(autopilot) => Some(autopilot),
-            Pilot::External(_) => None,
-        }
     }
 
     fn judge(&mut self) {
@@ -233,7 +228,7 @@ impl Vehicle {
             readings: sensors.read(0, &quadrotor, surroundings),
             quadrotor,
             sensors,
-            pilot: Pilot::BuiltIn(Box::new(autopilot)),
+            pilot: Box::new(BuiltIn::new(autopilot)),
             lidar,
             phase,
             scan: None,
@@ -245,10 +240,7 @@ impl Vehicle {
 
     /// One step from `now` to `after`; tells whether it ended in a crash on the ground.
     fn fly(&mut self, now: Duration, after: Duration, wind: &Vector3<f64>) -> bool {
-        let commands = match &mut self.pilot {
-            Pilot::BuiltIn(autopilot) => autopilot.step(now, &self.readings),
-            Pilot::External(commands) => *commands,
-        };
+        let commands = self.pilot.commands();
         let before = self.quadrotor.state().position;
         let touchdown = self.quadrotor.step(&commands, wind);
         if !self.quadrotor.on_ground() && !self.quadrotor.wrecked() {

@@ -1,11 +1,13 @@
 //! ArduPilot's copters.
 
+use std::time::Duration;
+
 use mavlink::dialects::common::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd};
 use nalgebra::Vector3;
 
 use super::px4;
 use crate::axes;
-use crate::command::CommandResult;
+use crate::command::{Command, CommandResult};
 use crate::dialect::{Dialect, Failsafe};
 use crate::mode::FlightMode;
 use crate::parameter::ParameterEncoding;
@@ -67,6 +69,16 @@ impl Dialect for ArduPilot {
             param7: height_m as f32,
             ..Default::default()
         })
+    }
+
+    /// GUIDED first: NAV_TAKEOFF is refused in every other mode, and the vehicle then stands armed.
+    fn launch(&self, height_m: f64) -> Vec<Command> {
+        vec![Command::Offboard, Command::Arm, Command::Takeoff { height_m }]
+    }
+
+    /// No set-points are needed before GUIDED.
+    fn set_points_before_offboard(&self) -> Duration {
+        Duration::ZERO
     }
 
     /// A set-point with partial axes stops the vehicle, and one without heading turns the nose: planar ones
