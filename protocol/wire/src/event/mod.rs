@@ -29,25 +29,7 @@ pub use skein_bp::catalogue::{Declaration, Declared, Events, Field, Kind, Whose}
 use skein_bp::{Event, EventSet};
 
 pub use self::catalogue::{Catalogue, Subject, any_of};
-pub use self::limit::{Limit, STATED};
-pub use self::mission::{
-    Airborne, CommandFailed, Complete, Failed, FoundAirborne, Landed, MISSION, PilotTook, Ready, Slept,
-    Unready,
-};
-pub use self::motion::{
-    Advance, Enter, Goto, Hold, Homeward, Land, MOTION, Plan, PlanReason, Return, Takeoff,
-};
-pub use self::order::{Declined, HandBack, Heeded, ORDERS, OrderTaken, What};
-pub use self::script::{
-    Ahead, Alone, At, BatteryLevel, Load, Nearest, NeighbourAt, SCRIPT_FACTS, SCRIPTS, ScriptNews,
-    ScriptState, Unload,
-};
-pub use self::sense::{
-    Arrived, BatteryCritical, BatteryLow, Clear, FenceBreached, Leave, Passage, PathBlocked, Planned, SENSES,
-    Stuck, TooClose, Unplannable,
-};
-pub use self::station::{Heard, Later, MissionOver, OrderGiven, STATION, Situation, Turn};
-pub use self::swarm::{Abort, JOINT, Launch, SWARM};
+pub use self::{limit::*, mission::*, motion::*, order::*, script::*, sense::*, station::*, swarm::*};
 
 /// A text in an event's data. Cloning is cheap.
 pub type Text = Arc<str>;
