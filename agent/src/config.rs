@@ -93,6 +93,15 @@ pub struct Planners {
     pub local: LocalPlanner,
 }
 
+/// What tells where the vehicle is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PositionSource {
+    /// The autopilot's own estimate.
+    #[default]
+    Autopilot,
+}
+
 /// The configuration of one vehicle's agent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AgentConfig {
@@ -118,6 +127,8 @@ pub struct AgentConfig {
     pub takeoff_height_m: f64,
     /// Height in the world at which this vehicle returns, m; different for every vehicle.
     pub return_altitude_m: f64,
+    /// What tells where it is.
+    pub position: PositionSource,
     /// Whether the vehicle has a lidar: without scans younger than 200 ms it then stands still.
     pub lidar: bool,
     pub fence: Fence,

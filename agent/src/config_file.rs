@@ -18,7 +18,7 @@ use skein_zenoh::NetworkSettings;
 use crate::airspace_table::AirspaceTable;
 use crate::autopilot_link::Address;
 use crate::bthreads::LinkLossPolicy;
-use crate::config::{AgentConfig, Envelope, Fence, Planners};
+use crate::config::{AgentConfig, Envelope, Fence, Planners, PositionSource};
 use crate::field;
 
 /// The file, field by field. What is never written keeps its default in files that are made.
@@ -35,6 +35,8 @@ pub struct AgentFile {
     lease_ms: f64,
     #[serde(default)]
     pub seed: u64,
+    #[serde(default)]
+    position: PositionSource,
     pub autopilot: Autopilot,
     pub lidar: Option<Lidar>,
     pub datum: DatumTable,
@@ -185,6 +187,7 @@ impl AgentFile {
             lease_ms: lease_ms(),
             // TOML has no greater number.
             seed: agent.seed.min(i64::MAX.unsigned_abs()),
+            position: agent.position,
             autopilot: Autopilot { link, system_id: agent.system_id, cable_is_private: false },
             lidar: agent.lidar.then(|| Lidar { sensor: sensor.to_owned(), network: None }),
             datum: agent.datum.into(),
@@ -229,6 +232,7 @@ impl AgentFile {
             waypoints: self.mission.waypoints,
             takeoff_height_m: self.mission.takeoff_height_m,
             return_altitude_m: self.mission.return_altitude_m,
+            position: self.position,
             lidar: lidar.is_some(),
             fence: self.fence,
             airspace,

@@ -3,7 +3,7 @@
 use crate::config::AgentConfig;
 use crate::mind::{BThreads, Mind};
 use crate::pipeline::layers::Layers;
-use crate::positioning::{Autopilot, Positioning};
+use crate::positioning::{self, Positioning};
 
 /// What an agent is made of, beside its configuration. Experiments replace a part to see what it is good for.
 #[derive(Debug)]
@@ -19,7 +19,7 @@ impl Parts {
     pub fn of(config: &AgentConfig) -> Self {
         Self {
             mind: Box::new(BThreads),
-            positioning: Box::new(Autopilot),
+            positioning: positioning::source(config.position),
             layers: Layers::of(&config.envelope, config.fence, config.planners),
         }
     }

@@ -35,6 +35,7 @@ fn config() -> AgentConfig {
         waypoints: vec![[10.0, 0.0, 2.0], [10.0, 10.0, 2.0]],
         takeoff_height_m: 2.0,
         return_altitude_m: RETURN_ALTITUDE_M,
+        position: Default::default(),
         lidar: true,
         fence: Fence { min: [-20.0, -20.0, 0.0], max: [20.0, 20.0, 10.0] },
         airspace: Default::default(),

@@ -27,6 +27,7 @@ pub fn config() -> AgentConfig {
         waypoints: vec![[50.0, 0.0, 3.0]],
         takeoff_height_m: 2.0,
         return_altitude_m: 4.0,
+        position: Default::default(),
         lidar: true,
         fence: Fence { min: [-60.0, -60.0, -1.0], max: [60.0, 60.0, 20.0] },
         airspace: Default::default(),

@@ -1,7 +1,7 @@
 //! Positioning: where the vehicle is, how it lies and moves, and how sure that is.
 //!
-//! Whoever needs a position asks a [`Positioning`] and nobody else. A new source is a file beside that of the
-//! [`Autopilot`] that implements it, and is chosen in [`Parts`](crate::parts::Parts).
+//! Whoever needs a position asks a [`Positioning`] and nobody else. Another source is a file here, a line in [`source`],
+//! and a name in [`PositionSource`].
 
 mod autopilot;
 mod estimate;
@@ -10,3 +10,13 @@ mod source;
 pub use self::autopilot::Autopilot;
 pub use self::estimate::{Attitude, Estimate, Motion};
 pub use self::source::Positioning;
+
+use crate::config::PositionSource;
+
+/// The source of this name.
+#[must_use]
+pub fn source(source: PositionSource) -> Box<dyn Positioning> {
+    match source {
+        PositionSource::Autopilot => Box::new(Autopilot),
+    }
+}

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AgentConfig, Envelope, Fence, Mind, Parts};
+use skein_agent::{AgentConfig, Envelope, Fence, Mind, Parts, PositionSource};
 use skein_bp::{Program, script::Assignment};
 use skein_dbp::{Kept, NodeName};
 use skein_ground::{GroundConfig, Order, Who};
@@ -88,6 +88,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             takeoff_height_m: scenario.takeoff_height_m,
             return_altitude_m: (RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64)
                 .min(bounds.max.z - 1.0),
+            position: PositionSource::default(),
             lidar: true,
             fence,
             airspace: scenario.airspace.clone(),
