@@ -82,7 +82,7 @@ impl Flight {
         let (velocity, height_m) = match set_point {
             SetPoint::Planar { vx, vy, z, .. } => (Vector3::new(vx, vy, 0.0), Some(z)),
             SetPoint::Velocity { velocity, .. } => (velocity, None),
-            SetPoint::Position { .. } => panic!("guidance flies by velocity"),
+            SetPoint::Position { position, .. } => (Vector3::zeros(), Some(position.z)),
         };
         let mut place = self.motion.position + velocity * 0.02;
         place.z = height_m.map_or(place.z, |height_m| place.z + (height_m - place.z).clamp(-0.02, 0.02));
@@ -187,8 +187,9 @@ fn the_slowest_limit_counts_and_is_no_standstill() {
 #[test]
 fn a_way_stays_in_the_region_and_a_waypoint_beyond_it_has_none() {
     let region = Limit { max_x: Some(10.0), min_y: Some(-2.0), ..Limit::NONE };
-    let mut flight =
-        Flight::from([0.0, 0.0, 6.0]).limited_by(&[region.clone()]).heads_for([20.0, 0.0, 6.0], false);
+    let mut flight = Flight::from([0.0, 0.0, 6.0])
+        .limited_by(std::slice::from_ref(&region))
+        .heads_for([20.0, 0.0, 6.0], false);
     let refused = flight.plans();
     assert!(
         matches!(&refused, Some(Report::Unplannable { why, .. }) if why.contains("limits")),

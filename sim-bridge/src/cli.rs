@@ -88,6 +88,8 @@ pub struct Fly {
     /// vehicles stay where they are.
     #[arg(long, value_enum, default_value_t = Controller::Bp)]
     pub controller: Controller,
+    #[command(flatten)]
+    pub autopilots: Autopilots,
     /// Folder for summary.json and mission.mcap; made if missing.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -177,8 +179,6 @@ pub struct WorldArgs {
     pub scenario: String,
     #[command(flatten)]
     pub overrides: Overrides,
-    #[command(flatten)]
-    pub autopilots: Autopilots,
     /// Seed of every random number.
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
@@ -190,9 +190,7 @@ impl WorldArgs {
     /// # Errors
     /// The first fault in them.
     pub fn open(&self, known: &Behaviours) -> Result<Scenario, ScenarioError> {
-        let mut scenario = Scenario::open_with(&self.scenario, &self.overrides, self.seed, known)?;
-        self.autopilots.assign(&mut scenario);
-        Ok(scenario)
+        Scenario::open_with(&self.scenario, &self.overrides, self.seed, known)
     }
 }
 

@@ -72,7 +72,7 @@ pub fn run(args: &cli::Configure, known: &Behaviours, as_json: bool) -> anyhow::
 
 fn instructions(args: &cli::Configure, files: &Files) -> String {
     let mut text = String::from("Start each in a terminal of its own, in any order:\n\n");
-    let cli::Configure { world: cli::WorldArgs { scenario, overrides, seed, .. }, setup, .. } = args;
+    let cli::Configure { world: cli::WorldArgs { scenario, overrides, seed }, setup, .. } = args;
     if setup.network == Network::Zenohd {
         let port = router_port(setup.port_offset);
         let _ = writeln!(text, "  zenohd --listen tcp/127.0.0.1:{port} --no-multicast-scouting");

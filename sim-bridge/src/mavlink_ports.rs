@@ -26,27 +26,31 @@ const MOST_CLIENTS: usize = 16;
 
 /// The ports of all vehicles of a world.
 pub struct MavlinkPorts {
-    vehicles: Vec<[Port; 2]>,
+    /// None for vehicles that have ports of their own.
+    vehicles: Vec<Option<[Port; 2]>>,
 }
 
 impl MavlinkPorts {
-    /// Opens two ports for each vehicle, all `offset` further up than by convention.
+    /// Opens two ports for each vehicle that is `served`, all `offset` further up than by convention.
     ///
     /// # Errors
     /// The port that is taken.
-    pub fn open(vehicles: usize, offset: u16) -> anyhow::Result<Self> {
-        let open = |vehicle| {
+    pub fn open(served: impl IntoIterator<Item = bool>, offset: u16) -> anyhow::Result<Self> {
+        let open = |(vehicle, is_served): (usize, bool)| {
+            if !is_served {
+                return Ok(None);
+            }
             let index = u16::try_from(vehicle)? + offset;
             let companion = Port::open(COMPANION.0 + index, COMPANION.1 + index, false)?;
-            Ok([companion, Port::open(GROUND.0 + index, GROUND.1 + offset, true)?])
+            Ok(Some([companion, Port::open(GROUND.0 + index, GROUND.1 + offset, true)?]))
         };
-        Ok(Self { vehicles: (0..vehicles).map(open).collect::<anyhow::Result<_>>()? })
+        Ok(Self { vehicles: served.into_iter().enumerate().map(open).collect::<anyhow::Result<_>>()? })
     }
 
     /// Hands on whatever has come, each for the autopilot of a vehicle.
     pub fn receive(&mut self, mut take_in: impl FnMut(usize, &[u8])) {
         for (index, ports) in self.vehicles.iter_mut().enumerate() {
-            for port in ports {
+            for port in ports.iter_mut().flatten() {
                 port.receive(|bytes| take_in(index, bytes));
             }
         }
@@ -54,19 +58,19 @@ impl MavlinkPorts {
 
     /// Sends what the autopilot of vehicle `index` says.
     pub fn send(&mut self, index: usize, bytes: &[u8]) {
-        for port in self.vehicles.get_mut(index).into_iter().flatten() {
+        for port in self.vehicles.get_mut(index).into_iter().flatten().flatten() {
             port.send(bytes);
         }
     }
 
     /// The port at which ground stations listen for all vehicles.
     pub fn audience(&self) -> Option<SocketAddr> {
-        self.vehicles.first().map(|[_, ground]| ground.audience)
+        self.vehicles.iter().flatten().next().map(|[_, ground]| ground.audience)
     }
 
     /// The port of the companion link of vehicle `index`.
     pub fn companion_port(&self, index: usize) -> Option<u16> {
-        self.vehicles.get(index).map(|[companion, _]| companion.listens_on)
+        self.vehicles.get(index)?.as_ref().map(|[companion, _]| companion.listens_on)
     }
 }
 

@@ -41,9 +41,9 @@ pub struct Summary {
     pub events: EventCounts,
     /// Traffic between nodes.
     pub network: Traffic,
-    /// Hash over every selected event and every pose: equal hashes mean equal runs. Empty for runs in several
-    /// processes.
-    pub trace_hash: String,
+    /// Hash over every selected event and every pose: equal hashes mean equal runs. None for runs that do not
+    /// replay: in several processes, or with autopilots that run by themselves.
+    pub trace_hash: Option<String>,
     /// One entry a vehicle, in order.
     pub per_vehicle: Vec<VehicleSummary>,
 }
@@ -207,8 +207,8 @@ impl Summary {
         writeln!(out, "  events      {occurred}, of which {remote} requested by another node")?;
         let Traffic { messages, bytes } = self.network;
         writeln!(out, "  network     {messages} messages, {:.1} kB", bytes as f64 / 1000.0)?;
-        if !self.trace_hash.is_empty() {
-            writeln!(out, "  trace       {}", self.trace_hash)?;
+        if let Some(trace_hash) = &self.trace_hash {
+            writeln!(out, "  trace       {trace_hash}")?;
         }
         writeln!(out, "{}", self.table())
     }
@@ -268,7 +268,7 @@ mod tests {
             plan_ms: PlanTimes::of((1..=200).rev().map(f64::from).collect()),
             events: EventCounts { occurred: 812, remote: 40 },
             network: Traffic { messages: 9000, bytes: 812_345 },
-            trace_hash: "00ff".into(),
+            trace_hash: Some("00ff".into()),
             per_vehicle: vec![VehicleSummary {
                 id: "uav/1".into(),
                 outcome: Outcome::LandedEarly,

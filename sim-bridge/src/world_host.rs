@@ -13,6 +13,7 @@ use skein_wire::{Fleet, Key, Link as _, MissionState, Payload, Scan, Scene, Stat
 use skein_world::{STEP, Simulation};
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
 
+use crate::autopilots::make::Make;
 use crate::fly::account::Account;
 use crate::fly::{FLEET, simulation_config, vehicle_name};
 use crate::mavlink_ports::MavlinkPorts;
@@ -92,7 +93,14 @@ impl WorldHost {
     ) -> anyhow::Result<Self> {
         let fleet = Fleet::new(&config.fleet)?;
         let node = NodeName::new(&config.node)?;
-        let ports = MavlinkPorts::open(scenario.vehicles.len(), port_offset)?;
+        for (number, plan) in (1..).zip(&scenario.vehicles) {
+            anyhow::ensure!(
+                plan.make() == Make::BuiltIn,
+                "vehicle {number}: a world for other processes has built-in autopilots alone; leave `autopilot` out, or \
+                 fly in one process, without --processes"
+            );
+        }
+        let ports = MavlinkPorts::open(scenario.vehicles.iter().map(|_| true), port_offset)?;
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
         let occurrences = Key::pattern::<Occurrence>(&fleet);
         let scan_key = |index| Key::to_one::<Scan>(&fleet, node.clone(), vehicle_name(index));
@@ -202,7 +210,7 @@ impl WorldHost {
             plan_times_ms: &[],
             events: self.events,
             network: self.traffic,
-            trace_hash: String::new(),
+            trace_hash: None,
         }
     }
 

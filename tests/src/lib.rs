@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use skein_bp::behaviour::Behaviours;
 use skein_dbp::NodeName;
+use skein_sim::autopilots::Autopilots;
 use skein_sim::cli::{self, Clock, Controller, Fly, WorldArgs};
 use skein_sim::fly::{self, Happenings, Links, Swarm};
 use skein_sim::scenario::{Overrides, Scenario};
@@ -17,15 +18,11 @@ use skein_world::Simulation;
 #[must_use]
 pub fn flight(scenario: &str, seed: u64) -> Fly {
     Fly {
-        world: WorldArgs {
-            scenario: scenario.to_owned(),
-            overrides: Overrides::default(),
-            autopilots: Autopilots::default(),
-            seed,
-        },
+        world: WorldArgs { scenario: scenario.to_owned(), overrides: Overrides::default(), seed },
         clock: Clock::Lockstep,
         speed: 1.0,
         controller: Controller::Bp,
+        autopilots: Autopilots::default(),
         out: None,
         headless: true,
         processes: false,

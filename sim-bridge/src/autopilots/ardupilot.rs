@@ -13,6 +13,7 @@ use skein_mav::simulator::ardupilot::{Servos, answer};
 use skein_world::{MotorCommands, Pilot, Quadrotor, STEP, SensorReadings, VehicleModel};
 
 use super::instance::{Instance, fresh};
+use super::legs::Legs;
 
 /// The port to which instance 0 sends its servos, and the one on which it speaks MAVLink.
 const SERVO_PORT: u16 = 9002;
@@ -41,6 +42,7 @@ pub(super) struct ArduPilot {
     throttle: [f64; 4],
     /// Where the vehicle was one step ago, and where it is.
     motion: Option<[Motion; 2]>,
+    legs: Legs,
     now: Duration,
     voltage_v: f64,
     has_sent: bool,
@@ -60,11 +62,11 @@ impl ArduPilot {
     ) -> anyhow::Result<Self> {
         let name = format!("ArduPilot of uav/{}", index + 1);
         let port = |base: u16| base + PORTS_APART * index as u16;
-        let servos = UdpSocket::bind((Ipv4Addr::LOCALHOST, port(SERVO_PORT)))
-            .with_context(|| format!("UDP port {}: is taken; does another simulator run?", port(SERVO_PORT)))?;
-        let mut instance = program
-            .map(|program| launch(index, &datum, model, program, defaults, folder))
-            .transpose()?;
+        let servos = UdpSocket::bind((Ipv4Addr::LOCALHOST, port(SERVO_PORT))).with_context(|| {
+            format!("UDP port {}: is taken; does another simulator run?", port(SERVO_PORT))
+        })?;
+        let mut instance =
+            program.map(|program| launch(index, &datum, model, program, defaults, folder)).transpose()?;
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port(MAVLINK_PORT)));
         let began = Instant::now();
         let mavlink = loop {
@@ -91,6 +93,7 @@ impl ArduPilot {
             mavlink: Some(mavlink),
             throttle: [0.0; 4],
             motion: None,
+            legs: Legs::default(),
             now: Duration::ZERO,
             voltage_v: 0.0,
             has_sent: false,
@@ -137,7 +140,7 @@ impl Pilot for ArduPilot {
             velocity: state.velocity,
             attitude: state.attitude,
             angular_rate: readings.imu.angular_rate,
-            specific_force: readings.imu.specific_force,
+            specific_force: self.legs.soften(&readings.imu.specific_force),
         };
         let before = self.motion.map_or(motion, |[_, last]| last);
         self.motion = Some([before, motion]);

@@ -3,6 +3,7 @@
 
 mod ardupilot;
 mod instance;
+mod legs;
 mod magnetism;
 pub mod make;
 mod px4;
@@ -53,14 +54,19 @@ impl Autopilots {
     ///
     /// # Errors
     /// A program that is missing, does not start or does not connect; a port that is taken.
-    pub fn seat(&self, simulation: &mut Simulation, scenario: &Scenario, folder: &Path) -> anyhow::Result<()> {
+    pub fn seat(
+        &self,
+        simulation: &mut Simulation,
+        scenario: &Scenario,
+        folder: &Path,
+    ) -> anyhow::Result<()> {
         let datum = *scenario.scene.datum();
         for (index, plan) in scenario.vehicles.iter().enumerate() {
             let folder = folder.join("autopilots").join(format!("uav-{}", index + 1));
             match plan.make() {
                 Make::BuiltIn => {}
                 Make::Px4 => {
-                    let px4 = Px4::start(index, datum, self.px4.as_deref(), &folder)?;
+                    let px4 = Px4::start(index, datum, &plan.model, self.px4.as_deref(), &folder)?;
                     simulation.seat(index, Box::new(px4));
                 }
                 Make::Ardupilot => {

@@ -10,9 +10,10 @@ use anyhow::Context as _;
 use nalgebra::{UnitQuaternion, Vector3};
 use skein_mav::Datum;
 use skein_mav::simulator::{Instruments, Px4Link};
-use skein_world::{MotorCommands, Pilot, Quadrotor, SensorReadings};
+use skein_world::{MotorCommands, Pilot, Quadrotor, SensorReadings, VehicleModel};
 
 use super::instance::{Instance, fresh};
+use super::legs::Legs;
 use super::magnetism;
 
 /// The simulator's port of instance 0.
@@ -38,6 +39,7 @@ pub(super) struct Px4 {
     companion: UdpSocket,
     hears_on: u16,
     field: Vector3<f64>,
+    legs: Legs,
     now: Duration,
     commands: [f64; 4],
     has_answered: bool,
@@ -51,6 +53,7 @@ impl Px4 {
     pub(super) fn start(
         index: usize,
         datum: Datum,
+        model: &VehicleModel,
         program: Option<&Path>,
         folder: &Path,
     ) -> anyhow::Result<Self> {
@@ -60,13 +63,14 @@ impl Px4 {
             "{name}: at most {MOST_INSTANCES} PX4s are served; beyond that they share one port"
         );
         let port = |base: u16| base + index as u16;
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port(SIMULATOR_PORT)))
-            .with_context(|| format!("TCP port {}: is taken; does another simulator run?", port(SIMULATOR_PORT)))?;
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port(SIMULATOR_PORT))).with_context(|| {
+            format!("TCP port {}: is taken; does another simulator run?", port(SIMULATOR_PORT))
+        })?;
         let [hears_on, speaks_to] = COMPANION_PORTS.map(port);
         let companion = UdpSocket::bind((Ipv4Addr::LOCALHOST, speaks_to))
             .with_context(|| format!("UDP port {speaks_to}: is taken; does another companion run?"))?;
         companion.set_nonblocking(true)?;
-        let mut instance = program.map(|program| launch(index, program, folder)).transpose()?;
+        let mut instance = program.map(|program| launch(index, model, program, folder)).transpose()?;
         let stream = accept(&listener, |waited| {
             if let Some(instance) = &mut instance {
                 instance.check(folder)?;
@@ -84,6 +88,7 @@ impl Px4 {
             companion,
             hears_on,
             field: magnetism::field(&datum)?,
+            legs: Legs::default(),
             now: Duration::ZERO,
             commands: [0.0; 4],
             has_answered: false,
@@ -150,7 +155,7 @@ impl Pilot for Px4 {
             now,
             &Instruments {
                 angular_rate: readings.imu.angular_rate,
-                specific_force: readings.imu.specific_force,
+                specific_force: self.legs.soften(&readings.imu.specific_force),
                 magnetic_field,
                 pressure_height_m: readings.baro_height_m,
                 satellite: readings.gps.map(|fix| [fix.position, fix.velocity]),
@@ -189,7 +194,7 @@ impl Pilot for Px4 {
     }
 }
 
-fn launch(index: usize, program: &Path, folder: &Path) -> anyhow::Result<Instance> {
+fn launch(index: usize, model: &VehicleModel, program: &Path, folder: &Path) -> anyhow::Result<Instance> {
     let program = program.canonicalize().with_context(|| format!("--px4 {}", program.display()))?;
     let etc = program
         .ancestors()
@@ -198,9 +203,13 @@ fn launch(index: usize, program: &Path, folder: &Path) -> anyhow::Result<Instanc
         .map(|folder| folder.join("etc"))
         .find(|etc| etc.join("init.d-posix/rcS").is_file())
         .with_context(|| {
-            format!("--px4 {}: there is no etc/init.d-posix/rcS in its folder or the one above", program.display())
+            format!(
+                "--px4 {}: there is no etc/init.d-posix/rcS in its folder or the one above",
+                program.display()
+            )
         })?;
     fresh(folder)?;
+    let endurance_s = model.battery.capacity_wh / model.battery.hover_power_w * 3600.0;
     let mut command = Command::new(program);
     command
         .args(["-d", "-i"])
@@ -210,7 +219,9 @@ fn launch(index: usize, program: &Path, folder: &Path) -> anyhow::Result<Instanc
         .arg(&etc)
         .env("PX4_SIM_MODEL", "none_iris")
         .env_remove("PX4_SIMULATOR")
-        // There is no remote control, and nobody reads its logs.
+        // Its battery empties as the vehicle's does in hover. There is no remote control, and nobody reads its logs.
+        .env("PX4_PARAM_SIM_BAT_DRAIN", format!("{endurance_s:.0}"))
+        .env("PX4_PARAM_SIM_BAT_MIN_PCT", "0")
         .env("PX4_PARAM_COM_RC_IN_MODE", "4")
         .env("PX4_PARAM_SDLOG_BACKEND", "0");
     Instance::start(command, folder)

@@ -23,8 +23,8 @@ pub struct Account<'a> {
     pub events: EventCounts,
     /// Messages of all nodes.
     pub network: Traffic,
-    /// Hash of the run; empty where it cannot be had.
-    pub trace_hash: String,
+    /// Hash of the run, if it replays.
+    pub trace_hash: Option<String>,
 }
 
 /// The summary of the run; `called_off` is the reason why it was ended before it was over.

@@ -31,7 +31,7 @@ pub use self::{
     trial::{Flown, Trial},
 };
 use crate::{
-    autopilots::Autopilots,
+    autopilots::{Autopilots, make::Make},
     cli::{self, Clock},
     scenario::Scenario,
     summary::{Summary, Traffic},
@@ -46,7 +46,8 @@ const PATIENCE: u32 = 2;
 /// # Errors
 /// A fault in the scenario or the output folder; a failed mission is no error but a [`Summary`] that says so.
 pub fn run(args: &cli::Fly, known: &Behaviours) -> anyhow::Result<Summary> {
-    let scenario = args.world.open(known)?;
+    let mut scenario = args.world.open(known)?;
+    args.autopilots.assign(&mut scenario);
     let out = args.out.clone().unwrap_or_else(|| default_folder(&scenario));
     std::fs::create_dir_all(&out).with_context(|| {
         format!("output folder {}: cannot be made; name another with --out", out.display())
@@ -94,7 +95,7 @@ fn in_lockstep(
     let links = memory_links(&network, scenario);
     let agents = Agents::of(scenario, args.controller);
     let mut flight = Flight::new(scenario, agents, links, Some(recording), table)?;
-    flight.seat(&args.world.autopilots, out)?;
+    flight.seat(&args.autopilots, out)?;
     flight.fly(&mut Lockstep(network))
 }
 
@@ -196,8 +197,10 @@ impl<'a> Flight<'a> {
 
     /// Lets the autopilots fly that the scenario's vehicles have.
     fn seat(&mut self, autopilots: &Autopilots, out: &Path) -> anyhow::Result<()> {
-        self.swarm.seat(|simulation| autopilots.seat(simulation, self.scenario, out))?;
-        self.began = Instant::now();
+        if self.scenario.vehicles.iter().any(|plan| plan.make() != Make::BuiltIn) {
+            self.swarm.seat(|simulation| autopilots.seat(simulation, self.scenario, out))?;
+            self.began = Instant::now();
+        }
         Ok(())
     }
 

@@ -19,6 +19,7 @@ use super::{
     setup::{FLEET, GROUND, vehicle_name},
 };
 use crate::{
+    autopilots::make::Make,
     cli,
     mavlink_ports::MavlinkPorts,
     scenario::Scenario,
@@ -61,7 +62,9 @@ pub fn fly(
     let console = serve_console(args.console)?;
     table.note(&format!("console: {}", console.url()))?;
     table.note(&format!("other nodes: Zenoh on {}", vehicles.locators().join(", ")))?;
-    let ports = MavlinkPorts::open(scenario.vehicles.len(), args.port_offset);
+    // PX4 has ports of its own, the same ones.
+    let served = scenario.vehicles.iter().map(|plan| plan.make() != Make::Px4);
+    let ports = MavlinkPorts::open(served, args.port_offset);
     match &ports {
         Ok(ports) => {
             let audience = ports.audience().map(|audience| audience.to_string()).unwrap_or_default();
@@ -73,7 +76,7 @@ pub fn fly(
     let table = (!args.headless).then_some(table);
     let agents = Agents::of(scenario, args.controller);
     let mut flight = Flight::new(scenario, agents, links, Some(recording), table)?;
-    flight.seat(&args.world.autopilots, out)?;
+    flight.seat(&args.autopilots, out)?;
     flight.fly(&mut RealTime {
         began: Instant::now(),
         speed: args.speed,

@@ -92,14 +92,14 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             lidar: true,
             fence,
             airspace: scenario.airspace.clone(),
-            envelope: Envelope {
+            envelope: plan.make().handles(Envelope {
                 cruise_m_s: plan.pace * scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
                 climb_m_s: plan.model.max_climb_m_s.min(1.5),
                 brake_m_s2: plan.model.max_accel_m_s2 * 0.7,
                 hull_m: plan.model.hull_radius_m,
                 separation_m: SEPARATION_HULLS * plan.model.hull_radius_m,
                 ..Envelope::default()
-            },
+            }),
             planners: scenario.planners,
             link_loss: LinkLossPolicy::default(),
             scripts: scripts_of(scenario, index + 1),

@@ -24,6 +24,8 @@ pub struct Swarm {
     ground_link: Box<dyn Link>,
     steps: u64,
     trace: TraceHash,
+    /// Equal configurations give equal runs.
+    replays: bool,
     events: EventCounts,
     plan_times: PlanTimes,
     stopwatch: Option<Stopwatch>,
@@ -97,6 +99,7 @@ impl Swarm {
             ground_link: links.ground,
             steps: 0,
             trace: TraceHash::default(),
+            replays: true,
             events: EventCounts::default(),
         })
     }
@@ -106,6 +109,7 @@ impl Swarm {
     /// # Errors
     /// As `seat`.
     pub fn seat<E>(&mut self, seat: impl FnOnce(&mut Simulation) -> Result<(), E>) -> Result<(), E> {
+        self.replays = false;
         seat(&mut self.simulation)
     }
 
@@ -231,7 +235,7 @@ impl Swarm {
             plan_times_ms: self.plan_times.milliseconds(),
             events: self.events,
             network,
-            trace_hash: self.trace.hex(),
+            trace_hash: self.replays.then(|| self.trace.hex()),
         }
     }
 
