@@ -8,3 +8,4 @@ mod frames;
 mod geodesy;
 mod lossy_link;
 mod protocols;
+mod simulator;

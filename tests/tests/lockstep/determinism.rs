@@ -29,7 +29,7 @@ fn a_release_build_and_this_build_agree() {
             .unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let summary = std::fs::read_to_string(folder.path().join("summary.json")).unwrap();
-        let hash = fly(flight(scenario, 5)).trace_hash;
+        let hash = fly(flight(scenario, 5)).trace_hash.unwrap();
         assert!(summary.contains(&hash), "{scenario}: this build's {hash} is not in {summary}");
     }
 }

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // A test fails by panicking.
 
+mod autopilots;
 mod console;
 mod processes;
 mod real_clock;
