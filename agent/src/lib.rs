@@ -25,7 +25,6 @@ mod me;
 mod mind;
 mod mission;
 mod neighbours;
-mod parts;
 pub mod pipeline;
 pub mod positioning;
 pub mod precedence;
@@ -42,13 +41,12 @@ pub use self::{
     airspace_table::{AirspaceError, AirspaceTable},
     config::{AgentConfig, Envelope, Fence, GlobalPlanner, LocalPlanner, Planners},
     control::SetPointRecord,
-    core::{AgentCore, Status},
+    core::{AgentCore, Parts, Status},
     flight::FlightPhase,
     instruction::Waypoint,
     me::Me,
     mind::{BThreads, Mind},
     mission::Outcome,
     neighbours::Neighbour,
-    parts::Parts,
     report::Report,
 };

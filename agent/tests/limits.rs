@@ -187,8 +187,9 @@ fn the_slowest_limit_counts_and_is_no_standstill() {
 #[test]
 fn a_way_stays_in_the_region_and_a_waypoint_beyond_it_has_none() {
     let region = Limit { max_x: Some(10.0), min_y: Some(-2.0), ..Limit::NONE };
-    let mut flight =
-        Flight::from([0.0, 0.0, 6.0]).limited_by(&[region.clone()]).heads_for([20.0, 0.0, 6.0], false);
+    let mut flight = Flight::from([0.0, 0.0, 6.0])
+        .limited_by(std::slice::from_ref(&region))
+        .heads_for([20.0, 0.0, 6.0], false);
     let refused = flight.plans();
     assert!(
         matches!(&refused, Some(Report::Unplannable { why, .. }) if why.contains("limits")),

@@ -36,13 +36,11 @@ pub struct GroundCore {
 
 impl GroundCore {
     /// A station that has heard of nobody yet.
-    #[must_use]
     pub fn new(config: GroundConfig) -> Self {
         Self::with_store(config, None)
     }
 
     /// A station that keeps in `store` what it must not forget, and takes up what its former life has kept.
-    #[must_use]
     pub fn durable(config: GroundConfig, store: Box<dyn Store>) -> Self {
         Self::with_store(config, Some(store))
     }
@@ -158,8 +156,7 @@ impl GroundCore {
         }
     }
 
-    /// How the mission went, once every vehicle is on the ground and knows.
-    #[must_use]
+    /// The outcome of the mission, once every vehicle is on the ground and knows.
     pub fn finished(&self) -> Option<MissionOutcome> {
         self.node.node().program().state_of::<Watch>(Watch::NAME)?.outcome()
     }
@@ -170,13 +167,11 @@ impl GroundCore {
     }
 
     /// The station's node name.
-    #[must_use]
     pub fn name(&self) -> &NodeName {
         &self.name
     }
 
     /// The station's node, to explain what it requests and blocks, and what has come in that was not understood.
-    #[must_use]
     pub fn node(&self) -> &NodeLink {
         &self.node
     }
@@ -192,7 +187,6 @@ impl GroundCore {
     }
 
     /// Why a vehicle of this station does what it does now, or does not move.
-    #[must_use]
     pub fn explain(&self, vehicle: &NodeName) -> Option<Explanation> {
         explain(&self.evidence, self.now, vehicle)
     }
@@ -203,7 +197,6 @@ impl GroundCore {
     }
 
     /// Grows whenever [`orders`](Self::orders) has changed.
-    #[must_use]
     pub fn orders_revision(&self) -> u64 {
         self.order_log.revision()
     }

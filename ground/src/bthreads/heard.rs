@@ -1,4 +1,4 @@
-//! What a ground station finds when it starts beside a swarm that is already there.
+//! The first word of a vehicle that was there before the ground station.
 //!
 //! A vehicle's first word to this station, in each of its lives, becomes the event [`Heard`].
 //! So a station that starts late, or again, launches nobody who flies and waits for nobody who has landed.
@@ -18,7 +18,6 @@ fn situation(state: &State) -> Situation {
 }
 
 /// The event by which the station `ground` tells that it has heard a vehicle.
-#[must_use]
 pub fn event(ground: &NodeName, state: &State) -> Event {
     let why = state.task.as_str().into();
     Heard { vehicle: state.node.clone(), situation: situation(state), why }.at(ground)

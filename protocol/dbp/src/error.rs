@@ -12,7 +12,6 @@ pub enum NodeError {
     /// The program cannot go on.
     #[error(transparent)]
     Program(#[from] ProgramError),
-    /// The b-threads kept requesting.
     #[error("{node}: the step did not settle within {limit} selections; look at the b-threads that kept requesting: {}", .bthreads.join(", "))]
     Unsettled {
         node: NodeName,
@@ -21,7 +20,6 @@ pub enum NodeError {
         /// The b-threads that requested the last events.
         bthreads: Vec<Arc<str>>,
     },
-    /// A b-thread requests events of two homes at one synchronisation point, so that both could occur.
     #[error("{node}: b-thread `{bthread}` requests events of {} at one synchronisation point; request at one home only", .homes.join(" and "))]
     TwoHomes {
         node: NodeName,

@@ -89,17 +89,11 @@ impl ZenohSession {
     }
 
     /// A link for `node`, which hears from now on. Two links of one name are two nodes that share it.
-    ///
-    /// # Errors
-    /// [`ZenohError::Subscribe`] when Zenoh does not let it listen.
     pub fn link(&self, node: &NodeName) -> Result<ZenohLink, ZenohError> {
         self.listen(Key::subscriptions(&self.0.fleet, node))
     }
 
     /// A link that hears what is put under keys of these patterns: a sensor's scans, a world's scene.
-    ///
-    /// # Errors
-    /// [`ZenohError::Subscribe`] names the pattern at fault.
     pub fn listen(&self, patterns: Vec<String>) -> Result<ZenohLink, ZenohError> {
         let port = self.0.next_port.fetch_add(1, Ordering::Relaxed);
         let inbox = Arc::new(Inbox::new(self.0.incoming_capacity));
@@ -113,19 +107,16 @@ impl ZenohSession {
     }
 
     /// The endpoints of this session, for others to connect to.
-    #[must_use]
     pub fn locators(&self) -> &[String] {
         &self.0.locators
     }
 
     /// To how many other sessions this one is connected now.
-    #[must_use]
     pub fn connected_peers(&self) -> usize {
         let (answer, peers) = sync_channel(1);
         self.0.entry.ask(Command::CountPeers { answer }).ok().and_then(|()| peers.recv().ok()).unwrap_or(0)
     }
 
-    #[must_use]
     pub fn stats(&self) -> ZenohStats {
         self.0.entry.stats()
     }

@@ -7,12 +7,10 @@ use thiserror::Error;
 /// Why a mission file cannot be flown.
 #[derive(Debug, Error)]
 pub enum MissionError {
-    /// A file that cannot be read.
     #[error("cannot read `{}`: {source}", path.display())]
     Unreadable { path: PathBuf, source: std::io::Error },
     #[error("{file}:{line}:{column}: {message}")]
     Syntax {
-        /// The mission file.
         file: String,
         /// Line from 1.
         line: usize,
@@ -20,10 +18,8 @@ pub enum MissionError {
         column: usize,
         message: String,
     },
-    /// JSON, but not what a mission says in this place.
     #[error("{file}:{line}: field `{field}`: expected {expected}, found {found}")]
     Field {
-        /// The mission file.
         file: String,
         /// Line from 1 of the value, or of what should hold it.
         line: usize,
@@ -32,20 +28,15 @@ pub enum MissionError {
         expected: String,
         found: String,
     },
-    /// Neither of the formats that are read.
     #[error(
         "{file}: expected a QGroundControl plan (a member `mission`) or an LSC mission (a member `agents`)"
     )]
-    Unknown {
-        /// The mission file.
-        file: String,
-    },
+    Unknown { file: String },
 }
 
 /// Something in a mission file that is read over.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
-    /// The mission file.
     pub file: String,
     /// Line from 1.
     pub line: usize,

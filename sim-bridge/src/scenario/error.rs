@@ -11,20 +11,16 @@ use crate::mission::MissionError;
 /// Why a scenario cannot be flown.
 #[derive(Debug, Error)]
 pub enum ScenarioError {
-    /// Neither a built-in name nor a file.
     #[error("unknown scenario `{name}`: expected one of {known}, or the path of a scenario file (.toml)")]
     Unknown {
         name: String,
         /// The built-in names, separated by commas.
         known: String,
     },
-    /// A file that cannot be read.
     #[error("cannot read `{}`: {source}", path.display())]
     Unreadable { path: PathBuf, source: std::io::Error },
-    /// Not TOML, an unknown key, or a value of the wrong type or range.
     #[error("{file}:{line}:{column}: {}{message}", at_field(.field))]
     Malformed {
-        /// The scenario file.
         file: String,
         /// Line from 1.
         line: usize,
@@ -34,10 +30,8 @@ pub enum ScenarioError {
         field: String,
         message: String,
     },
-    /// Fields that are sound alone but not together.
     #[error("{file}: {field}: {message}")]
     Contradiction {
-        /// The scenario file.
         file: String,
         /// Path of the field.
         field: String,
@@ -55,51 +49,36 @@ pub enum ScenarioError {
     /// A mission file that cannot be read.
     #[error(transparent)]
     Mission(#[from] MissionError),
-    /// Nothing to fly.
     #[error(
         "scenario `{scenario}` has no vehicles: expected at least 1; give --vehicles N or [[vehicle]] tables"
     )]
-    NoVehicles {
-        /// Name of the scenario.
-        scenario: String,
-    },
-    /// More vehicles than MAVLink system numbers.
+    NoVehicles { scenario: String },
     #[error("{vehicles} vehicles are too many: expected at most {limit}")]
     TooManyVehicles {
         vehicles: usize,
         /// The largest swarm.
         limit: usize,
     },
-    /// More vehicles than the file describes.
     #[error("scenario `{scenario}` describes {described} vehicles, {wanted} were asked for")]
     TooFewDescribed {
-        /// Name of the scenario.
         scenario: String,
         wanted: usize,
         /// `[[vehicle]]` tables in the file.
         described: usize,
     },
-    /// Several missions, but not one for each vehicle.
     #[error(
         "{missions} missions for {vehicles} vehicles: give one mission that all fly in trail, or one for each vehicle"
     )]
-    MissionCount {
-        missions: usize,
-        /// Vehicles of the scenario.
-        vehicles: usize,
-    },
-    /// A vehicle that would start within an obstacle.
+    MissionCount { missions: usize, vehicles: usize },
     #[error("vehicle {vehicle}: start {} is inside obstacle `{obstacle}` (its hull overlaps by {overlap_m:.2} m); move the start", place(.position))]
     StartInObstacle {
         /// Number of the vehicle, from 1.
         vehicle: usize,
-        /// Name of the obstacle.
         obstacle: String,
         /// ENU, metres.
         position: Vector3<f64>,
         overlap_m: f64,
     },
-    /// A start or waypoint out of the world.
     #[error("vehicle {vehicle}: {what} {} is outside the world, which reaches from {} to {}", place(.position), place(.min), place(.max))]
     OutsideBounds {
         /// Number of the vehicle, from 1.
@@ -113,7 +92,6 @@ pub enum ScenarioError {
         /// Highest corner of the world.
         max: Vector3<f64>,
     },
-    /// A goal or waypoint under the ground.
     #[error("vehicle {vehicle}: {what} {} is not above the ground: expected a height above 0 m", place(.position))]
     BelowGround {
         /// Number of the vehicle, from 1.
@@ -123,7 +101,6 @@ pub enum ScenarioError {
         /// ENU, metres.
         position: Vector3<f64>,
     },
-    /// A goal or waypoint where nobody may fly.
     #[error("vehicle {vehicle}: {what} {} is in a no-fly zone, in a threat or in terrain: no path leads there", place(.position))]
     Closed {
         /// Number of the vehicle, from 1.
@@ -133,7 +110,6 @@ pub enum ScenarioError {
         /// ENU, metres.
         position: Vector3<f64>,
     },
-    /// Two vehicles that would stand in one another.
     #[error(
         "{what}s of vehicles {first} and {second} are {distance_m:.2} m apart: expected at least {least_m:.2} m"
     )]
@@ -149,13 +125,11 @@ pub enum ScenarioError {
         /// The need of their hulls, in metres.
         least_m: f64,
     },
-    /// A vehicle without a way.
     #[error("vehicle {vehicle} has nowhere to go: give it waypoints or a mission")]
     NoWaypoints {
         /// Number of the vehicle, from 1.
         vehicle: usize,
     },
-    /// No room for a start or goal.
     #[error("vehicle {vehicle}: no place for its {what} near {}: everything within {reach_m} m is too close to an obstacle, to another vehicle or to the bounds", place(.near))]
     NoRoom {
         /// Number of the vehicle, from 1.

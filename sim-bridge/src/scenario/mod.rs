@@ -154,7 +154,6 @@ pub struct Order {
     pub who: Who,
 }
 
-/// A script on one vehicle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VehicleScript {
     /// The vehicle's number, from 1.
@@ -196,9 +195,6 @@ impl Scenario {
     }
 
     /// A built-in scenario; `vehicles` is the scenario's own number where `None`.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Unknown`] lists the names there are; others as [`Scenario::validate`].
     pub fn built_in(name: &str, vehicles: Option<usize>, seed: u64) -> Result<Self, ScenarioError> {
         match BUILT_IN.iter().find(|(known, _)| *known == name) {
             Some((_, text)) => Self::from_toml(text, &format!("{name}.toml"), vehicles, seed),
@@ -210,9 +206,6 @@ impl Scenario {
     }
 
     /// A scenario from the text of its file; `file` names it in errors, and paths inside are relative to it.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Malformed`] with line, column and field; others as [`Scenario::validate`].
     pub fn from_toml(
         text: &str,
         file: &str,
@@ -236,17 +229,11 @@ impl Scenario {
     }
 
     /// The scenario that a command line names: built in, or the path of a file; with its overrides.
-    ///
-    /// # Errors
-    /// Whatever is wrong with any of the files, or with all together.
     pub fn open(name: &str, overrides: &Overrides, seed: u64) -> Result<Self, ScenarioError> {
         Self::open_with(name, overrides, seed, &Behaviours::default())
     }
 
     /// The same for a program with these behaviours.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
     pub fn open_with(
         name: &str,
         overrides: &Overrides,
@@ -292,9 +279,6 @@ impl Scenario {
     }
 
     /// Moves each start and goal that stands too near an obstacle to the nearest clear place, and notes it.
-    ///
-    /// # Errors
-    /// [`ScenarioError::NoRoom`] where there is none.
     pub fn settle(&mut self) -> Result<(), ScenarioError> {
         let (mut starts, mut goals) = (Vec::new(), Vec::new());
         for i in 0..self.vehicles.len() {

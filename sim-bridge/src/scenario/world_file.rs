@@ -7,9 +7,6 @@ use skein_world::Scene;
 use super::{ScenarioError, read};
 
 /// Reads a Gazebo world, or a `.csv` of boxes; returns what of it could not be read as lines for people.
-///
-/// # Errors
-/// The file cannot be read, or is malformed: with file, line and what was expected.
 pub fn read_world(path: &Path) -> Result<(Scene, Vec<String>), ScenarioError> {
     let text = read(path)?;
     let name = path.display().to_string();

@@ -17,7 +17,6 @@ pub struct Neighbour {
     pub sigma_m: f64,
     /// Age of the state, seconds, the time on the network included.
     pub age_s: f64,
-    /// Hull radius, metres.
     pub radius_m: f64,
     /// Whether it keeps its distance by the same rule. A vehicle flown by a pilot does not.
     pub cooperative: bool,
@@ -26,7 +25,6 @@ pub struct Neighbour {
 impl Neighbour {
     /// Where it should be now (ENU, metres): straight on for the state's age, half a second at most. One that
     /// is silent for longer stays there.
-    #[must_use]
     pub fn predicted(&self) -> Vector3<f64> {
         self.position + self.velocity * self.age_s.clamp(0.0, EXTRAPOLATE_S)
     }

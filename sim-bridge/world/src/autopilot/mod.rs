@@ -41,7 +41,6 @@ pub struct AutopilotConfig {
     pub system_id: u8,
     /// The vehicle it flies: its gains and limits follow from that.
     pub vehicle: VehicleModel,
-    /// Datum of the world.
     pub datum: Datum,
     /// Its parameters; see [`default_parameters`].
     pub parameters: ParameterTable,
