@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use skein_bp::catalogue::Whose;
-use skein_bp::{EventSet, Program, ProgramConfig};
+use skein_bp::{Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Board, Happened, Node, NodeConfig, NodeError, NodeName};
-use skein_wire::{Link, NodeLink, State, Store, joint_roster};
+use skein_wire::event::{Declared as _, Heard, Situation};
+use skein_wire::{Link, MissionState, NodeLink, State, Store, joint_roster};
 
-use crate::bthreads::{self, MissionOutcome, Watch, heard};
+use crate::bthreads::{self, MissionOutcome, Watch};
 use crate::config::GroundConfig;
 use crate::explain::{Evidence, Explanation, explain};
 use crate::order::{Order, Who};
@@ -135,10 +136,8 @@ impl GroundCore {
         if !self.vehicles.contains(&state.node) {
             return;
         }
-        let first_word =
-            self.roster.get(&state.node).is_none_or(|known| known.incarnation != state.incarnation);
-        if first_word {
-            self.node.node_mut().enqueue(heard::event(&self.name, &state));
+        if self.roster.get(&state.node).is_none_or(|known| known.incarnation != state.incarnation) {
+            self.node.node_mut().enqueue(first_word(&self.name, &state));
         }
         self.evidence.note_state(self.now, &state);
         self.roster.insert(state.node.clone(), state);
@@ -200,4 +199,17 @@ impl GroundCore {
     pub fn orders_revision(&self) -> u64 {
         self.order_log.revision()
     }
+}
+
+/// The event by which the station `ground` tells that it has heard a vehicle for the first time in the vehicle's life.
+/// So a station that starts late, or again, launches nobody who flies and waits for nobody who has landed.
+fn first_word(ground: &NodeName, state: &State) -> Event {
+    let situation = match state.mission {
+        MissionState::UnderWay if state.armed => Situation::Flying,
+        MissionState::UnderWay => Situation::Grounded,
+        MissionState::Complete => Situation::Complete,
+        MissionState::Failed => Situation::Failed,
+    };
+    let why = state.task.as_str().into();
+    Heard { vehicle: state.node.clone(), situation, why }.at(ground)
 }

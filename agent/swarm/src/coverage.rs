@@ -13,10 +13,7 @@ pub enum CoverageError {
     )]
     NoArea { corners: usize },
     #[error("a swath of {swath_m} m; expected a width above 0")]
-    Swath {
-        /// The width asked for, metres.
-        swath_m: f64,
-    },
+    Swath { swath_m: f64 },
     #[error("no vehicle to cover the area; expected at least one")]
     NoVehicles,
 }

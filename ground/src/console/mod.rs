@@ -6,7 +6,6 @@
 //!
 //! Only this computer can open it, and only pages that it serves itself may speak to it.
 
-mod assets;
 mod client;
 mod feed;
 mod request;

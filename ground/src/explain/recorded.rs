@@ -19,13 +19,7 @@ pub enum RecordedError {
     #[error("{} is no recording that can be read: {source}; expected an MCAP file such as mission.mcap", path.display())]
     Unreadable { path: PathBuf, source: McapError },
     #[error("{}: a message on {topic} at {at_s:.3} s cannot be read: {source}", path.display())]
-    Message {
-        path: PathBuf,
-        topic: String,
-        /// When it was recorded, seconds since the run began.
-        at_s: f64,
-        source: DecodeError,
-    },
+    Message { path: PathBuf, topic: String, at_s: f64, source: DecodeError },
 }
 
 /// A recording of boards, events and states of vehicles. Times are the run's, from 0.

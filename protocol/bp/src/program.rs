@@ -27,13 +27,7 @@ const RUNAWAY_LIMIT: usize = 1000;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ProgramError {
     #[error("the superstep did not settle within {limit} selections; look at the b-threads that kept requesting: {}", .bthreads.join(", "))]
-    Unsettled {
-        /// The limit, from [`ProgramConfig::settle_limit`](ProgramConfig::settle_limit).
-        limit: u32,
-        /// The b-threads that requested the events of the superstep's second half.
-        bthreads: Vec<Arc<str>>,
-        selections: Vec<Selection>,
-    },
+    Unsettled { limit: u32, bthreads: Vec<Arc<str>>, selections: Vec<Selection> },
     #[error("b-thread `{bthread}` failed: {message}")]
     Failed { bthread: Arc<str>, message: String },
     #[error("`{event}` is not selectable now; selectable are {selectable:?}")]

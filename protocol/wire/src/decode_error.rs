@@ -16,12 +16,7 @@ pub enum DecodeError {
     #[error("`{field}` is missing")]
     Missing { field: &'static str },
     #[error("`{field}` is {given}: expected {expected}")]
-    Range {
-        field: &'static str,
-        given: String,
-        /// The values that are allowed.
-        expected: &'static str,
-    },
+    Range { field: &'static str, given: String, expected: &'static str },
     #[error("`{field}`: {source}")]
     Name { field: &'static str, source: NodeNameError },
 }

@@ -29,6 +29,20 @@ const TRY_AGAIN: Duration = Duration::from_millis(200);
 /// whole messages it waits a millisecond, and not again before there is room.
 const MOST_WHOLE: usize = 32 << 10;
 
+/// As it comes, Zenoh accepts, reads, routes and sends on threads of their own, so that a message wakes one thread
+/// which finds it and another which reads it. Here two threads do all of that, and a message wakes one.
+const SHARED: &str = "ZENOH_RUNTIME='(acc: (handover: rx), net: (handover: rx), tx: (handover: rx))'";
+
+/// Lets all of Zenoh's work in this process be done by the same two threads, unless the environment says otherwise
+/// (`ZENOH_RUNTIME`): messages come and go faster.
+///
+/// For the first line of `main`: Zenoh looks at the environment when the first session opens, and no other thread may
+/// run while it is changed.
+pub fn share_threads() {
+    // It is one line, which can be read.
+    let _ = dotenvy::from_read(SHARED.as_bytes());
+}
+
 /// A session that any number of links of one process share. Cloning gives another handle to the same session, which
 /// closes with its last handle or link.
 ///

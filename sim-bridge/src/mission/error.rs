@@ -10,24 +10,9 @@ pub enum MissionError {
     #[error("cannot read `{}`: {source}", path.display())]
     Unreadable { path: PathBuf, source: std::io::Error },
     #[error("{file}:{line}:{column}: {message}")]
-    Syntax {
-        file: String,
-        /// Line from 1.
-        line: usize,
-        /// Column from 1.
-        column: usize,
-        message: String,
-    },
+    Syntax { file: String, line: usize, column: usize, message: String },
     #[error("{file}:{line}: field `{field}`: expected {expected}, found {found}")]
-    Field {
-        file: String,
-        /// Line from 1 of the value, or of what should hold it.
-        line: usize,
-        /// Path of the value, such as `mission.items[3].params[4]`.
-        field: String,
-        expected: String,
-        found: String,
-    },
+    Field { file: String, line: usize, field: String, expected: String, found: String },
     #[error(
         "{file}: expected a QGroundControl plan (a member `mission`) or an LSC mission (a member `agents`)"
     )]

@@ -18,7 +18,6 @@ mod open;
 mod placement;
 mod targets;
 mod window;
-mod world_file;
 
 use std::path::{Path, PathBuf};
 
@@ -36,7 +35,6 @@ use skein_world::{Aabb, Scene, VehicleModel, WindConfig};
 pub use error::ScenarioError;
 pub use layout::SPACING_M;
 pub use missions::apply_missions;
-pub use world_file::read_world;
 
 use crate::mission::{self, MissionSet};
 
@@ -454,6 +452,17 @@ fn text_of(name: &str) -> Result<Option<String>, ScenarioError> {
     let path = Path::new(name);
     let names_a_file = path.extension().is_some() || path.components().count() > 1;
     if names_a_file { read(path).map(Some) } else { Ok(None) }
+}
+
+/// Reads a Gazebo world, or a `.csv` of boxes; returns what of it could not be read as lines for people.
+pub fn read_world(path: &Path) -> Result<(Scene, Vec<String>), ScenarioError> {
+    let text = read(path)?;
+    let name = path.display().to_string();
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+        return Ok((Scene::from_csv(&text, &name)?, Vec::new()));
+    }
+    let (scene, warnings) = Scene::from_sdf(&text, &name)?;
+    Ok((scene, warnings.iter().map(ToString::to_string).collect()))
 }
 
 fn read(path: &Path) -> Result<String, ScenarioError> {

@@ -51,10 +51,7 @@ pub enum TargetsError {
     #[error(
         "no route was found for vehicle {vehicle} that keeps clear of terrain, zones and the others; leave more room between them"
     )]
-    NoRoute {
-        /// Its number, from 1.
-        vehicle: usize,
-    },
+    NoRoute { vehicle: usize },
 }
 
 /// A route and how fast it is flown.

@@ -35,7 +35,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod aabb;
 pub mod autopilot;
 pub mod csv;
 pub mod lidar;
@@ -50,12 +49,11 @@ pub mod truth;
 pub mod vehicle;
 pub mod wind;
 
-pub use aabb::Aabb;
 pub use csv::CsvError;
 pub use lidar::{Hull, Lidar, Surroundings};
 pub use obstacle::{Obstacle, Shape};
 pub use quadrotor::{MotorCommands, Quadrotor, RigidState, STEP};
-pub use scene::{Nearest, Scene};
+pub use scene::{Aabb, Nearest, Scene};
 pub use sdf::{SdfError, Warning};
 pub use sensors::{Gps, Imu, SensorReadings};
 pub use simulation::{Simulation, SimulationConfig, VehicleSetup, VehicleState};

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-use crate::aabb::Aabb;
+use crate::scene::Aabb;
 
 /// The form of an obstacle in its own frame, metres, centred on its origin.
 #[derive(Debug, Clone, Copy, PartialEq)]

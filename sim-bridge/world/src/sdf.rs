@@ -79,25 +79,11 @@ pub enum SdfError {
     #[error("{place}: {message}; {advice}")]
     Malformed { place: Place, message: String, advice: &'static str },
     #[error("{place}: <{element}> holds `{found}`; expected {expected}")]
-    Value {
-        /// Start of the element.
-        place: Place,
-        element: String,
-        found: String,
-        expected: &'static str,
-    },
+    Value { place: Place, element: String, found: String, expected: &'static str },
     #[error("{place}: <{element}> needs {expected} inside; add it")]
-    Missing {
-        /// Start of the element.
-        place: Place,
-        element: String,
-        expected: &'static str,
-    },
+    Missing { place: Place, element: String, expected: &'static str },
     #[error("{place}: models nest deeper than {DEPTH_LIMIT} levels; flatten the file")]
-    TooDeep {
-        /// Start of the model that is one too many.
-        place: Place,
-    },
+    TooDeep { place: Place },
 }
 
 impl Scene {

@@ -195,28 +195,11 @@ pub struct RangefinderModel {
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum VehicleError {
     #[error("{source_name}:{line}:{column}: {message}")]
-    Syntax {
-        source_name: String,
-        /// Line from 1.
-        line: usize,
-        /// Column from 1.
-        column: usize,
-        message: String,
-    },
+    Syntax { source_name: String, line: usize, column: usize, message: String },
     #[error("{source_name}: field `{field}` is {found}; expected {expected}")]
-    Range {
-        source_name: String,
-        /// Dotted name of the field.
-        field: &'static str,
-        found: f64,
-        expected: &'static str,
-    },
+    Range { source_name: String, field: &'static str, found: f64, expected: &'static str },
     #[error("no built-in vehicle `{name}`; there are: {known}")]
-    Unknown {
-        name: String,
-        /// The names that exist.
-        known: String,
-    },
+    Unknown { name: String, known: String },
 }
 
 impl VehicleModel {

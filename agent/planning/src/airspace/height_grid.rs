@@ -19,19 +19,9 @@ pub enum HeightGridError {
     #[error("`spacing_m` is {0}: expected a number above 0")]
     Spacing(f64),
     #[error("`heights_m` has {rows} rows of {columns}: expected two or more of two or more")]
-    TooFew {
-        rows: usize,
-        /// Heights in the first.
-        columns: usize,
-    },
+    TooFew { rows: usize, columns: usize },
     #[error("`heights_m`: row {row} has {found} heights, the first has {expected}")]
-    Ragged {
-        /// Number of the row, from 1.
-        row: usize,
-        found: usize,
-        /// Those of the first.
-        expected: usize,
-    },
+    Ragged { row: usize, found: usize, expected: usize },
     #[error("`corner_m` or `heights_m` holds a number that is not finite")]
     NotFinite,
 }

@@ -59,11 +59,7 @@ pub enum Unsolved {
     #[error("everything reachable from the start was searched ({expanded} cells)")]
     Unreachable { expanded: usize },
     #[error("no way was found within {expanded} expansions")]
-    Spent {
-        expanded: usize,
-        /// The way to the cell reached that is nearest to the goal by the heuristic.
-        partial: Vec<VoxelIndex>,
-    },
+    Spent { expanded: usize, partial: Vec<VoxelIndex> },
 }
 
 /// A search over a [`Lattice`], and the memory that searches reuse, so that the next one allocates little and clears

@@ -86,32 +86,15 @@ pub enum PlanError {
     #[error("goal ({:.2}, {:.2}, {:.2}) is outside the map's window; plan to a nearer one", .goal.x, .goal.y, .goal.z)]
     GoalOutside { goal: Vector3<f64> },
     #[error("goal ({:.2}, {:.2}, {:.2}) has a clearance of {clearance_m:.2} m, expected {required_m:.2} m or more", .goal.x, .goal.y, .goal.z)]
-    GoalBlocked {
-        goal: Vector3<f64>,
-        clearance_m: f64,
-        /// Clearance required, metres.
-        required_m: f64,
-    },
+    GoalBlocked { goal: Vector3<f64>, clearance_m: f64, required_m: f64 },
     #[error("goal ({:.2}, {:.2}, {:.2}) is in or next to a no-fly zone or a threat, or too low above the terrain, by {inside_m:.2} m", .goal.x, .goal.y, .goal.z)]
-    GoalClosed {
-        goal: Vector3<f64>,
-        /// Its depth inside, metres.
-        inside_m: f64,
-    },
+    GoalClosed { goal: Vector3<f64>, inside_m: f64 },
     #[error("goal ({:.2}, {:.2}, {:.2}) is outside what limits allow, by {outside_m:.2} m", .goal.x, .goal.y, .goal.z)]
-    GoalBeyondLimits {
-        goal: Vector3<f64>,
-        /// Its distance outside, metres.
-        outside_m: f64,
-    },
+    GoalBeyondLimits { goal: Vector3<f64>, outside_m: f64 },
     #[error("no path: everything reachable from the start was searched ({expanded} voxels)")]
     Unreachable { expanded: usize },
     #[error("no path within the budget of {budget} expansions")]
-    BudgetExhausted {
-        budget: usize,
-        /// The way to the voxel nearest to the goal (by the heuristic) that was reached.
-        partial: Path,
-    },
+    BudgetExhausted { budget: usize, partial: Path },
 }
 
 /// Room in a voxel that is occupied or outside.

@@ -65,11 +65,6 @@ pub fn stopping_speed(distance_m: f64, decel_m_s2: f64, latency_s: f64) -> f64 {
     (lag * lag + 2.0 * decel_m_s2 * distance_m).sqrt() - lag
 }
 
-/// Distance needed to stop, metres: the inverse of [`stopping_speed`].
-pub fn stopping_distance(speed_m_s: f64, decel_m_s2: f64, latency_s: f64) -> f64 {
-    speed_m_s * latency_s + speed_m_s * speed_m_s / (2.0 * decel_m_s2)
-}
-
 /// The speed cap at `station_m` of a path, m/s, and what sets it. `sensed_free_m` is how far ahead the way is
 /// known to be free.
 ///
@@ -139,7 +134,8 @@ mod tests {
             distance in 0.01..60.0_f64, decel in 0.3..6.0_f64, latency in 0.0..1.5_f64,
         ) {
             let speed = stopping_speed(distance, decel, latency);
-            prop_assert!((stopping_distance(speed, decel, latency) - distance).abs() < 1e-9);
+            let needed = speed * latency + speed * speed / (2.0 * decel);
+            prop_assert!((needed - distance).abs() < 1e-9);
         }
 
         #[test]

@@ -60,11 +60,7 @@ impl Default for VoxelMapConfig {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MapError {
     #[error("map: `{field}` is {value}, expected a positive number of metres")]
-    NotPositive {
-        /// The field of [`VoxelMapConfig`] or parameter at fault.
-        field: &'static str,
-        value: f64,
-    },
+    NotPositive { field: &'static str, value: f64 },
     #[error("map: `vertical_extent_m` is {value}, expected 0 to 100 times `resolution_m`")]
     Extent { value: f64 },
     #[error(
@@ -74,11 +70,7 @@ pub enum MapError {
     #[error(
         "map: `size_m` / `resolution_m` makes {voxels:.0} voxels, expected at most {limit}; take a smaller window or larger voxels"
     )]
-    TooLarge {
-        voxels: f64,
-        /// Most that are allowed.
-        limit: usize,
-    },
+    TooLarge { voxels: f64, limit: usize },
 }
 
 /// The map's knowledge of a place.

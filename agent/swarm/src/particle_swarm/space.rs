@@ -17,19 +17,9 @@ pub enum SearchSpaceError {
     )]
     Lengths { lower: usize, upper: usize },
     #[error("dimension {dimension} runs from {lower} to {upper}, expected finite bounds in rising order")]
-    Bounds {
-        dimension: usize,
-        /// Its lower bound.
-        lower: f64,
-        /// Its upper bound.
-        upper: f64,
-    },
+    Bounds { dimension: usize, lower: f64, upper: f64 },
     #[error("{dimensions} dimensions cannot be cut into chains of {chain}; give a length that divides them")]
-    Chain {
-        dimensions: usize,
-        /// The length asked for.
-        chain: usize,
-    },
+    Chain { dimensions: usize, chain: usize },
     #[error("a centre of {numbers} numbers, expected {dimensions}: one for each dimension")]
     Centre { dimensions: usize, numbers: usize },
 }

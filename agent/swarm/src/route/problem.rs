@@ -26,12 +26,7 @@ pub struct RouteProblem<'a> {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RouteError {
     #[error("the route's {which} ({:.1}, {:.1}, {:.1}) is outside the airspace; move it, or make the airspace larger", .point.x, .point.y, .point.z)]
-    Outside {
-        /// "start" or "goal".
-        which: &'static str,
-        /// ENU, metres.
-        point: Vector3<f64>,
-    },
+    Outside { which: &'static str, point: Vector3<f64> },
     #[error("a route cannot be searched for: {0}")]
     Space(#[from] SearchSpaceError),
 }

@@ -79,17 +79,7 @@ pub enum TravellerError {
     #[error(
         "vehicle {number}: its {what} ({x}, {y}, {z}) m is outside the bounds or too near an obstacle; move it"
     )]
-    Place {
-        number: u32,
-        /// `start` or `goal`.
-        what: &'static str,
-        /// East, m.
-        x: f64,
-        /// North, m.
-        y: f64,
-        /// Up, m.
-        z: f64,
-    },
+    Place { number: u32, what: &'static str, x: f64, y: f64, z: f64 },
     #[error("vehicle {number}: no way leads from its start to its goal; obstacles close every one")]
     NoWay { number: u32 },
 }

@@ -56,17 +56,9 @@ const OPS_BETWEEN_SYNCS: usize = 100_000;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ScriptError {
     #[error("`spawn` names the template `{template}`, which is not defined; defined are {defined:?}")]
-    UnknownTemplate {
-        /// The name given.
-        template: String,
-        /// The names there are.
-        defined: Vec<String>,
-    },
+    UnknownTemplate { template: String, defined: Vec<String> },
     #[error("`repeat forever` holds neither `sync` nor `stop`; it would never end: {body}")]
-    EndlessLoop {
-        /// The loop's body as JSON.
-        body: String,
-    },
+    EndlessLoop { body: String },
 }
 
 /// Scripts that other scripts may spawn, by name.

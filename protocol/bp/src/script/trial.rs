@@ -27,18 +27,9 @@ pub struct Trial {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TrialFault {
     #[error("it blocks `{event}` for ever{}; give it a `within_s`, or something to wait for that can happen", after(.trace))]
-    NeverLetsGo {
-        event: Event,
-        /// The events before.
-        trace: Vec<Event>,
-    },
+    NeverLetsGo { event: Event, trace: Vec<Event> },
     #[error("it goes round without waiting for anything: {}{}", list(.cycle), after(.trace))]
-    Spins {
-        /// The events that it requests again and again.
-        cycle: Vec<Event>,
-        /// The events before.
-        trace: Vec<Event>,
-    },
+    Spins { cycle: Vec<Event>, trace: Vec<Event> },
 }
 
 fn list(events: &[Event]) -> String {
