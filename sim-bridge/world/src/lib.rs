@@ -51,9 +51,9 @@ pub mod wind;
 
 pub use csv::CsvError;
 pub use lidar::{Hull, Lidar, Surroundings};
-pub use obstacle::{Obstacle, Shape};
+pub use obstacle::{Aabb, Obstacle, Shape};
 pub use quadrotor::{MotorCommands, Quadrotor, RigidState, STEP};
-pub use scene::{Aabb, Nearest, Scene};
+pub use scene::{Nearest, Scene};
 pub use sdf::{SdfError, Warning};
 pub use sensors::{Gps, Imu, SensorReadings};
 pub use simulation::{Simulation, SimulationConfig, VehicleSetup, VehicleState};

@@ -9,8 +9,7 @@ use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::{Compound, SharedShape};
 
 use crate::lidar::Hull;
-use crate::obstacle::{Obstacle, Shape};
-use crate::scene::Aabb;
+use crate::obstacle::{Aabb, Obstacle, Shape};
 use crate::scene::Scene;
 
 /// The record of a run.
