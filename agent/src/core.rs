@@ -16,10 +16,9 @@ use crate::{
     agent_error::AgentError,
     config::AgentConfig,
     control::{Control, SetPointRecord},
-    mind::{BThreads, Mind},
     mission::{Mission, Outcome},
-    pipeline::{layers::Layers, set_point::SILENT_AFTER},
-    positioning::{Autopilot, Positioning},
+    parts::Parts,
+    pipeline::set_point::SILENT_AFTER,
     scripts::RunningScript,
 };
 
@@ -29,25 +28,6 @@ const LONGEST_PAUSE: Duration = SILENT_AFTER;
 const CYCLE_PERIOD: Duration = Duration::from_millis(100);
 /// Planning answers a decision with a new report, which deserves its turn in the same tick; so often.
 const ROUNDS: usize = 4;
-
-/// The exchangeable parts of an agent, beside its configuration. Experiments replace a part to see what it is good for.
-#[derive(Debug)]
-pub struct Parts {
-    pub mind: Box<dyn Mind>,
-    pub positioning: Box<dyn Positioning>,
-    pub layers: Layers,
-}
-
-impl Parts {
-    /// The parts that fly with this configuration.
-    pub fn of(config: &AgentConfig) -> Self {
-        Self {
-            mind: Box::new(BThreads),
-            positioning: Box::new(Autopilot),
-            layers: Layers::of(&config.envelope, config.fence, config.planners),
-        }
-    }
-}
 
 /// One line about a vehicle, for people.
 #[derive(Clone, Debug, PartialEq)]

@@ -25,6 +25,7 @@ mod me;
 mod mind;
 mod mission;
 mod neighbours;
+mod parts;
 pub mod pipeline;
 pub mod positioning;
 pub mod precedence;
@@ -41,12 +42,13 @@ pub use self::{
     airspace_table::{AirspaceError, AirspaceTable},
     config::{AgentConfig, Envelope, Fence, GlobalPlanner, LocalPlanner, Planners},
     control::SetPointRecord,
-    core::{AgentCore, Parts, Status},
+    core::{AgentCore, Status},
     flight::FlightPhase,
     instruction::Waypoint,
     me::Me,
     mind::{BThreads, Mind},
     mission::Outcome,
     neighbours::Neighbour,
+    parts::Parts,
     report::Report,
 };

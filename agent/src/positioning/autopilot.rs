@@ -3,8 +3,8 @@
 use nalgebra::Matrix3;
 use skein_mav::{Stamped, Telemetry};
 
-use super::Positioning;
 use super::estimate::{Attitude, Estimate, Motion};
+use super::source::Positioning;
 
 /// Standard deviations that are assumed of what the autopilot tells: position, m, and velocity, m/s.
 const MOTION_SIGMA: [f64; 2] = [0.05, 0.1];

@@ -1,0 +1,11 @@
+//! The seam between who knows where the vehicle is and who needs to know.
+
+use skein_mav::Telemetry;
+
+use super::estimate::Estimate;
+
+/// A source of position.
+pub trait Positioning: std::fmt::Debug + Send {
+    /// The newest estimate, given the newest telemetry of the autopilot.
+    fn estimate(&self, telemetry: &Telemetry) -> Estimate;
+}
