@@ -35,6 +35,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod aabb;
 pub mod autopilot;
 pub mod csv;
 pub mod lidar;
@@ -49,9 +50,10 @@ pub mod truth;
 pub mod vehicle;
 pub mod wind;
 
+pub use aabb::Aabb;
 pub use csv::CsvError;
 pub use lidar::{Hull, Lidar, Surroundings};
-pub use obstacle::{Aabb, Obstacle, Shape};
+pub use obstacle::{Obstacle, Shape};
 pub use quadrotor::{MotorCommands, Quadrotor, RigidState, STEP};
 pub use scene::{Nearest, Scene};
 pub use sdf::{SdfError, Warning};

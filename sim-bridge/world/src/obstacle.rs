@@ -4,6 +4,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
+use crate::aabb::Aabb;
+
 /// The form of an obstacle in its own frame, metres, centred on its origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Shape {
@@ -227,31 +229,5 @@ impl Obstacle {
                 [world.x, world.y]
             })
             .collect()
-    }
-}
-
-/// A box along the world axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Aabb {
-    /// Lowest corner, metres ENU.
-    pub min: Vector3<f64>,
-    /// Highest corner, metres ENU.
-    pub max: Vector3<f64>,
-}
-
-impl Aabb {
-    /// Whether `point` is inside or on the surface.
-    pub fn contains(&self, point: &Vector3<f64>) -> bool {
-        (0..3).all(|axis| self.min[axis] <= point[axis] && point[axis] <= self.max[axis])
-    }
-
-    /// The smallest box that holds both.
-    pub fn union(&self, other: &Self) -> Self {
-        Self { min: self.min.inf(&other.min), max: self.max.sup(&other.max) }
-    }
-
-    /// Grown by `margin` metres on every side.
-    pub fn grown(&self, margin: Vector3<f64>) -> Self {
-        Self { min: self.min - margin, max: self.max + margin }
     }
 }

@@ -3,7 +3,8 @@
 use nalgebra::{Point3, Vector3};
 use skein_mav::Datum;
 
-use crate::obstacle::{Aabb, Obstacle};
+use crate::aabb::Aabb;
+use crate::obstacle::Obstacle;
 
 /// Distance of the derived bounds from the outermost obstacle, m.
 const MARGIN_M: f64 = 20.0;

@@ -8,8 +8,9 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::{Compound, SharedShape};
 
+use crate::aabb::Aabb;
 use crate::lidar::Hull;
-use crate::obstacle::{Aabb, Obstacle, Shape};
+use crate::obstacle::{Obstacle, Shape};
 use crate::scene::Scene;
 
 /// The record of a run.
