@@ -6,7 +6,6 @@ use skein_planning::local::apf;
 use skein_planning::local::braking::stopping_speed;
 use skein_wire::Limits;
 
-use super::steering::Wish;
 use crate::config::Envelope;
 
 /// Kept from the sides of the region where there is room for it, so that nothing sways across them, m.
@@ -25,6 +24,13 @@ pub struct Allowed {
     pub region: Region,
     /// Nowhere: the limits contradict one another.
     pub nowhere: bool,
+}
+
+/// The velocity wanted before others are considered (ENU, m/s), and the height it leads to (m).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wish {
+    pub(super) velocity: Vector3<f64>,
+    pub(super) height_m: f64,
 }
 
 impl Allowed {

@@ -15,7 +15,7 @@ use skein_planning::{
 };
 
 use super::{
-    allowed::Allowed,
+    allowed::{Allowed, Wish},
     course::Following,
     local::{PathFollower, Place},
     safety_filter::{Kept, VelocityFilter},
@@ -54,13 +54,6 @@ pub struct Steering {
 pub struct Lead<'a> {
     pub following: &'a mut Following,
     pub attraction: f64,
-}
-
-/// The velocity wanted before others are considered (ENU, m/s), and the height it leads to (m).
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Wish {
-    pub(super) velocity: Vector3<f64>,
-    pub(super) height_m: f64,
 }
 
 impl Steering {
