@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// How long each of npm's steps may take.
+/// Time limit of each of npm's steps.
 const PATIENCE: Duration = Duration::from_secs(180);
 
 fn main() -> Result<(), Box<dyn Error>> {

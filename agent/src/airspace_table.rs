@@ -68,7 +68,6 @@ pub struct TerrainTable {
 pub struct AirspaceError {
     /// The field at fault, such as `no_fly[1]`.
     pub field: String,
-    /// What is wrong, and what was expected.
     pub problem: String,
 }
 
@@ -87,9 +86,6 @@ fn is_infinite(height_m: &f64) -> bool {
 
 impl AirspaceTable {
     /// The airspace that it describes, without a box.
-    ///
-    /// # Errors
-    /// [`AirspaceError`] names the field at fault.
     pub fn check(&self) -> Result<Airspace, AirspaceError> {
         let mut airspace = Airspace::default();
         for (index, table) in self.mountain.iter().enumerate() {
@@ -131,7 +127,6 @@ impl AirspaceTable {
     }
 
     /// The table that describes an airspace.
-    #[must_use]
     pub fn of(airspace: &Airspace) -> AirspaceTable {
         let round = airspace.no_fly.iter().map(|zone| NoFlyTable {
             centre_m: Some(zone.centre.into()),

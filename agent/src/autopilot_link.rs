@@ -12,7 +12,7 @@ use serialport::SerialPort;
 
 /// A link that is broken, or cannot be opened yet, is tried again this often.
 const OPEN_AGAIN: Duration = Duration::from_secs(1);
-/// How long opening a TCP link may take; until it is open no vehicle is flown over it.
+/// Time limit for opening a TCP link; until it is open no vehicle is flown over it.
 const CONNECT: Duration = Duration::from_millis(500);
 /// Whoever spoke first on a listening port is answered until it has been silent for this long.
 const FAITHFUL_FOR: Duration = Duration::from_secs(2);
@@ -29,10 +29,11 @@ pub enum Address {
     UdpIn(SocketAddr),
     /// Speaks to this address first.
     UdpOut(SocketAddr),
-    /// Connects to this address.
     Tcp(SocketAddr),
-    /// Opens this device.
-    Serial { device: String, baud: u32 },
+    Serial {
+        device: String,
+        baud: u32,
+    },
 }
 
 impl FromStr for Address {
@@ -73,9 +74,6 @@ impl From<Address> for String {
 
 impl Address {
     /// Refuses what other computers could speak to, unless the cable is private.
-    ///
-    /// # Errors
-    /// It is such an address.
     pub fn check(&self, cable_is_private: bool) -> anyhow::Result<()> {
         let ip: IpAddr = match self {
             Self::UdpIn(address) | Self::UdpOut(address) | Self::Tcp(address) => address.ip(),

@@ -1,4 +1,4 @@
-//! What one vehicle's agent must know. The parts that a user writes are read and written as they stand here, by
+//! The configuration of one vehicle's agent. The parts that a user writes are read and written as they stand here, by
 //! `agent.toml` and by whatever else configures a vehicle.
 
 use std::time::Duration;
@@ -22,7 +22,7 @@ pub struct Fence {
     pub max: [f64; 3],
 }
 
-/// What the vehicle can do, and the distances it keeps.
+/// The vehicle's abilities, and the distances it keeps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Envelope {
@@ -63,7 +63,7 @@ impl Default for Envelope {
     }
 }
 
-/// What finds a path through the map.
+/// The planner that finds a path through the map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum GlobalPlanner {
@@ -74,7 +74,7 @@ pub enum GlobalPlanner {
     DstarLite,
 }
 
-/// What turns a path into the velocity to fly now.
+/// The planner that turns a path into the velocity to fly now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LocalPlanner {
@@ -134,11 +134,9 @@ pub struct AgentConfig {
     pub fence: Fence,
     /// Terrain, threats and no-fly zones that are known; its box counts for nothing, the fence does.
     pub airspace: Airspace,
-    /// What the vehicle can do.
     pub envelope: Envelope,
-    /// How it plans.
     pub planners: Planners,
-    /// What to do without the ground station.
+    /// The policy without the ground station.
     pub link_loss: LinkLossPolicy,
     /// The scripts that run from the start.
     pub scripts: Vec<Assignment>,
@@ -146,9 +144,9 @@ pub struct AgentConfig {
     pub behaviours: Chosen,
     /// Lease of the bids this node sends.
     pub lease: Duration,
-    /// Who of the others may request and block what here.
+    /// The rights of other nodes to request and block events here.
     pub authority: Authority,
-    /// What a former life of this node has promised to keep; see [`AgentCore::durable`](crate::AgentCore::durable).
+    /// The promises of a former life of this node; see [`AgentCore::durable`](crate::AgentCore::durable).
     pub kept: Kept,
     /// Seed of the program's tie-breaks.
     pub seed: u64,
@@ -156,13 +154,11 @@ pub struct AgentConfig {
 
 impl AgentConfig {
     /// The vehicle as its behaviours see it.
-    #[must_use]
     pub fn host(&self) -> Host<'_> {
         Host { node: &self.node, roster: self.roster.iter().map(String::as_str).collect() }
     }
 
     /// The events that the vehicle knows.
-    #[must_use]
     pub fn events(&self) -> Catalogue {
         self.behaviours.declarations(&self.node).fold(Catalogue::standard(), Catalogue::with)
     }

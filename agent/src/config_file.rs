@@ -151,9 +151,6 @@ pub const EXAMPLE: &str = include_str!("../agent.toml");
 
 impl Config {
     /// Reads and checks a configuration file for a program with these behaviours.
-    ///
-    /// # Errors
-    /// The file, and the field at fault.
     pub fn read(path: &Path, known: &Behaviours) -> anyhow::Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -161,9 +158,6 @@ impl Config {
     }
 
     /// The configuration that `agent/agent.toml` shows.
-    ///
-    /// # Errors
-    /// None: it is sound.
     pub fn example() -> anyhow::Result<Self> {
         Self::parse(EXAMPLE, Path::new(""), &Behaviours::default()).context("agent/agent.toml")
     }
@@ -176,7 +170,6 @@ impl Config {
 impl AgentFile {
     /// The file of a vehicle whose autopilot and lidar are reached in these ways. The files of its scripts are still
     /// to be named.
-    #[must_use]
     pub fn of(agent: &AgentConfig, link: Address, sensor: &str, network: NetworkSettings) -> Self {
         Self {
             fleet: agent.fleet.clone(),

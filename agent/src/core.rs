@@ -34,9 +34,7 @@ const ROUNDS: usize = 4;
 pub struct Status {
     /// Flight mode as the autopilot tells it.
     pub mode: String,
-    /// What it is doing.
     pub task: String,
-    /// What it waits for, and who holds it.
     pub waiting_for: String,
     /// Energy left, 0 to 1.
     pub battery: f64,
@@ -55,27 +53,18 @@ pub struct AgentCore {
 
 impl AgentCore {
     /// An agent for a vehicle that has not been heard of yet.
-    ///
-    /// # Errors
-    /// [`AgentError`] names the field of the configuration at fault.
     pub fn new(config: AgentConfig) -> Result<Self, AgentError> {
         let parts = Parts::of(&config);
         Self::with_parts(config, parts, None)
     }
 
     /// An agent that keeps what it promises in `store`, so that blocks on its events can outlive whoever stated them.
-    ///
-    /// # Errors
-    /// As [`new`](Self::new).
     pub fn durable(config: AgentConfig, store: Box<dyn Store>) -> Result<Self, AgentError> {
         let parts = Parts::of(&config);
         Self::with_parts(config, parts, Some(store))
     }
 
     /// An agent of these parts. With a `store`, as [`durable`](Self::durable).
-    ///
-    /// # Errors
-    /// As [`new`](Self::new).
     pub fn with_parts(
         config: AgentConfig,
         parts: Parts,
@@ -191,13 +180,11 @@ impl AgentCore {
     }
 
     /// Whether this agent has the vehicle in the air, or on its way there.
-    #[must_use]
     pub fn is_committed(&self) -> bool {
         self.control.flight().is_committed()
     }
 
     /// One line about this vehicle.
-    #[must_use]
     pub fn status(&self, now: Duration) -> Status {
         Status {
             mode: self.control.mode(),
@@ -219,19 +206,15 @@ impl AgentCore {
     }
 
     /// Why this agent's next life would not run the scripts that run now, if so: they could not be written down yet.
-    #[must_use]
     pub fn unsaved_scripts(&self) -> Option<&str> {
         self.mission.scripts().unsaved()
     }
 
-    /// How the mission ended, once it has.
-    #[must_use]
+    /// The outcome of the mission, once it has ended.
     pub fn outcome(&self) -> Option<&Outcome> {
         self.mission.outcome()
     }
 
-    /// What set-points were made from so far.
-    #[must_use]
     pub fn set_points(&self) -> SetPointRecord {
         self.control.set_points()
     }
@@ -242,19 +225,16 @@ impl AgentCore {
     }
 
     /// The vehicle's node: its program, its peers, and what has come in that was not understood.
-    #[must_use]
     pub fn node(&self) -> &NodeLink {
         self.mission.node()
     }
 
     /// Whether a path is being searched for that the last tick was not enough for.
-    #[must_use]
     pub fn is_planning(&self) -> bool {
         self.control.guidance().planning.is_under_way()
     }
 
     /// The vehicle's node name.
-    #[must_use]
     pub fn name(&self) -> &NodeName {
         self.mission.name()
     }

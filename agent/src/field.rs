@@ -10,7 +10,6 @@ pub fn positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Er
     number(deserializer, "a number above 0", |v| v > 0.0)
 }
 
-/// A finite number.
 pub fn finite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     number(deserializer, "a number", |_| true)
 }

@@ -39,15 +39,12 @@ pub struct Waypoint {
     pub leg: i64,
     /// World ENU, m.
     pub target: Vector3<f64>,
-    /// Whether the vehicle lands there.
     pub lands: bool,
     /// Whether it is where the way home ends.
     pub is_home: bool,
 }
 
 impl Instruction {
-    /// The instruction in an event of vehicle `me`, if there is one.
-    #[must_use]
     pub fn of(me: &Me, event: &Event) -> Option<Self> {
         Some(match me.verb(event)? {
             Takeoff::NAME => Self::TakeOff,

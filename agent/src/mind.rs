@@ -14,7 +14,6 @@ pub trait Mind: std::fmt::Debug + Send {
     /// Loads b-threads into the program of the vehicle's node.
     fn load(&self, program: &mut Program, config: &AgentConfig);
 
-    /// Takes in a report.
     fn hear(&mut self, now: Duration, report: Event, node: &mut Node) {
         let _ = now;
         node.enqueue(report);

@@ -32,7 +32,7 @@ use crate::{
 /// between two ticks. `skein-agent verify --script` looks at all.
 const STATES_TRIED: usize = 500;
 
-/// How a vehicle's mission ended.
+/// The outcome of a vehicle's mission.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// It reached its last waypoint and landed.
@@ -63,8 +63,6 @@ pub struct Mission {
 impl Mission {
     /// The mission of a vehicle on the ground, decided by `mind`. What its node promises is kept in `store`, if there
     /// is one.
-    ///
-    /// # Errors [`AgentError`] names the field of the configuration at fault.
     pub fn new(
         config: Arc<AgentConfig>,
         mind: Box<dyn Mind>,
@@ -299,8 +297,7 @@ impl Mission {
         Ok(is_member && !node.starts_with("uav/") && NodeName::new(node).is_ok_and(may_request))
     }
 
-    /// Who keeps this vehicle from moving on or taking off; `complaint` is control's.
-    #[must_use]
+    /// The b-threads that keep this vehicle from moving on or taking off; `complaint` is control's.
     pub fn waiting_for(&self, complaint: Option<&str>) -> String {
         if let Some(fault) = self.fault.as_deref().or(complaint) {
             return fault.to_owned();
@@ -322,29 +319,24 @@ impl Mission {
         std::mem::take(&mut self.selections)
     }
 
-    #[must_use]
     pub fn name(&self) -> &NodeName {
         &self.name
     }
 
-    #[must_use]
     pub fn node(&self) -> &NodeLink {
         &self.node
     }
 
-    #[must_use]
     pub fn scripts(&self) -> &Scripts {
         &self.scripts
     }
 
-    /// What the vehicle is doing, for people.
-    #[must_use]
+    /// The vehicle's task, for people.
     pub fn task(&self) -> &str {
         &self.task
     }
 
-    /// How the mission ended, once it has.
-    #[must_use]
+    /// The outcome of the mission, once it has ended.
     pub fn outcome(&self) -> Option<&Outcome> {
         self.outcome.as_ref()
     }

@@ -1,4 +1,4 @@
-//! What a vehicle knows of the others: their last word, which stays, as a ghost that the safety filter lets grow,
+//! A vehicle's knowledge of the others: their last word, which stays, as a ghost that the safety filter lets grow,
 //! when they fall silent.
 //!
 //! How old a word is, the time on the network included, is known from echoes: each vehicle tells the others in turn
@@ -20,7 +20,7 @@ const SILENT_AFTER: Duration = Duration::from_millis(1000);
 /// Clocks drift apart by no more than this, seconds in a second: a round trip that took this much longer by now tells
 /// as much.
 const DRIFT: f64 = 1e-3;
-/// What was heard longer ago is not told back.
+/// Older words are not told back.
 const ECHO_FOR: Duration = Duration::from_millis(500);
 
 /// Neighbours are heard this often at least, while they are, s.
@@ -75,14 +75,12 @@ pub struct Neighbour {
 
 impl Neighbour {
     /// Where it should be now, metres ENU.
-    #[must_use]
     pub fn position(&self) -> Vector3<f64> {
         self.track.predicted()
     }
 
     /// Whether it may fly where a vehicle of this envelope would climb from `place`, as far as can be known: one that
     /// is silent may have come closer meanwhile.
-    #[must_use]
     pub fn may_be_over(&self, place: &Vector3<f64>, envelope: &Envelope) -> bool {
         let unseen_s = match self.track.age_s {
             age_s if !(PERIOD_S..=SURELY_DOWN_S).contains(&age_s) => 0.0,
@@ -95,7 +93,6 @@ impl Neighbour {
 
 impl Neighbours {
     /// Nobody has been heard of yet by `me` in this incarnation.
-    #[must_use]
     pub fn new(me: NodeName, incarnation: u64) -> Self {
         Self { me, incarnation, last: BTreeMap::new(), echoed: None, around: Vec::new() }
     }
@@ -113,7 +110,7 @@ impl Neighbours {
         }
     }
 
-    /// What the echo in a state that arrives at `now` says of its sender's clock.
+    /// The sender's clock, from the echo in a state that arrives at `now`.
     fn clock_of(&self, now: Duration, state: &State) -> Option<Clock> {
         let echo = state.echo.as_ref()?;
         let is_mine = echo.node == self.me && echo.incarnation == self.incarnation;
@@ -122,7 +119,7 @@ impl Neighbours {
         is_mine.then_some(Clock { behind_s: sent_s - state.time.as_secs_f64(), round_trip_s, at: now })
     }
 
-    /// What to tell one of the others back, each in turn.
+    /// An echo for one of the others, each in turn.
     pub fn echo(&mut self, now: Duration) -> Option<Echo> {
         let is_fresh = |heard: &&Heard| now.saturating_sub(heard.at) <= ECHO_FOR;
         let after = |heard: &&Heard| self.echoed.as_ref().is_none_or(|echoed| heard.state.node > *echoed);
@@ -148,7 +145,6 @@ impl Neighbours {
     }
 
     /// Everybody as of the last look around, in the order of their names.
-    #[must_use]
     pub fn around(&self) -> &[Neighbour] {
         &self.around
     }
@@ -174,7 +170,6 @@ impl Neighbours {
     }
 
     /// The nearest neighbour's name and distance in metres.
-    #[must_use]
     pub fn nearest(&self, now: Duration, position: Vector3<f64>) -> Option<(NodeName, f64)> {
         self.at(now)
             .map(|neighbour| ((neighbour.position() - position).norm(), neighbour.node))

@@ -66,8 +66,6 @@ pub enum Report {
 }
 
 impl Report {
-    /// The report as an event of vehicle `me`.
-    #[must_use]
     pub fn into_event(self, me: &Me) -> Event {
         match self {
             Self::Ready => me.event(Ready),

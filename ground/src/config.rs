@@ -1,4 +1,4 @@
-//! What a ground station must know.
+//! The configuration of a ground station.
 
 use std::time::Duration;
 
@@ -32,9 +32,9 @@ pub struct GroundConfig {
     pub behaviours: Chosen,
     /// Lease of the station's bids.
     pub lease: Duration,
-    /// Who of the others may request and block what here.
+    /// The rights of other nodes to request and block events here.
     pub authority: Authority,
-    /// What a former life of this station has kept: joint decisions, and a roster that an operator has given.
+    /// The promises of a former life of this station: joint decisions, and a roster that an operator has given.
     pub kept: Kept,
     /// Seed of the program's tie-breaks.
     pub seed: u64,
@@ -42,7 +42,6 @@ pub struct GroundConfig {
 
 impl GroundConfig {
     /// The station `name`, in its first incarnation, with the usual lease and nothing ordered yet.
-    #[must_use]
     pub fn new(fleet: Fleet, name: NodeName, vehicles: Vec<NodeName>) -> Self {
         let lease = Duration::from_secs(1);
         Self {
@@ -64,7 +63,6 @@ impl GroundConfig {
     }
 
     /// The station as its behaviours see it.
-    #[must_use]
     pub fn host(&self) -> Host<'_> {
         let roster = self.vehicles.iter().chain([&self.name]).chain(&self.operators);
         Host { node: self.name.as_str(), roster: roster.map(NodeName::as_str).collect() }

@@ -83,9 +83,6 @@ fn lease_ms() -> u64 {
 
 impl Config {
     /// Reads and checks a configuration file for a program with these behaviours.
-    ///
-    /// # Errors
-    /// The file, and the field at fault.
     pub fn read(path: &Path, known: &Behaviours) -> anyhow::Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -99,7 +96,6 @@ impl Config {
 
 impl GroundFile {
     /// The file of a station with this configuration.
-    #[must_use]
     pub fn of(station: &GroundConfig, console: SocketAddr, network: NetworkSettings) -> Self {
         let names = |nodes: &[NodeName]| nodes.iter().map(NodeName::to_string).collect();
         Self {

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use skein_bp::catalogue::Whose;
-use skein_bp::{EventSet, Program, ProgramConfig};
+use skein_bp::{Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Board, Happened, Node, NodeConfig, NodeError, NodeName};
-use skein_wire::{Link, NodeLink, State, Store, joint_roster};
+use skein_wire::event::{Declared as _, Heard, Situation};
+use skein_wire::{Link, MissionState, NodeLink, State, Store, joint_roster};
 
-use crate::bthreads::{self, MissionOutcome, Watch, heard};
+use crate::bthreads::{self, MissionOutcome, Watch};
 use crate::config::GroundConfig;
 use crate::explain::{Evidence, Explanation, explain};
 use crate::order::{Order, Who};
@@ -36,13 +37,11 @@ pub struct GroundCore {
 
 impl GroundCore {
     /// A station that has heard of nobody yet.
-    #[must_use]
     pub fn new(config: GroundConfig) -> Self {
         Self::with_store(config, None)
     }
 
     /// A station that keeps in `store` what it must not forget, and takes up what its former life has kept.
-    #[must_use]
     pub fn durable(config: GroundConfig, store: Box<dyn Store>) -> Self {
         Self::with_store(config, Some(store))
     }
@@ -137,10 +136,8 @@ impl GroundCore {
         if !self.vehicles.contains(&state.node) {
             return;
         }
-        let first_word =
-            self.roster.get(&state.node).is_none_or(|known| known.incarnation != state.incarnation);
-        if first_word {
-            self.node.node_mut().enqueue(heard::event(&self.name, &state));
+        if self.roster.get(&state.node).is_none_or(|known| known.incarnation != state.incarnation) {
+            self.node.node_mut().enqueue(first_word(&self.name, &state));
         }
         self.evidence.note_state(self.now, &state);
         self.roster.insert(state.node.clone(), state);
@@ -158,8 +155,7 @@ impl GroundCore {
         }
     }
 
-    /// How the mission went, once every vehicle is on the ground and knows.
-    #[must_use]
+    /// The outcome of the mission, once every vehicle is on the ground and knows.
     pub fn finished(&self) -> Option<MissionOutcome> {
         self.node.node().program().state_of::<Watch>(Watch::NAME)?.outcome()
     }
@@ -170,13 +166,11 @@ impl GroundCore {
     }
 
     /// The station's node name.
-    #[must_use]
     pub fn name(&self) -> &NodeName {
         &self.name
     }
 
     /// The station's node, to explain what it requests and blocks, and what has come in that was not understood.
-    #[must_use]
     pub fn node(&self) -> &NodeLink {
         &self.node
     }
@@ -192,7 +186,6 @@ impl GroundCore {
     }
 
     /// Why a vehicle of this station does what it does now, or does not move.
-    #[must_use]
     pub fn explain(&self, vehicle: &NodeName) -> Option<Explanation> {
         explain(&self.evidence, self.now, vehicle)
     }
@@ -203,8 +196,20 @@ impl GroundCore {
     }
 
     /// Grows whenever [`orders`](Self::orders) has changed.
-    #[must_use]
     pub fn orders_revision(&self) -> u64 {
         self.order_log.revision()
     }
+}
+
+/// The event by which the station `ground` tells that it has heard a vehicle for the first time in the vehicle's life.
+/// So a station that starts late, or again, launches nobody who flies and waits for nobody who has landed.
+fn first_word(ground: &NodeName, state: &State) -> Event {
+    let situation = match state.mission {
+        MissionState::UnderWay if state.armed => Situation::Flying,
+        MissionState::UnderWay => Situation::Grounded,
+        MissionState::Complete => Situation::Complete,
+        MissionState::Failed => Situation::Failed,
+    };
+    let why = state.task.as_str().into();
+    Heard { vehicle: state.node.clone(), situation, why }.at(ground)
 }

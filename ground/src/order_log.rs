@@ -1,4 +1,4 @@
-//! Who has heard an order, and who has not.
+//! The log of orders: which vehicles have heard each.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -9,7 +9,7 @@ use skein_wire::event::{Declared as _, Declined, Heeded, OrderTaken, ScriptNews,
 use crate::bthreads::{GOING_LASTS, Hold, LAUNCH_LASTS};
 use crate::order::{Order, Who};
 
-/// How many orders are remembered.
+/// The number of orders that are remembered.
 const KEPT: usize = 10;
 
 /// An order, and what has become of it.
@@ -20,11 +20,11 @@ pub struct OrderRecord {
     pub order: Order,
     /// When it was given, on the station's clock.
     pub at: Duration,
-    /// What each vehicle that it is for has said to it.
+    /// The answer of each vehicle that it is for.
     pub answers: BTreeMap<NodeName, Answer>,
 }
 
-/// What a vehicle has said to an order.
+/// A vehicle's answer to an order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
     Pending,
@@ -160,7 +160,7 @@ fn supersedes(new: &Order, old: &Order) -> bool {
     }
 }
 
-/// What an event at a vehicle says to an order.
+/// The answer to an order in an event at a vehicle.
 fn answer_in(order: &Order, happened: &Happened, after: Duration) -> Option<Answer> {
     let event = &happened.event;
     let acknowledged = || Some(Answer::Acknowledged(after));

@@ -32,9 +32,6 @@ impl fmt::Display for Findings {
 
 /// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`), a mission (`.plan`, `.json`), or
 /// else a scenario.
-///
-/// # Errors
-/// The first fault: with file, line and what was expected.
 pub fn check(file: &Path, known: &Behaviours) -> Result<Findings, ScenarioError> {
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase());
     let (kind, holds, warnings) = match extension.as_deref() {

@@ -34,12 +34,10 @@ const COMPANION_PORT: u16 = 14540;
 const WORLD_EXAMPLE: &str = include_str!("../world.toml");
 
 /// The port of the router, or of the ground station in its place.
-#[must_use]
 pub fn router_port(port_offset: u16) -> u16 {
     GROUND_PORT + port_offset
 }
 
-#[must_use]
 pub fn console(port_offset: u16) -> SocketAddr {
     (Ipv4Addr::LOCALHOST, CONSOLE_PORT + port_offset).into()
 }
@@ -56,9 +54,6 @@ pub struct Files {
 }
 
 /// Writes the files, and says how to start the swarm.
-///
-/// # Errors
-/// A fault in the scenario; a file that cannot be written.
 pub fn run(args: &cli::Configure, known: &Behaviours, as_json: bool) -> anyhow::Result<()> {
     let scenario = args.world.open(known)?;
     let files = write(&scenario, &args.out, args.setup)?;
@@ -99,9 +94,6 @@ fn instructions(args: &cli::Configure, files: &Files) -> String {
 }
 
 /// Writes the files of a scenario's swarm into `folder`, which is made if it is missing.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result<Files> {
     std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
     let save = |name: &str, text: String| {
@@ -136,7 +128,7 @@ impl Setup {
         format!("tcp/127.0.0.1:{}", port + self.port_offset)
     }
 
-    /// How a node is joined that listens on `port`, and connects to those before it.
+    /// The network settings of a node that listens on `port`, and connects to those before it.
     fn join(&self, port: u16, before: impl IntoIterator<Item = u16>) -> NetworkSettings {
         let router = vec![self.endpoint(GROUND_PORT)];
         let (mode, listen, connect) = match self.network {

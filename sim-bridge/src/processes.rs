@@ -64,9 +64,6 @@ impl Drop for Double {
 
 impl Processes {
     /// Writes their configurations into `folder`, where their logs and the recording go too, and starts them all.
-    ///
-    /// # Errors
-    /// A program that is missing, a port that is taken, a file that cannot be written.
     pub fn start(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result<Self> {
         let mut processes = Self::prepare(scenario, folder, setup)?;
         processes.start_all()?;
@@ -74,9 +71,6 @@ impl Processes {
     }
 
     /// The same, but starts nothing but the world and, where there is one, the router.
-    ///
-    /// # Errors
-    /// A program that is missing, a port that is taken, a file that cannot be written.
     pub fn prepare(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result<Self> {
         let Setup { network, port_offset, .. } = setup;
         let files = configure::write(scenario, folder, setup)?;
@@ -100,9 +94,6 @@ impl Processes {
     }
 
     /// Starts the ground station and all agents.
-    ///
-    /// # Errors
-    /// A program that is missing.
     pub fn start_all(&mut self) -> anyhow::Result<()> {
         self.start_node(&GROUND)?;
         (0..self.files.agents.len()).try_for_each(|index| self.start_node(&vehicle_name(index)))
@@ -126,9 +117,6 @@ impl Processes {
     }
 
     /// Starts a second process with a vehicle's own configuration.
-    ///
-    /// # Errors
-    /// Its program is missing.
     pub fn start_double(&self, node: &NodeName) -> anyhow::Result<Double> {
         let log = self.logs.join(format!("{}-double.log", node.as_str().replace('/', "-")));
         // With a place of its own to listen: only its name is that of the other.
@@ -145,19 +133,16 @@ impl Processes {
     }
 
     /// The folder of configurations, logs and the recording.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// The distance of all network ports from the usual ones.
-    #[must_use]
     pub fn port_offset(&self) -> u16 {
         self.port_offset
     }
 
     /// For how long a node's process has run.
-    #[must_use]
     pub fn age_of(&self, node: &NodeName) -> Option<Duration> {
         self.nodes.get(node).map(|running| running.since.elapsed())
     }
@@ -182,9 +167,6 @@ impl Processes {
     }
 
     /// Starts a node, for the first time or again.
-    ///
-    /// # Errors
-    /// Its program is missing.
     pub fn start_node(&mut self, node: &NodeName) -> anyhow::Result<()> {
         let mut command = self.program_of(node)?;
         command.arg("--config").arg(self.config_of(node)?);
@@ -193,8 +175,6 @@ impl Processes {
         Ok(())
     }
 
-    /// The log of a node.
-    #[must_use]
     pub fn log_of(&self, node: &NodeName) -> PathBuf {
         self.logs.join(format!("{}.log", node.as_str().replace('/', "-")))
     }
@@ -204,30 +184,21 @@ impl Processes {
         self.world.step();
     }
 
-    #[must_use]
     pub fn world(&self) -> &WorldHost {
         &self.world
     }
 
-    /// The address of the console.
-    #[must_use]
     pub fn console(&self) -> SocketAddr {
         configure::console(self.port_offset)
     }
 
     /// Sends a signal to a node's process.
-    ///
-    /// # Errors
-    /// There is no such process any more.
     pub fn signal(&self, node: &NodeName, signal: Signal) -> anyhow::Result<()> {
         let running = self.nodes.get(node).context("no such process")?;
         kill(pid(&running.child), signal).with_context(|| format!("{node} cannot be sent {signal}"))
     }
 
     /// Ends a node's process without warning.
-    ///
-    /// # Errors
-    /// There is no such process any more.
     pub fn kill(&mut self, node: &NodeName) -> anyhow::Result<()> {
         let mut running = self.nodes.remove(node).context("no such process")?;
         running.child.kill()?;

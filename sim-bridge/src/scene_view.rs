@@ -4,7 +4,6 @@ use skein_wire::{Form, Solid};
 use skein_world::{Obstacle, Scene, Shape};
 
 /// The obstacles of `scene`; planes without end are left out.
-#[must_use]
 pub fn view(scene: &Scene) -> skein_wire::Scene {
     let solid = |obstacle: &Obstacle| {
         let form = match obstacle.shape {

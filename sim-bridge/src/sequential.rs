@@ -17,7 +17,7 @@ use skein_wire::event::{
     PilotTook, Plan, PlanReason, Planned, Ready, Slept, Stuck, Takeoff, TooClose, Unplannable, Unready,
 };
 
-/// Who requested what the navigator does, in the trace.
+/// The navigator's name in the trace.
 const NAME: &str = "sequential";
 
 /// The state machine.
@@ -70,7 +70,6 @@ enum Way {
 impl Sequential {
     /// The navigator of a vehicle that stands on the ground: over its waypoints, landing at the last, and home where
     /// it must.
-    #[must_use]
     pub fn new(config: &AgentConfig) -> Self {
         let (me, [x, y, _]) = (Me::new(&config.node), config.home);
         Self {
@@ -132,7 +131,7 @@ impl Sequential {
         }
     }
 
-    /// What is to be done now, in this order; nothing until something is heard or due.
+    /// The events to happen now, in this order; none until something is heard or due.
     fn step(&mut self, now: Duration) -> Vec<Event> {
         if self.stage == Stage::Grounded && self.ready {
             self.stage = Stage::Climbing;

@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 /// The outcome of a run, in SI units. Its JSON form is the program's contract with scripts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
-    /// Name of the scenario.
     pub scenario: String,
     /// The source of every random number.
     pub seed: u64,
@@ -22,7 +21,6 @@ pub struct Summary {
     pub reason: Option<String>,
     /// Simulated time from the start to the last landing.
     pub sim_time_s: f64,
-    /// Time on the wall for it.
     pub wall_time_s: f64,
     /// Simulated time over wall time.
     pub realtime_factor: f64,
@@ -65,7 +63,6 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of these values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let (mut count, mut sum, mut max) = (0_u32, 0.0, 0.0_f64);
         for value in values {
@@ -163,17 +160,11 @@ pub struct VehicleSummary {
 
 impl Summary {
     /// The object that `--json` prints and `summary.json` holds, indented, with a newline at its end.
-    ///
-    /// # Errors
-    /// None but those of the serialiser, which has no reason for one here.
     pub fn to_json(&self) -> serde_json::Result<String> {
         serde_json::to_string_pretty(self).map(|text| text + "\n")
     }
 
     /// Writes `summary.json`.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn write(&self, path: &Path) -> io::Result<()> {
         std::fs::write(path, self.to_json()?)
     }

@@ -92,9 +92,6 @@ impl<W: Write> LiveTable<W> {
     }
 
     /// Draws a picture now; see [`LiveTable::is_due`].
-    ///
-    /// # Errors
-    /// The output cannot be written to.
     pub fn draw(&mut self, wall: Duration, progress: &Progress, rows: &[Row]) -> io::Result<()> {
         self.last = Some(wall);
         let Some(width) = self.width else {
@@ -110,9 +107,6 @@ impl<W: Write> LiveTable<W> {
     }
 
     /// Writes a line above the picture, which the next [`LiveTable::draw`] brings back.
-    ///
-    /// # Errors
-    /// The output cannot be written to.
     pub fn note(&mut self, line: &str) -> io::Result<()> {
         let erase = self.erase();
         self.drawn = 0;

@@ -40,7 +40,6 @@ pub struct ThreatZone {
 pub struct NoFlyZone {
     /// Its axis (ENU, metres).
     pub centre: Vector2<f64>,
-    /// Its radius, metres.
     pub radius_m: f64,
     /// Height of its lower end, metres.
     pub floor_m: f64,
@@ -115,7 +114,6 @@ impl Airspace {
     }
 
     /// Height of the terrain at a place, metres.
-    #[must_use]
     pub fn terrain_m(&self, x: f64, y: f64) -> f64 {
         let ground_m = self.heights.as_ref().map_or(0.0, |heights| heights.height_m(x, y));
         self.mountains.iter().map(|mountain| mountain.height_at_m(x, y)).sum::<f64>() + ground_m
@@ -128,13 +126,11 @@ impl Airspace {
     }
 
     /// Height of a point above the terrain, metres.
-    #[must_use]
     pub fn clearance_m(&self, point: &Vector3<f64>) -> f64 {
         point.z - self.terrain_m(point.x, point.y)
     }
 
     /// A height that the terrain under the box between two points does not exceed, metres.
-    #[must_use]
     pub fn terrain_bound_m(&self, one: &Vector3<f64>, other: &Vector3<f64>) -> f64 {
         let (lower, upper) = (one.xy().inf(&other.xy()), one.xy().sup(&other.xy()));
         let ground_m = self.heights.as_ref().map_or(0.0, |heights| heights.most_in_m(&lower, &upper));
@@ -143,7 +139,6 @@ impl Airspace {
 
     /// How much of the straight way between two points lies in threat and no-fly zones, metres; where zones
     /// overlap, it counts for each.
-    #[must_use]
     pub fn intrusion_m(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
         let threats: f64 = self.threats.iter().map(|zone| zone.share_inside(from, to)).sum();
         let no_fly: f64 = self.no_fly.iter().map(|zone| zone.share_inside(from, to)).sum();
@@ -153,7 +148,6 @@ impl Airspace {
     }
 
     /// The point of the box that is nearest to a point.
-    #[must_use]
     pub fn nearest_inside(&self, point: &Vector3<f64>) -> Vector3<f64> {
         point.sup(&self.lower).inf(&self.upper)
     }

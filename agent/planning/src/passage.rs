@@ -5,10 +5,10 @@ use nalgebra::Vector3;
 use crate::map::ClearanceMap;
 use crate::path::Path;
 
-/// What counts as a narrow passage.
+/// The definition of a narrow passage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PassageConfig {
-    /// How far ahead on the path to look, metres.
+    /// The distance to look ahead on the path, metres.
     pub look_m: f64,
     /// Free width below which a passage is narrow, metres.
     pub width_m: f64,
@@ -42,7 +42,6 @@ pub struct Passage {
 /// One obstacle beside the path is no passage.
 ///
 /// A vehicle that is inside the passage, or has its middle just behind it, is told of it with distance 0.
-#[must_use]
 pub fn first_passage(
     map: &ClearanceMap,
     path: &Path,

@@ -48,7 +48,6 @@ impl Path {
     /// A path through `points`, in order. Repeated points are dropped.
     ///
     /// `None` if there is no point, or a coordinate is not finite.
-    #[must_use]
     pub fn new(points: Vec<Vector3<f64>>) -> Option<Path> {
         if points.iter().any(|point| !point.iter().all(|c| c.is_finite())) {
             return None;
@@ -79,37 +78,31 @@ impl Path {
     }
 
     /// The points, in order; at least one.
-    #[must_use]
     pub fn points(&self) -> &[Vector3<f64>] {
         &self.points
     }
 
     /// The station of each point, metres, in order.
-    #[must_use]
     pub fn stations(&self) -> &[f64] {
         &self.stations
     }
 
     /// The first point.
-    #[must_use]
     pub fn start(&self) -> Vector3<f64> {
         self.points.first().copied().unwrap_or_default()
     }
 
     /// The last point.
-    #[must_use]
     pub fn end(&self) -> Vector3<f64> {
         self.points.last().copied().unwrap_or_default()
     }
 
     /// Arc length of the whole path, metres.
-    #[must_use]
     pub fn length_m(&self) -> f64 {
         self.stations.last().copied().unwrap_or(0.0)
     }
 
     /// The point at a station; stations beyond the ends give the ends.
-    #[must_use]
     pub fn point_at(&self, station_m: f64) -> Vector3<f64> {
         match self.leg_at(station_m) {
             Some(leg) => leg.point_at(station_m),
@@ -119,13 +112,11 @@ impl Path {
 
     /// Unit direction of travel at a station (at a corner, that of the leg that begins there); zero for a
     /// path of one point.
-    #[must_use]
     pub fn direction_at(&self, station_m: f64) -> Vector3<f64> {
         self.leg_at(station_m).map_or_else(Vector3::zeros, |leg| leg.direction())
     }
 
     /// The nearest point of the path; of equally near ones the first.
-    #[must_use]
     pub fn project(&self, point: &Vector3<f64>) -> Projection {
         self.project_within(point, 0.0, self.length_m())
     }
@@ -134,7 +125,6 @@ impl Path {
     ///
     /// A follower that passes the stretch around its last station does not jump where the path comes near
     /// itself again.
-    #[must_use]
     pub fn project_within(&self, point: &Vector3<f64>, from_m: f64, to_m: f64) -> Projection {
         let from = from_m.clamp(0.0, self.length_m());
         let to = to_m.clamp(from, self.length_m());

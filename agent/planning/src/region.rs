@@ -33,26 +33,22 @@ impl Region {
     };
 
     /// Distance to the nearest side, metres; outside negative, to the side that is furthest away.
-    #[must_use]
     pub fn room_m(&self, point: &Vector3<f64>) -> f64 {
         (point - self.min).min().min((self.max - point).min())
     }
 
     /// The same of the sides that stand upright.
-    #[must_use]
     pub fn level_room_m(&self, point: &Vector3<f64>) -> f64 {
         let [low, high] = [point - self.min, self.max - point];
         low.xy().min().min(high.xy().min())
     }
 
     /// The nearest point inside.
-    #[must_use]
     pub fn clamp(&self, point: &Vector3<f64>) -> Vector3<f64> {
         point.sup(&self.min).inf(&self.max)
     }
 
     /// The nearest point at a height inside.
-    #[must_use]
     pub fn clamp_height(&self, point: &Vector3<f64>) -> Vector3<f64> {
         Vector3::new(point.x, point.y, self.clamp(point).z)
     }

@@ -23,8 +23,6 @@ enum Phase {
 }
 
 impl Battery {
-    /// The b-thread of vehicle `me`.
-    #[must_use]
     pub fn new(me: Me) -> Self {
         Self { me, phase: Phase::Good }
     }

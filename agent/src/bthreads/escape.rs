@@ -6,7 +6,7 @@ use skein_wire::event::{Arrived, Declared as _, Goto, Land, Plan, PlanReason, St
 
 use crate::{me::Me, precedence};
 
-/// How many escapes one waypoint is worth before the vehicle lands.
+/// Escapes from one waypoint before the vehicle lands.
 pub const ATTEMPTS: u8 = 12;
 
 /// Requests `plan` when the vehicle is stuck; the planner then goes around its neighbours too and pulls less
@@ -19,8 +19,6 @@ pub struct Escape {
 }
 
 impl Escape {
-    /// The b-thread of vehicle `me`.
-    #[must_use]
     pub fn new(me: Me) -> Self {
         Self { me, attempts: 0, stuck: false }
     }

@@ -21,8 +21,6 @@ enum Phase {
 }
 
 impl FoundAirborne {
-    /// The b-thread of vehicle `me`.
-    #[must_use]
     pub fn new(me: Me) -> Self {
         Self { me, phase: Phase::Unaware }
     }

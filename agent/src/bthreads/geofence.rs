@@ -23,7 +23,6 @@ enum Phase {
 
 impl Geofence {
     /// A fence over the box from `min` to `max`, metres ENU.
-    #[must_use]
     pub fn new(me: Me, min: [f64; 3], max: [f64; 3]) -> Self {
         let outside = me.any::<Goto>().and(EventSet::region(min, max).not());
         Self { me, outside, phase: Phase::Inside }

@@ -9,10 +9,10 @@ use skein_wire::event::{Airborne, Declared as _, Land, Landed, Return};
 
 use crate::{me::Me, precedence};
 
-/// How long the ground may be silent before the vehicle acts on it.
+/// The vehicle acts once the ground has been silent for this long.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// What a vehicle does without its ground station.
+/// The policy of a vehicle without its ground station.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LinkLossPolicy {
@@ -45,7 +45,6 @@ enum Phase {
 
 impl LinkLoss {
     /// The b-thread of vehicle `me`, whose ground station is the node `ground`.
-    #[must_use]
     pub fn new(me: Me, ground: &str, policy: LinkLossPolicy) -> Self {
         Self { me, ground: ground.to_owned(), policy, phase: Phase::Grounded }
     }

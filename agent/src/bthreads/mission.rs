@@ -49,7 +49,6 @@ enum Phase {
 
 impl Mission {
     /// A mission over `waypoints` in metres ENU, the last being where the vehicle lands.
-    #[must_use]
     pub fn new(me: Me, waypoints: &[[f64; 3]]) -> Self {
         Self { waypoints: gotos(&me, waypoints), me, phase: Phase::Grounded }
     }

@@ -11,7 +11,7 @@ use skein_wire::event::{Advance, Ahead, Arrived, Declared as _, Goto, Homeward, 
 use crate::bthreads::HOME_LEG;
 use crate::{me::Me, precedence};
 
-/// How long a leave to move is asked for: one navigation cycle.
+/// The length of a leave to move: one navigation cycle.
 pub const CYCLE: Duration = Duration::from_millis(100);
 
 /// Requests `advance`, or on the way home `homeward`, once in each navigation cycle while there is a path to follow.
@@ -32,8 +32,6 @@ enum Phase {
 }
 
 impl Navigation {
-    /// The b-thread of vehicle `me`.
-    #[must_use]
     pub fn new(me: Me) -> Self {
         Self { me, homeward: false, ahead: None, phase: Phase::Idle }
     }

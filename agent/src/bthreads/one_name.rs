@@ -24,8 +24,6 @@ enum Phase {
 }
 
 impl OneName {
-    /// The b-thread of vehicle `me`.
-    #[must_use]
     pub fn new(me: Me) -> Self {
         Self { me, phase: Phase::Unique }
     }

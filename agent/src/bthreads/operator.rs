@@ -16,8 +16,6 @@ pub struct Operator {
 }
 
 impl Operator {
-    /// The b-thread of vehicle `me`.
-    #[must_use]
     pub fn new(me: Me) -> Self {
         Self { me, pending: Vec::new(), holding: false }
     }

@@ -11,7 +11,7 @@ use skein_wire::event::{
 use crate::bthreads::OPERATOR_LEG;
 use crate::{me::Me, precedence};
 
-/// How often a waypoint without a path is tried again: the map may have held a ghost.
+/// Attempts at a waypoint without a path: the map may have held a ghost.
 pub const ATTEMPTS: u8 = 3;
 /// The pause before the next attempt.
 pub const PAUSE: Duration = Duration::from_secs(1);
@@ -34,8 +34,6 @@ enum Phase {
 }
 
 impl PathPlanning {
-    /// The b-thread of vehicle `me`.
-    #[must_use]
     pub fn new(me: Me) -> Self {
         Self { me, phase: Phase::Idle }
     }

@@ -15,8 +15,6 @@ pub struct Pilot {
 }
 
 impl Pilot {
-    /// The b-thread of vehicle `me`.
-    #[must_use]
     pub fn new(me: Me) -> Self {
         Self { me, has_control: false }
     }

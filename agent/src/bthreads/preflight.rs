@@ -16,8 +16,6 @@ pub struct Preflight {
 }
 
 impl Preflight {
-    /// The b-thread of vehicle `me`.
-    #[must_use]
     pub fn new(me: Me) -> Self {
         Self { me, ready: false, off: false }
     }

@@ -39,13 +39,10 @@ enum Task {
 }
 
 impl Reposition {
-    /// The b-thread of vehicle `me`.
-    #[must_use]
     pub fn new(me: Me) -> Self {
         Self { me, standing: Standing::Grounded, task: Task::Nothing }
     }
 
-    /// The `goto` that an order asks for.
     fn goto(&self, order: &OrderTaken) -> Option<Event> {
         let [x, y, z] = order.place()?;
         Some(self.me.event(Goto { leg: OPERATOR_LEG, lands: false, x, y, z }))

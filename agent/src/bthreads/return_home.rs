@@ -40,7 +40,6 @@ enum Phase {
 
 impl ReturnHome {
     /// `home` is the point above the take-off place, metres ENU; its height is the vehicle's own return altitude.
-    #[must_use]
     pub fn new(me: Me, home: [f64; 3]) -> Self {
         Self { home: goto(&me, home), me, phase: Phase::Grounded }
     }

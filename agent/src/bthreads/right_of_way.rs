@@ -38,14 +38,14 @@ pub struct RightOfWay {
     me: Me,
     /// The other vehicles and the ground station.
     others: BTreeMap<String, Other>,
-    /// How long claims take to cross.
+    /// The time that claims take to cross.
     meeting: Duration,
     /// No claim counts before this.
     met: Duration,
     phase: Phase,
 }
 
-/// What is known of another node.
+/// The knowledge of another node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 enum Other {
     /// Not heard yet: it cannot have claimed anything.
@@ -70,7 +70,6 @@ enum Phase {
 impl RightOfWay {
     /// The b-thread of vehicle `me`; `others` are the other vehicles and the ground station, `lease` is that of their
     /// bids.
-    #[must_use]
     pub fn new<'a>(me: Me, others: impl IntoIterator<Item = &'a str>, lease: Duration) -> Self {
         let others = others.into_iter().map(|node| (node.to_owned(), Other::Unheard)).collect();
         let meeting = lease.mul_f64(MEETING_LEASES);
@@ -128,14 +127,13 @@ impl RightOfWay {
     }
 }
 
-/// What is about the same passage.
+/// The events about the same passage.
 pub fn around(passage: &Event) -> EventSet {
     let [min, max] =
         [-SAME_PASSAGE_M, SAME_PASSAGE_M].map(|margin| centre(passage).map(|coordinate| coordinate + margin));
     EventSet::region(min, max)
 }
 
-/// `enter` into a passage.
 pub fn entering(me: &Me, passage: &Event) -> Event {
     let [x, y, z] = centre(passage);
     me.event(Enter { x, y, z })

@@ -16,8 +16,6 @@ pub struct Separation {
 }
 
 impl Separation {
-    /// The b-thread of vehicle `me`.
-    #[must_use]
     pub fn new(me: Me) -> Self {
         Self { me, too_close: false }
     }

@@ -37,8 +37,6 @@ enum Task {
 }
 
 impl Together {
-    /// The b-thread of vehicle `me`.
-    #[must_use]
     pub fn new(me: Me) -> Self {
         let task = Task::Nothing;
         Self { me, ready: false, flying: false, in_step_with: None, aborted_meanwhile: false, task }

@@ -27,7 +27,7 @@ const STATES_OF_NETWORK: usize = 50_000;
 /// States that are drawn unless told otherwise.
 const STATES_DRAWN: usize = 1_000;
 
-/// What is looked for in every network.
+/// The faults that are looked for in every network.
 const LOOKED_FOR: [&str; 4] = [
     "failed assertions",
     "nodes that do not settle",
@@ -114,8 +114,8 @@ impl Verify {
             return Ok(scenes);
         }
         let named = |name: &String| {
-            let names = || scenes.iter().map(|scene| scene.name()).collect::<Vec<_>>().join(", ");
-            let scene = scenes.iter().copied().find(|scene| scene.name() == name);
+            let names = || scenes.iter().map(|scene| scene.word()).collect::<Vec<_>>().join(", ");
+            let scene = scenes.iter().copied().find(|scene| scene.word() == name);
             scene.with_context(|| format!("`--scene {name}`: expected one of {}", names()))
         };
         self.scene.iter().map(named).collect()
@@ -132,7 +132,7 @@ impl Verify {
         let mut reports = Vec::new();
         for scene in self.scenes(&verifier)? {
             let began = Instant::now();
-            let report = verifier.verify(scene, progress_line(scene.name()));
+            let report = verifier.verify(scene, progress_line(scene.word()));
             clear_line();
             if !self.json {
                 print_scene(&report, began.elapsed().as_secs_f64());
@@ -177,7 +177,7 @@ impl Verify {
         if self.json {
             println!(
                 "{}",
-                json!({ "scene": scene.name(), "states": states, "edges": edges, "not_covered": omitted })
+                json!({ "scene": scene.word(), "states": states, "edges": edges, "not_covered": omitted })
             );
         } else {
             println!("{}: {states} states, {edges} edges of the scene `{scene}`", file.display());
@@ -341,7 +341,7 @@ fn vehicle_json(
         });
         let mut result = report_json(report);
         if let Value::Object(fields) = &mut result {
-            fields.insert("scene".to_owned(), scene.name().into());
+            fields.insert("scene".to_owned(), scene.word().into());
             fields.insert("about".to_owned(), scene.about().into());
             fields.insert("longest_burst".to_owned(), report.longest_burst.into());
             fields.insert("bthreads".to_owned(), bthreads.collect());

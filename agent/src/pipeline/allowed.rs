@@ -15,7 +15,7 @@ const BACK_M_S: f64 = 0.5;
 /// Limits that leave less than this above home do not keep a vehicle from taking off, m.
 const LEAST_CLIMB_M: f64 = 1.0;
 
-/// How a vehicle may move while nothing more important moves it.
+/// The motion allowed to a vehicle while nothing more important moves it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Allowed {
     /// Greatest speed, m/s.
@@ -38,7 +38,6 @@ impl Allowed {
     pub const ANYTHING: Self = Self { speed_m_s: f64::INFINITY, region: Region::EVERYWHERE, nowhere: false };
 
     /// The height above home to take off to, where `wanted_m` is.
-    #[must_use]
     pub fn takeoff_height_m(&self, wanted_m: f64, home_z_m: f64) -> f64 {
         wanted_m.min((self.inset().max.z - home_z_m).max(LEAST_CLIMB_M))
     }

@@ -8,7 +8,7 @@ use crate::instruction::Waypoint;
 
 /// A path is kept while its clearance is less by no more than this, m.
 const REPLAN_SLACK_M: f64 = 0.15;
-/// How far ahead the path is checked against the map, m.
+/// The path is checked against the map this far ahead, m.
 const CHECK_AHEAD_M: f64 = 15.0;
 /// A path further away than this is planned anew, m.
 const OFF_PATH_M: f64 = 2.0;
@@ -36,7 +36,6 @@ pub struct Following {
 
 impl Course {
     /// The course to a waypoint, without a path yet.
-    #[must_use]
     pub fn to(waypoint: Waypoint) -> Self {
         Self { waypoint: Some(waypoint), ..Self::default() }
     }
@@ -58,7 +57,6 @@ impl Course {
     }
 
     /// Whether the path ahead leads through a passage, as far as there is a path.
-    #[must_use]
     pub fn leads_through(&self, passage: &Passage) -> bool {
         self.following.as_ref().is_none_or(|following| {
             let end_m = following.path.length_m();
@@ -70,20 +68,17 @@ impl Course {
 
 impl Following {
     /// A path from its beginning, planned to stay within a region.
-    #[must_use]
     pub fn new(Found { path, clearance_m }: Found, within: Region) -> Self {
         Self { path, clearance_m, within, station_m: 0.0, is_blocked: false }
     }
 
     /// The place so far ahead of the vehicle, or the path's end.
-    #[must_use]
     pub fn place_ahead(&self, reach_m: f64) -> Vector3<f64> {
         self.path.point_at((self.station_m + reach_m).min(self.path.length_m()))
     }
 
     /// Whether a vehicle at `position` that is to stay `within` a region can fly on along the path, as far as the map
     /// tells.
-    #[must_use]
     pub fn can_be_flown(&self, position: &Vector3<f64>, within: &Region, map: &ClearanceMap) -> bool {
         if *within != self.within {
             return false;

@@ -10,13 +10,11 @@ const OBSTACLE_MARGIN_M: f64 = 0.1;
 
 impl Envelope {
     /// Distance that the safety filter keeps from the vehicle's centre to obstacles, m.
-    #[must_use]
     pub fn obstacle_clearance_m(&self) -> f64 {
         self.hull_m + OBSTACLE_MARGIN_M
     }
 
     /// The distances that the safety filter keeps.
-    #[must_use]
     pub fn filter(&self) -> FilterConfig {
         FilterConfig {
             separation_m: self.separation_m,
@@ -29,8 +27,7 @@ impl Envelope {
         }
     }
 
-    /// How a local planner slows down and speeds up that does both with `accel_m_s2`.
-    #[must_use]
+    /// The settings of a local planner that brakes and accelerates with `accel_m_s2`.
     pub fn braking(&self, accel_m_s2: f64) -> BrakingConfig {
         BrakingConfig {
             cruise_m_s: self.cruise_m_s,

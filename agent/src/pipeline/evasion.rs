@@ -18,8 +18,6 @@ pub enum Way {
 }
 
 impl Way {
-    /// 1 or -1.
-    #[must_use]
     pub fn sign(self) -> f64 {
         match self {
             Self::Up => 1.0,

@@ -43,7 +43,6 @@ pub struct Guidance {
 
 impl Guidance {
     /// Guidance for a vehicle of this envelope.
-    #[must_use]
     pub fn new(envelope: Envelope, layers: Layers) -> Self {
         let Layers { finder, follower, repulsion, filter, escape, passages } = layers;
         Self {
@@ -87,13 +86,11 @@ impl Guidance {
     }
 
     /// Whether the limits leave a place to fly.
-    #[must_use]
     pub fn has_somewhere_to_fly(&self) -> bool {
         !self.allowed.nowhere
     }
 
     /// The height above home to take off to, where `wanted_m` is, m.
-    #[must_use]
     pub fn takeoff_height_m(&self, wanted_m: f64, home_z_m: f64) -> f64 {
         self.allowed.takeoff_height_m(wanted_m, home_z_m)
     }
@@ -103,7 +100,6 @@ impl Guidance {
     }
 
     /// Where a vehicle that moves like this would come to a stop if it were told to now, metres ENU, at its height.
-    #[must_use]
     pub fn stop(&self, motion: &Motion) -> Vector3<f64> {
         let unheld = motion.position + motion.velocity * self.envelope.latency_s;
         self.steering.stop(&unheld, &motion.velocity).xy().push(motion.position.z)
@@ -120,7 +116,6 @@ impl Guidance {
 
     /// A place on the path so far ahead that a vehicle whose leave to move ends now stops well before it; none
     /// without a path.
-    #[must_use]
     pub fn place_ahead(&self) -> Option<Vector3<f64>> {
         let following = self.course.following.as_ref()?;
         let Envelope { cruise_m_s, brake_m_s2, latency_s, .. } = self.envelope;

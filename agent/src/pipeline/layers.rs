@@ -12,7 +12,7 @@ use crate::config::{Envelope, Fence, Planners};
 /// A passage is announced this far ahead, m: far enough to stop well clear of it.
 const PASSAGE_AHEAD_M: f64 = 5.0;
 
-/// What guidance is made of. Every layer is there for a reason: [`Layers::of`] has them all.
+/// The layers of guidance. Every one is there for a reason: [`Layers::of`] has them all.
 #[derive(Debug)]
 pub struct Layers {
     /// Finds a path through the map.
@@ -31,7 +31,6 @@ pub struct Layers {
 
 impl Layers {
     /// The layers that fly: those of a vehicle of this envelope inside this fence, with these planners.
-    #[must_use]
     pub fn of(envelope: &Envelope, fence: Fence, planners: Planners) -> Self {
         Self {
             finder: path_finder(planners.global),

@@ -48,7 +48,6 @@ const TERRAIN_CLEARANCE_M: f64 = 1.0;
 /// Where the vehicle was, and how it lay, when a scan was taken. World ENU, body FLU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Position, m.
     pub position: Vector3<f64>,
     /// Body to world.
     pub attitude: UnitQuaternion<f64>,
@@ -74,9 +73,6 @@ pub struct Perception {
 
 impl Perception {
     /// An empty map of where the mission of this configuration may fly.
-    ///
-    /// # Errors
-    /// [`MapError`] when the fence is no box in space.
     pub fn of_mission(config: &AgentConfig) -> Result<Self, MapError> {
         let perception = Self::new(&config.fence, Vector3::from(config.home), heights(config))?;
         if config.airspace == Airspace::default() {
@@ -88,9 +84,6 @@ impl Perception {
 
     /// An empty map of the space between the heights `floor_m` and `ceiling_m` inside the fence, metres ENU: no path
     /// leaves these heights. A fence too wide for one map is covered by a window that rolls along with the vehicle.
-    ///
-    /// # Errors
-    /// [`MapError`] when the fence is no box in space.
     pub fn new(fence: &Fence, home: Vector3<f64>, [floor_m, ceiling_m]: [f64; 2]) -> Result<Self, MapError> {
         let height_m = (ceiling_m.min(fence.max[2]) - floor_m).min(TALLEST_WINDOW_M);
         let width_m = [0, 1].map(|axis| fence.max[axis] - fence.min[axis] + 4.0 * RESOLUTION_M);
@@ -157,7 +150,6 @@ impl Perception {
         (self.map, self.heights_m) = (wider.map, wider.heights_m);
     }
 
-    #[must_use]
     pub fn map(&self) -> &ClearanceMap {
         &self.map
     }
@@ -168,20 +160,17 @@ impl Perception {
     }
 
     /// The nearest obstacle point in each direction, of the newest scan; metres ENU.
-    #[must_use]
     pub fn obstacles(&self) -> &[Vector3<f64>] {
         &self.near
     }
 
     /// All obstacle points within the range of the map, of the newest scan; metres ENU. Neither neighbours are among
     /// them nor the ground, which a beam meets when the vehicle pitches.
-    #[must_use]
     pub fn returns(&self) -> &[Vector3<f64>] {
         &self.returns
     }
 
     /// When the newest scan was taken.
-    #[must_use]
     pub fn last_scan(&self) -> Option<Duration> {
         self.last_scan
     }

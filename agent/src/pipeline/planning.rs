@@ -19,7 +19,7 @@ use crate::{
 
 /// Neighbours within this distance are gone around when the vehicle is stuck, m.
 const AROUND_NEIGHBOURS_M: f64 = 8.0;
-/// How far outside the ghost of a silent neighbour a path leads, m.
+/// A path keeps this far outside the ghost of a silent neighbour, m.
 const GHOST_SLACK_M: f64 = 0.3;
 /// Nearer than this is the same place, m.
 const SAME_PLACE_M: f64 = 1e-6;
@@ -34,13 +34,12 @@ pub struct Planning {
     routes: RouteSearch,
     /// The region that the plan under way is to stay in.
     within: Region,
-    /// What the search for a path may still do in this tick.
+    /// The effort left to the search for a path in this tick.
     allowance: usize,
 }
 
 impl Planning {
     /// Plans for a vehicle of this envelope by this planner.
-    #[must_use]
     pub fn new(envelope: Envelope, finder: Box<dyn PathFinder>) -> Self {
         let (filter, routes) = (envelope.filter(), RouteSearch::new(finder));
         Self { envelope, filter, routes, within: Region::EVERYWHERE, allowance: ALLOWANCE }
@@ -52,7 +51,6 @@ impl Planning {
     }
 
     /// Whether a plan has been begun that has no answer yet.
-    #[must_use]
     pub fn is_under_way(&self) -> bool {
         self.routes.is_under_way()
     }

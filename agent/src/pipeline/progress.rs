@@ -35,12 +35,10 @@ pub struct Progress {
 
 impl Progress {
     /// Watches a vehicle that keeps so far from others, m. Passages and local minima are found as configured.
-    #[must_use]
     pub fn new(separation_m: f64, passages: PassageConfig, escape: EscapeConfig) -> Self {
         Self { separation_m, passages, passage: None, escape: EscapeDetector::new(escape) }
     }
 
-    /// There is a new path.
     pub fn begin_path(&mut self) {
         self.escape.reset();
     }
@@ -51,7 +49,6 @@ impl Progress {
     }
 
     /// The share of the attraction that is left: 1, and less while a local minimum is escaped from.
-    #[must_use]
     pub fn attraction(&self) -> f64 {
         self.escape.attraction()
     }

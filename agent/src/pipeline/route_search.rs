@@ -8,7 +8,7 @@ use skein_planning::{
 
 use super::global::{Found, PathFinder, Task};
 
-/// What the search may do in one tick: as much as so many expansions in one layer take, some three milliseconds.
+/// The effort of the search in one tick: so many expansions in one layer, some three milliseconds.
 pub const ALLOWANCE: usize = 10_000;
 
 /// The planner, and the search under way, if one is.
@@ -29,7 +29,6 @@ struct UnderWay {
 
 impl RouteSearch {
     /// Searches by this planner.
-    #[must_use]
     pub fn new(finder: Box<dyn PathFinder>) -> Self {
         Self { finder, under_way: None }
     }
@@ -45,8 +44,6 @@ impl RouteSearch {
         self.under_way = None;
     }
 
-    /// Whether a search is under way.
-    #[must_use]
     pub fn is_under_way(&self) -> bool {
         self.under_way.is_some()
     }

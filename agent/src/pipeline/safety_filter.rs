@@ -50,7 +50,6 @@ pub struct SafetyFilter {
 
 impl SafetyFilter {
     /// The filter of a vehicle of this envelope inside this fence.
-    #[must_use]
     pub fn new(envelope: &Envelope, fence: Fence) -> Self {
         let (climb_m_s, config) = (envelope.climb_m_s, envelope.filter());
         Self { fence, climb_m_s, config, evasion: Evasion::default() }

@@ -10,7 +10,7 @@ pub const FRESH_FOR: Duration = Duration::from_millis(200);
 /// After this long without fresh inputs not even zero velocity is sent.
 pub const SILENT_AFTER: Duration = Duration::from_millis(1000);
 
-/// What may be sent, given the age of the oldest input.
+/// The set-point that may be sent, given the age of the oldest input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KeepAlive {
     /// The pipeline's set-point.
@@ -23,7 +23,6 @@ pub enum KeepAlive {
 /// Applies the rule at `now` to the times at which the inputs were measured.
 ///
 /// An input that was never received counts as silent.
-#[must_use]
 pub fn keep_alive(now: Duration, measured_at: &[Option<Duration>]) -> KeepAlive {
     match oldest_age(now, measured_at) {
         Some(age) if age <= FRESH_FOR => KeepAlive::Command,
@@ -33,7 +32,6 @@ pub fn keep_alive(now: Duration, measured_at: &[Option<Duration>]) -> KeepAlive 
 }
 
 /// The age of the oldest input; `None` when one was never received.
-#[must_use]
 pub fn oldest_age(now: Duration, measured_at: &[Option<Duration>]) -> Option<Duration> {
     measured_at
         .iter()

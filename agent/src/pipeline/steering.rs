@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{config::Envelope, positioning::Motion};
 
-/// How far ahead the way is looked at for the speed cap, m.
+/// The speed cap looks this far ahead, m.
 const SENSED_AHEAD_M: f64 = 9.0;
 /// Height differences below this are flown in planar mode, m.
 const PLANAR_BAND_M: f64 = 0.4;
@@ -39,7 +39,7 @@ const SETTLING_M_S: f64 = 1.0;
 pub struct Steering {
     envelope: Envelope,
     follower: Box<dyn PathFollower>,
-    /// What moves and tells nobody where it is.
+    /// Moving things that tell nobody where they are.
     moving: Tracker,
     repulsion: RepulsionConfig,
     filter: Box<dyn VelocityFilter>,
@@ -58,7 +58,6 @@ pub struct Lead<'a> {
 
 impl Steering {
     /// Steers a vehicle of this envelope.
-    #[must_use]
     pub fn new(
         envelope: Envelope,
         follower: Box<dyn PathFollower>,
@@ -90,7 +89,6 @@ impl Steering {
     }
 
     /// Where a vehicle that brakes here and now comes to a stop, metres ENU.
-    #[must_use]
     pub fn stop(&self, position: &Vector3<f64>, velocity: &Vector3<f64>) -> Vector3<f64> {
         position + velocity * (velocity.norm() / (2.0 * self.follower.braking().decel_m_s2))
     }

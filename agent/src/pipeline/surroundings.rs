@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use skein_planning::{map::ClearanceMap, separation};
 
-/// What is around the vehicle now.
+/// The vehicle's surroundings now.
 #[derive(Clone, Copy, Debug)]
 pub struct Surroundings<'a> {
     pub map: &'a ClearanceMap,

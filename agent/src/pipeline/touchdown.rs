@@ -44,7 +44,6 @@ pub struct Descent<'a> {
 impl Descent<'_> {
     /// Where to go first, at the vehicle's height: `None` if it can go down where it stops, or nowhere within reach.
     /// `chosen` is kept as long as it will do.
-    #[must_use]
     pub fn detour(&self, chosen: Option<Vector3<f64>>) -> Option<Vector3<f64>> {
         let mut places = chosen.into_iter().chain(places_around(&self.stop, REACH_M));
         let place = places.find(|place| self.is_free_below(place) && self.can_be_reached(place))?;

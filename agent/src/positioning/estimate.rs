@@ -8,7 +8,6 @@ use skein_mav::Stamped;
 /// Position and velocity. World ENU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// Position, m.
     pub position: Vector3<f64>,
     /// Velocity, m/s.
     pub velocity: Vector3<f64>,
@@ -18,7 +17,6 @@ pub struct Motion {
 
 impl Motion {
     /// A motion whose errors are independent and alike on all axes: standard deviations in m and m/s.
-    #[must_use]
     pub fn new(position: Vector3<f64>, velocity: Vector3<f64>, [position_m, velocity_m_s]: [f64; 2]) -> Self {
         let mut covariance = Matrix6::zeros();
         covariance.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(position_m * position_m);
@@ -28,7 +26,6 @@ impl Motion {
 
     /// Standard deviation of the position along its least certain direction at most, m: exact if the axes are
     /// independent.
-    #[must_use]
     pub fn position_sigma_m(&self) -> f64 {
         // No eigenvalue of a matrix exceeds its greatest sum of a row's magnitudes (Gershgorin).
         let position = self.covariance.fixed_view::<3, 3>(0, 0);
@@ -56,19 +53,16 @@ pub struct Estimate {
 
 impl Estimate {
     /// When motion and attitude were measured.
-    #[must_use]
     pub fn stamps(&self) -> [Option<Duration>; 2] {
         [self.motion.map(|motion| motion.stamp), self.attitude.map(|attitude| attitude.stamp)]
     }
 
     /// Whether motion and attitude are both younger than `limit`.
-    #[must_use]
     pub fn is_fresh(&self, now: Duration, limit: Duration) -> bool {
         self.stamps().iter().all(|stamp| stamp.is_some_and(|stamp| now.saturating_sub(stamp) < limit))
     }
 
     /// Position and orientation at a time near both stamps, from rates.
-    #[must_use]
     pub fn pose_at(&self, at: Duration) -> Option<(Vector3<f64>, UnitQuaternion<f64>)> {
         let (motion, attitude) = (self.motion?, self.attitude?);
         let lead_s = |stamp: Duration| (at.as_secs_f64() - stamp.as_secs_f64()).clamp(-0.2, 0.2);

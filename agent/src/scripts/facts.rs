@@ -1,4 +1,4 @@
-//! What is told to scripts about places and energy, and to nobody while none listens.
+//! Facts about places and energy, told while a script listens.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ const STEP_M: f64 = 1.0;
 /// Energy is told in steps of so many per cent.
 const STEP_PERCENT: i64 = 5;
 
-/// What a vehicle knows of itself and of the others at one time.
+/// A vehicle's knowledge of itself and of the others at one time.
 #[derive(Clone, Copy, Debug)]
 pub struct Circumstances<'a> {
     /// Where it is, m.
@@ -28,7 +28,7 @@ pub struct Circumstances<'a> {
     pub neighbours: &'a [Neighbour],
 }
 
-/// What was told last.
+/// The facts that were told last.
 #[derive(Debug, Default)]
 pub struct ScriptFacts {
     at: Option<Vector3<f64>>,
@@ -51,7 +51,7 @@ impl ScriptFacts {
         self.ahead = None;
     }
 
-    /// What has changed since it was told last, as far as somebody listens.
+    /// The changes since the last call, as far as somebody listens.
     pub fn tell(&mut self, me: &Me, is_heard: impl Fn(&str) -> bool, now: &Circumstances<'_>) -> Vec<Event> {
         let mut events: Vec<Event> =
             if is_heard(Nearest::NAME) { self.tell_nearest(me, now) } else { None }.into_iter().collect();

@@ -24,13 +24,13 @@ pub use self::{
 };
 use crate::me::Me;
 
-/// How many scripts may run at once.
+/// The most scripts that may run at once.
 const MOST_SCRIPTS: usize = skein_wire::State::MAX_SCRIPTS;
 
-/// What could not be kept is tried again after so long.
+/// Scripts that could not be kept are tried again after so long.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 
-/// Who has sent the scripts that come with the vehicle's configuration.
+/// The sender of the scripts that come with the vehicle's configuration.
 pub const CONFIGURATION: &str = "configuration";
 
 /// When a script that is taken in begins.
@@ -48,10 +48,9 @@ pub struct RunningScript {
     pub about: String,
     /// The values of its parameters.
     pub with: BTreeMap<String, Argument>,
-    /// Who has sent it: [`CONFIGURATION`], or as in [`KeptScript::from`].
+    /// Its sender: [`CONFIGURATION`], or as in [`KeptScript::from`].
     pub from: String,
     assignment: Assignment,
-    /// The facts that it listens to.
     listens: Vec<&'static str>,
 }
 
@@ -74,7 +73,6 @@ const STATES_TRIED: usize = 200;
 
 impl Scripts {
     /// No scripts yet, on a vehicle whose fleet is `roster` and knows these events.
-    #[must_use]
     pub fn new(me: Me, roster: &[String], events: &Catalogue) -> Self {
         Self {
             rights: ScriptRights::usual(&me, roster, events),
@@ -93,9 +91,6 @@ impl Scripts {
     }
 
     /// Adds a script that `from` has sent to the vehicle's program, once it is kept.
-    ///
-    /// # Errors
-    /// Why it is not run.
     pub fn load(
         &mut self,
         program: &mut Program,
@@ -135,9 +130,6 @@ impl Scripts {
 
     /// A script with its parameters, once it has passed what can be said of it alone: its rights, and that it neither
     /// blocks something for ever nor goes round by itself.
-    ///
-    /// # Errors
-    /// Why it is not run.
     pub fn examine(&self, assignment: &Assignment) -> Result<BoundScript, String> {
         let script = assignment.bind(self.me.name()).map_err(|error| error.to_string())?;
         self.rights.check(&script.bthread)?;
@@ -146,7 +138,6 @@ impl Scripts {
     }
 
     /// The b-thread that runs a script within its rights.
-    #[must_use]
     pub fn runner(&self, script: &BoundScript) -> Runner {
         let may_block = self.rights.block().clone();
         Runner::new(self.me.clone(), &script.name, script.bthread.clone(), may_block)
@@ -181,7 +172,6 @@ impl Scripts {
     }
 
     /// Why the agent's next life would not run the scripts that run now, if so: the store does not take them in.
-    #[must_use]
     pub fn unsaved(&self) -> Option<&str> {
         self.unsaved.as_deref()
     }
@@ -203,7 +193,6 @@ impl Scripts {
     }
 
     /// The event that says what has become of a script.
-    #[must_use]
     pub fn verdict(&self, name: &str, outcome: Result<(), String>) -> Event {
         match outcome {
             Ok(()) => report(&self.me, name, ScriptState::Accepted, ""),
@@ -212,13 +201,10 @@ impl Scripts {
     }
 
     /// Whether a script runs under this name.
-    #[must_use]
     pub fn runs(&self, name: &str) -> bool {
         self.running.contains_key(name)
     }
 
-    /// Whether a script listens to a fact.
-    #[must_use]
     pub fn listen_to(&self, fact: &str) -> bool {
         self.running.values().any(|script| script.listens.contains(&fact))
     }

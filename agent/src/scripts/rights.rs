@@ -21,7 +21,6 @@ impl ScriptRights {
     /// What every script may do: order its own vehicle about at its gateway, hold it, limit its motion, and have
     /// events of its own. It
     /// cannot keep a vehicle from the way home, from landing, or from anything else that is for its safety.
-    #[must_use]
     pub fn usual(me: &Me, roster: &[String], events: &Catalogue) -> Self {
         let own = EventSet::prefix(own_events(me));
         let orders = EventSet::any_of(What::those(What::is_open_to_scripts).map(OrderTaken::what));
@@ -36,16 +35,11 @@ impl ScriptRights {
         }
     }
 
-    /// What may be blocked.
-    #[must_use]
     pub fn block(&self) -> &EventSet {
         &self.grant.block
     }
 
     /// Whether a script keeps to its rights, and speaks of events that there are.
-    ///
-    /// # Errors
-    /// The first thing that it may not, or that nobody knows.
     pub fn check(&self, script: &Script) -> Result<(), String> {
         script.bids().try_for_each(|bid| self.check_bid(bid))
     }
@@ -110,7 +104,7 @@ impl ScriptRights {
     }
 }
 
-/// How the names of the events begin that a vehicle's scripts make up.
+/// The prefix of the events that a vehicle's scripts make up.
 fn own_events(me: &Me) -> String {
     format!("{}/script/", me.name())
 }

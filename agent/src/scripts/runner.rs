@@ -10,7 +10,7 @@ use skein_wire::event::{HandBack, OrderTaken, Ready, ScriptState, Unload, What};
 use super::report;
 use crate::{me::Me, precedence};
 
-/// How often a script may be resumed at one time: far less than the selections that a superstep may take.
+/// The most times a script may be resumed at once: far less than the selections that a superstep may take.
 const MOST_AT_ONCE: u32 = 100;
 
 /// A script as a b-thread of a vehicle: with the priority of a mission, blocking nothing beyond its rights, to be
@@ -30,7 +30,6 @@ pub struct Runner {
 
 impl Runner {
     /// Runs `script` under `name` on the vehicle `me`.
-    #[must_use]
     pub fn new(me: Me, name: &str, script: Script, may_block: EventSet) -> Self {
         let pace = Some((Duration::ZERO, 0));
         Self { me, name: name.to_owned(), script, may_block, over: false, asleep: false, pace }
@@ -49,7 +48,6 @@ impl Runner {
     }
 
     /// The b-thread's name for a script of this name.
-    #[must_use]
     pub fn bthread_name(name: &str) -> String {
         format!("script/{name}")
     }

@@ -18,7 +18,6 @@ type Declared = Option<Vec<&'static Declaration>>;
 
 impl Vocabulary {
     /// The events of `catalogue` at the nodes of `roster`.
-    #[must_use]
     pub fn new(roster: &[String], catalogue: &Catalogue) -> Self {
         let nodes = roster.iter().filter_map(|node| NodeName::new(node).ok()).collect();
         Self { nodes, events: catalogue.clone() }
@@ -35,17 +34,11 @@ impl Vocabulary {
 
     /// Checks that each name in a set is that of an event, each pattern fits one, and that they have the data asked
     /// for.
-    ///
-    /// # Errors
-    /// The first that does not, and what there is.
     pub(super) fn check(&self, set: &EventSet) -> Result<(), String> {
         self.check_among(set, &None)
     }
 
     /// Checks that there is this event, with data of these kinds.
-    ///
-    /// # Errors
-    /// The name or the field at fault, and what there is.
     pub(super) fn check_event(&self, event: &Event) -> Result<(), String> {
         let declared = self.named(event.name())?;
         event.data().try_for_each(|(key, value)| check_datum(&declared, key, Some(value)))
@@ -98,7 +91,6 @@ impl Vocabulary {
         }
     }
 
-    /// The declaration of the event of this name.
     fn named(&self, name: &str) -> Result<Declared, String> {
         let (node, verb) = self
             .nodes

@@ -32,7 +32,7 @@ use crate::config::AgentConfig;
 use crate::me::Me;
 use crate::scripts::{Runner, Scripts};
 
-/// How many waypoints of a mission are flown: the first and the last, between which all others are alike.
+/// The waypoints of a mission that are flown: the first and the last, between which all others are alike.
 const MOST_WAYPOINTS: usize = 2;
 /// On a vehicle an external event gets its turn after so many internal ones.
 const LONGEST_BURST: u32 = 16;
@@ -67,9 +67,6 @@ pub struct VehicleVerifier {
 
 /// Looks for a fault of a script together with the vehicle's program, in no more than so many states around the
 /// vehicle's first flight.
-///
-/// # Errors
-/// What is wrong, with the run that shows it.
 pub fn check_script(config: &AgentConfig, script: &Assignment, most_states: usize) -> Result<(), String> {
     let config = AgentConfig { scripts: vec![script.clone()], ..config.clone() };
     let verifier = VehicleVerifier::new(&config).map_err(|error| match error {
@@ -82,24 +79,24 @@ pub fn check_script(config: &AgentConfig, script: &Assignment, most_states: usiz
     }
 }
 
-/// What came of one scene.
+/// The result of one scene.
 #[derive(Clone, Debug)]
 pub struct SceneReport {
     pub scene: Scene,
     /// The verdict, how much was looked at, and what was not.
     pub report: Report,
-    /// What of the program was met.
+    /// The parts of the program that were met.
     pub coverage: Coverage,
 }
 
-/// What of a program no scene has met.
+/// The parts of a program that no scene has met.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct NotCovered {
     /// Events that b-threads wait for and that never happened, each with those b-threads.
     pub never_told: Vec<(String, Vec<Arc<str>>)>,
     /// Events that b-threads requested and that never happened.
     pub never_selected: Vec<Event>,
-    /// What the model of the world leaves out.
+    /// The behaviour that the model of the world leaves out.
     pub left_out: Vec<String>,
 }
 
@@ -152,12 +149,11 @@ impl VehicleVerifier {
     }
 
     /// The vehicle's node name.
-    #[must_use]
     pub fn vehicle(&self) -> &str {
         self.me.name()
     }
 
-    /// What is looked for, in words.
+    /// The rules that are checked, in words.
     pub fn rules(&self) -> impl Iterator<Item = String> {
         let general = [
             "no deadlock; nobody is hot for ever; every burst comes to rest",
@@ -177,7 +173,7 @@ impl VehicleVerifier {
     /// The scenes that are of interest for this program.
     pub fn scenes(&self) -> impl Iterator<Item = Scene> + use<> {
         let has_scripts = !self.scripts.is_empty();
-        Scene::ALL.into_iter().filter(move |scene| *scene != Scene::Scripts || has_scripts)
+        Scene::ALL.iter().copied().filter(move |scene| *scene != Scene::Scripts || has_scripts)
     }
 
     /// Looks at all runs of one scene.
@@ -187,7 +183,6 @@ impl VehicleVerifier {
     }
 
     /// The verification of one scene, to be run or drawn.
-    #[must_use]
     pub fn verifier(&self, scene: Scene) -> Verifier {
         let mut program = self.program.clone();
         for requirement in requirements(&self.me, &self.config.fence) {
@@ -232,8 +227,7 @@ impl VehicleVerifier {
         verifier
     }
 
-    /// What the scenes together have not met.
-    #[must_use]
+    /// The parts that the scenes together have not met.
     pub fn not_covered(&self, scenes: &[SceneReport]) -> NotCovered {
         let mut coverage = Coverage::default();
         scenes.iter().for_each(|scene| coverage.join(scene.coverage.clone()));
@@ -269,14 +263,14 @@ impl VehicleVerifier {
         }
     }
 
-    /// What scripts listen to and nobody else.
+    /// The events that only scripts listen to.
     fn script_facts(&self) -> BTreeSet<Event> {
         let told = self.me.any_in(SCRIPT_FACTS);
         let is_told = |event: &Event| told.contains(event) || !event.name().starts_with(self.me.name());
         self.scripts.iter().flat_map(|(_, script)| script.listened_to()).filter(is_told).collect()
     }
 
-    /// What a script may block, with its b-thread's name.
+    /// The events that scripts may block, each with the b-thread's name.
     fn held_by_scripts(&self) -> impl Iterator<Item = (Arc<str>, Event)> {
         self.scripts
             .iter()
@@ -314,7 +308,7 @@ fn is_down(view: &View<'_>) -> bool {
         .is_some_and(|flight| [world::ON_THE_GROUND, world::UNHEARD_OF].contains(&flight.place()))
 }
 
-/// What must stay within reach of a script that blocks something.
+/// The goal of a script that blocks something: to let it happen.
 fn goal_of_script(bthread: &str, event: &Event) -> String {
     format!("`{bthread}` lets {event} happen")
 }

@@ -29,7 +29,6 @@ pub struct Place {
 
 impl Place {
     /// A place where nothing happens yet.
-    #[must_use]
     pub fn new(name: impl Into<Arc<str>>) -> Self {
         Self { name: name.into(), offers: Vec::new(), hears: Vec::new(), rules_out: EventSet::None }
     }
@@ -65,14 +64,11 @@ impl Place {
 
 impl Part {
     /// A part that begins in the first of these places.
-    #[must_use]
     pub fn new(places: Vec<Place>) -> Self {
         let at = places.first().map_or_else(|| "".into(), |place| place.name.clone());
         Self { places: Arc::new(places), at, priority: None }
     }
 
-    /// A part with one place.
-    #[must_use]
     pub fn of_one(place: Place) -> Self {
         Self::new(vec![place])
     }
@@ -85,7 +81,6 @@ impl Part {
     }
 
     /// The name of the place where it is.
-    #[must_use]
     pub fn place(&self) -> &str {
         &self.at
     }

@@ -1,4 +1,4 @@
-//! What must hold of a vehicle's program: b-threads that watch it and fail.
+//! The requirements on a vehicle's program: b-threads that watch it and fail.
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
@@ -54,26 +54,22 @@ struct Pilot {
 
 impl Requirement {
     /// None of `never` happens from an event of `from` to the next of `until`.
-    #[must_use]
     pub fn absence(name: &str, never: EventSet, from: EventSet, until: EventSet) -> Self {
         Self { name: name.to_owned(), rule: Rule::Absence { never, from, until, is_on: false } }
     }
 
     /// The same, and it is asked from the start.
-    #[must_use]
     pub fn absence_from_start(name: &str, never: EventSet, from: EventSet, until: EventSet) -> Self {
         Self { name: name.to_owned(), rule: Rule::Absence { never, from, until, is_on: true } }
     }
 
     /// After each event of `from` one of `answer` happens before the vehicle `me` rests for good, unless a pilot has
     /// it.
-    #[must_use]
     pub fn response(name: &str, me: &Me, from: EventSet, answer: EventSet) -> Self {
         Self::answered(name, me, from, answer, None)
     }
 
     /// The same once in each flight that begins with one of `begins`: an answer that came before counts.
-    #[must_use]
     pub fn response_in_flight(
         name: &str,
         me: &Me,
@@ -92,8 +88,7 @@ impl Requirement {
         Self { name: name.to_owned(), rule }
     }
 
-    /// What must hold, in a few words.
-    #[must_use]
+    /// The requirement in a few words.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -155,11 +150,10 @@ impl BThread for Requirement {
     }
 }
 
-/// What a flight begins with.
+/// The events that begin a flight.
 type InTheAir = (Takeoff, FoundAirborne);
 
-/// What must hold of every vehicle, whatever its mission.
-#[must_use]
+/// The requirements on every vehicle, whatever its mission.
 pub fn requirements(me: &Me, fence: &Fence) -> Vec<Requirement> {
     let order = |what: &[What]| {
         me.any::<OrderTaken>().and(EventSet::any_of(what.iter().copied().map(OrderTaken::what)))

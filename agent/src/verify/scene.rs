@@ -11,29 +11,30 @@ use super::part::Part;
 use super::world::{self, Disturbed};
 use crate::{config::AgentConfig, me::Me};
 
-/// A selection of what may happen around a vehicle. The program is always whole.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Scene {
-    /// Checks that pass and fail, take-off asked for, refused, held, decided together.
-    Launch,
-    /// Paths that are not found or turn out blocked, getting stuck, a neighbour too close, a ground station that holds.
-    Flight,
-    /// A narrow passage, claimed against another vehicle, while nodes are lost and heard again.
-    Passage,
-    /// A battery that runs low and empty, and the fence, while a neighbour comes too close.
-    Energy,
-    /// A ground station that is lost and heard again, with a low battery.
-    Link,
-    /// An operator's orders, with a low battery.
-    Operator,
-    /// A pilot who takes over and hands back, an agent that slept or started in the air, with battery and orders.
-    Pilot,
-    /// Another process under the vehicle's name, and an operator who holds and resumes.
-    Name,
-    /// What is told to scripts only, around an undisturbed flight.
-    Scripts,
-    /// All of it at once.
-    Everything,
+skein_bp::words! {
+    /// A selection of what may happen around a vehicle. The program is always whole.
+    pub enum Scene {
+        /// Checks that pass and fail, take-off asked for, refused, held, decided together.
+        Launch = "launch",
+        /// Paths that are not found or turn out blocked, getting stuck, a neighbour too close, a station that holds.
+        Flight = "flight",
+        /// A narrow passage, claimed against another vehicle, while nodes are lost and heard again.
+        Passage = "passage",
+        /// A battery that runs low and empty, and the fence, while a neighbour comes too close.
+        Energy = "energy",
+        /// A ground station that is lost and heard again, with a low battery.
+        Link = "link",
+        /// An operator's orders, with a low battery.
+        Operator = "operator",
+        /// A pilot who takes over and hands back, an agent that slept or started in the air, with battery and orders.
+        Pilot = "pilot",
+        /// Another process under the vehicle's name, and an operator who holds and resumes.
+        Name = "name",
+        /// What is told to scripts only, around an undisturbed flight.
+        Scripts = "scripts",
+        /// All of it at once.
+        Everything = "everything",
+    }
 }
 
 /// The world of one vehicle, from which scenes take their parts.
@@ -43,43 +44,12 @@ pub(super) struct World<'a> {
     /// Another vehicle, if there is one.
     pub(super) other: Option<&'a NodeName>,
     pub(super) ground: Option<&'a NodeName>,
-    /// What is told to scripts only.
+    /// The facts that are told to scripts only.
     pub(super) script_facts: &'a BTreeSet<Event>,
 }
 
 impl Scene {
-    /// All scenes, in the order in which they are verified. That of scripts is of interest where there are some.
-    pub const ALL: [Self; 10] = [
-        Self::Launch,
-        Self::Flight,
-        Self::Passage,
-        Self::Energy,
-        Self::Link,
-        Self::Operator,
-        Self::Pilot,
-        Self::Name,
-        Self::Scripts,
-        Self::Everything,
-    ];
-
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Launch => "launch",
-            Self::Flight => "flight",
-            Self::Passage => "passage",
-            Self::Energy => "energy",
-            Self::Link => "link",
-            Self::Operator => "operator",
-            Self::Pilot => "pilot",
-            Self::Name => "name",
-            Self::Scripts => "scripts",
-            Self::Everything => "everything",
-        }
-    }
-
     /// What may happen in it, besides an undisturbed flight.
-    #[must_use]
     pub fn about(self) -> &'static str {
         match self {
             Self::Launch => "checks, refused commands, the ground's launch and hold, joint launch and abort",
@@ -162,11 +132,5 @@ impl Scene {
             Self::Everything => &[Hold, Resume, Land, Return, GoTo, HandBack],
             _ => &[],
         }
-    }
-}
-
-impl std::fmt::Display for Scene {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
     }
 }

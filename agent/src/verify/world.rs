@@ -23,9 +23,9 @@ pub(super) const ON_THE_GROUND: &str = "on the ground";
 /// The same, before the agent has heard of it.
 pub(super) const UNHEARD_OF: &str = "not heard of";
 
-/// What the vehicle's autopilot and guidance report only while the agent flies it.
+/// Reports of the autopilot and the guidance that come only while the agent flies the vehicle.
 type OnTheWay = (Arrived, PathBlocked, Stuck, Passage, At, Ahead, NeighbourAt, BatteryLevel);
-/// What is watched in the air only.
+/// Reports of watches that look in the air only.
 type InTheAir = (BatteryLow, BatteryCritical, FenceBreached, TooClose, Clear);
 
 /// The flight as `flight.rs` conducts it with the autopilot; `disturbed`: commands may fail, and a pilot may take over.
@@ -74,7 +74,7 @@ pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
     ])
 }
 
-/// What goes wrong with a flight.
+/// The disturbances of a flight.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Disturbed {
     /// The autopilot refuses to take off.

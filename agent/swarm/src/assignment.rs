@@ -1,4 +1,4 @@
-//! Who takes what: optimal assignment.
+//! Optimal assignment of vehicles to targets.
 
 /// Assigns to each row a column of its own so that the sum of their costs is least (Kuhn 1955, Munkres 1957; with
 /// potentials, as Jonker and Volgenant 1987). The result has the column of each row. `None` if there are more rows than
@@ -10,7 +10,6 @@
 /// let costs = [vec![4.0, 1.0, 3.0], vec![2.0, 0.0, 5.0], vec![3.0, 2.0, 2.0]];
 /// assert_eq!(assign(&costs), Some(vec![1, 0, 2]));
 /// ```
-#[must_use]
 pub fn assign(costs: &[Vec<f64>]) -> Option<Vec<usize>> {
     let (rows, columns) = (costs.len(), costs.first().map_or(0, Vec::len));
     let is_sound = |row: &Vec<f64>| row.len() == columns && row.iter().all(|cost| cost.is_finite());

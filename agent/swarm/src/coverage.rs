@@ -11,17 +11,9 @@ pub enum CoverageError {
     #[error(
         "an area of {corners} corners encloses nothing; give at least three, not in a line and all finite"
     )]
-    NoArea {
-        /// How many corners there are.
-        corners: usize,
-    },
-    /// The swath is no width.
+    NoArea { corners: usize },
     #[error("a swath of {swath_m} m; expected a width above 0")]
-    Swath {
-        /// The width asked for, metres.
-        swath_m: f64,
-    },
-    /// Nobody is there to fly.
+    Swath { swath_m: f64 },
     #[error("no vehicle to cover the area; expected at least one")]
     NoVehicles,
 }
@@ -35,9 +27,6 @@ pub enum CoverageError {
 /// time. Where the area is not convex, a line may cross a gap in it.
 ///
 /// `O(corners^2 + lines corners)`.
-///
-/// # Errors
-/// See [`CoverageError`].
 ///
 /// ```
 /// use nalgebra::Vector2;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Rotation2, Vector2, Vector3};
 
-/// How vehicles fly together.
+/// A formation: the places of vehicles that fly together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Formation {
     pub shape: Shape,
@@ -23,7 +23,6 @@ pub enum Shape {
 
 impl Formation {
     /// The place of a vehicle, 0 the leader, relative to the leader: ahead and to the left, metres.
-    #[must_use]
     pub fn offset(&self, vehicle: usize) -> Vector2<f64> {
         let rank = vehicle.div_ceil(2) as f64;
         let side = if vehicle.is_multiple_of(2) { -1.0 } else { 1.0 };
@@ -37,7 +36,6 @@ impl Formation {
 
     /// The places of so many vehicles (ENU, metres), with the leader at `leader`, heading along `heading_rad`
     /// (counter-clockwise from east). All at the leader's height.
-    #[must_use]
     pub fn places(&self, leader: &Vector3<f64>, heading_rad: f64, vehicles: usize) -> Vec<Vector3<f64>> {
         let turn = Rotation2::new(heading_rad);
         let place = |vehicle| {
@@ -51,7 +49,6 @@ impl Formation {
     /// formation heads along the leader's first leg that leads anywhere over ground, and is shifted without being
     /// turned: all routes are the leader's, moved aside. So all are equally long, and vehicles that set out together
     /// and are equally fast keep their places, around corners too.
-    #[must_use]
     pub fn routes(&self, leader: &[Vector3<f64>], vehicles: usize) -> Vec<Vec<Vector3<f64>>> {
         let mut legs = leader.windows(2).map(|leg| (leg[1] - leg[0]).xy());
         let ahead = legs.find(|leg| *leg != Vector2::zeros()).unwrap_or_else(Vector2::x);

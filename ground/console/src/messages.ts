@@ -9,7 +9,7 @@ import type { What } from './vocabulary';
 export type AnswerView = { "state": "pending" } | { "state": "missing" } | { "state": "acknowledged", after_ms: number, } | { "state": "refused", why: string, };
 
 /**
- * Who blocks a request.
+ * A b-thread that blocks a request.
  */
 export type Blocker = { node: string, bthread: string,
 /**
@@ -17,7 +17,7 @@ export type Blocker = { node: string, bthread: string,
  */
 local: boolean,
 /**
- * How long ago it renewed its block, if that comes from elsewhere.
+ * The time since it renewed its block, if that comes from elsewhere.
  */
 lease_age_s: number | null,
 /**
@@ -62,7 +62,7 @@ event: string,
  */
 home: string,
 /**
- * Who requested it; nobody if the node reports it.
+ * The b-threads that requested it; none if the node reports it.
  */
 requested_by: Array<string>,
 /**
@@ -105,7 +105,7 @@ event: string, by: string,
  */
 priority: number | null,
 /**
- * Who blocks it at its home.
+ * The b-threads that block it at its home.
  */
 blocked_by: Array<Blocker>, };
 
@@ -118,11 +118,11 @@ export type ServerMessage = { "type": "scene", fleet: string, station: string, s
  */
 situation: Situation | null,
 /**
- * What has happened at it last, newest first.
+ * Its latest events, newest first.
  */
 events: Array<EventNote>,
 /**
- * What is requested of it now, by its own b-threads and by others.
+ * The requests for its events now, by its own b-threads and by others.
  */
 requests: Array<Request>,
 /**
@@ -130,11 +130,11 @@ requests: Array<Request>,
  */
 limits: Array<string>,
 /**
- * What would let it move: one will do. Empty while it moves.
+ * The changes that would let it move: one will do. Empty while it moves.
  */
 changes: Array<Change>,
 /**
- * What all this cannot be sure of.
+ * The doubts about all this.
  */
 doubts: Array<string>, } | { "type": "ordered", tag: string | null, id: number, } | { "type": "script", tag: string | null, script: unknown, } | { "type": "error", tag: string | null, message: string, };
 
@@ -143,7 +143,7 @@ doubts: Array<string>, } | { "type": "ordered", tag: string | null, id: number, 
  */
 export type Situation = {
 /**
- * How old this is.
+ * The age of this.
  */
 age_s: number,
 /**
@@ -151,7 +151,7 @@ age_s: number,
  */
 mode: string,
 /**
- * What the vehicle is about, as it says.
+ * The vehicle's task, as it says.
  */
 task: string,
 /**

@@ -28,13 +28,11 @@ pub struct Delivery {
 
 impl Delivery {
     /// Brings the orders of the station `ground` to `vehicle`.
-    #[must_use]
     pub fn new(ground: NodeName, vehicle: NodeName) -> Self {
         Self { ground, vehicle, order: None, until: None }
     }
 
     /// The name it runs under.
-    #[must_use]
     pub fn name(vehicle: &NodeName) -> String {
         format!("orders for {vehicle}")
     }

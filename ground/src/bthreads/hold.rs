@@ -25,7 +25,6 @@ impl Hold {
     pub const NAME: &'static str = "hold";
 
     /// The b-thread of the ground station `ground` for its `vehicles`.
-    #[must_use]
     pub fn new(ground: NodeName, vehicles: Vec<NodeName>) -> Self {
         Self { ground, vehicles, held: BTreeSet::new() }
     }

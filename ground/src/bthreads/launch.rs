@@ -13,7 +13,7 @@ use skein_wire::event::{
 
 use crate::order::{ordered, ordered_for_all};
 
-/// How long a vehicle may block its own take-off before the next one gets its turn.
+/// A vehicle that blocks its own take-off for longer lets the next one have its turn.
 const PATIENCE: Duration = Duration::from_secs(15);
 
 /// Requests `uav/N/takeoff` for each vehicle whose turn it is. Each vehicle's own preflight b-thread may block its
@@ -46,7 +46,6 @@ impl Launch {
     pub const NAME: &'static str = "launch";
 
     /// Launches from the ground station `ground`: at once, or `on_order`.
-    #[must_use]
     pub fn new(ground: NodeName, on_order: bool) -> Self {
         Self { ground, phase: if on_order { Phase::Unordered } else { Phase::Free } }
     }

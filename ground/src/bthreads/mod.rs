@@ -4,7 +4,6 @@
 //! [`Behaviour`](skein_bp::behaviour::Behaviour).
 
 mod delivery;
-pub mod heard;
 mod hold;
 mod launch;
 mod muster;

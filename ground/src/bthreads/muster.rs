@@ -23,7 +23,6 @@ pub struct Muster {
 
 impl Muster {
     /// Waits for `vehicles`, at the ground station `ground`.
-    #[must_use]
     pub fn new(ground: NodeName, vehicles: impl IntoIterator<Item = NodeName>) -> Self {
         Self { ground, missing: vehicles.into_iter().map(|vehicle| vehicle.to_string()).collect() }
     }

@@ -10,7 +10,7 @@ use skein_wire::event::{Declared as _, Heard, Later, OrderGiven, Situation, Turn
 
 use crate::order::ordered;
 
-/// How long those that are there wait for one that was to go before them, from the first word of any.
+/// Vehicles that are there wait so long for one that goes before them, from the first word of any.
 const COURTESY: Duration = Duration::from_secs(2);
 
 /// Offers `turn` for each vehicle that has been heard of on the ground, in the order in which they are to take off. Who
@@ -20,7 +20,7 @@ const COURTESY: Duration = Duration::from_secs(2);
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct RollCall {
     ground: NodeName,
-    /// Who has yet to fly.
+    /// The vehicles that have yet to fly.
     waiting: VecDeque<NodeName>,
     /// Those of them that have been heard of.
     present: BTreeSet<NodeName>,
@@ -31,7 +31,6 @@ pub struct RollCall {
 
 impl RollCall {
     /// Calls `vehicles`, in this order.
-    #[must_use]
     pub fn new(ground: NodeName, vehicles: Vec<NodeName>) -> Self {
         Self { ground, waiting: vehicles.into(), present: BTreeSet::new(), courtesy: None, begun: false }
     }

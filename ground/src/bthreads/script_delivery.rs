@@ -20,19 +20,17 @@ use crate::order::{ordered, ordered_for};
 pub struct ScriptDelivery {
     ground: NodeName,
     vehicle: NodeName,
-    /// What is to be requested, and until when.
+    /// The requests to make, each with the time at which it ends.
     queue: VecDeque<(Event, Duration)>,
 }
 
 impl ScriptDelivery {
     /// Brings the scripts of the station `ground` to `vehicle`.
-    #[must_use]
     pub fn new(ground: NodeName, vehicle: NodeName) -> Self {
         Self { ground, vehicle, queue: VecDeque::new() }
     }
 
     /// The name it runs under.
-    #[must_use]
     pub fn name(vehicle: &NodeName) -> String {
         format!("scripts for {vehicle}")
     }

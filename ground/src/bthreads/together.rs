@@ -9,7 +9,7 @@ use skein_wire::event::{Abort, Declared as _, Launch, OrderGiven, SWARM, What};
 
 use crate::order::{ordered, ordered_for_all};
 
-/// How long a joint launch is asked for: whoever ordered it does not look any more.
+/// A joint launch is asked for so long; then whoever ordered it does not look any more.
 pub const LAUNCH_LASTS: Duration = Duration::from_secs(60);
 
 /// Requests `swarm/launch` until everybody takes off, which those that are not ready keep back, or `swarm/abort`.
@@ -28,7 +28,6 @@ enum Phase {
 
 impl Together {
     /// The b-thread of the ground station `ground`.
-    #[must_use]
     pub fn new(ground: NodeName) -> Self {
         Self { ground, phase: Phase::Unordered }
     }

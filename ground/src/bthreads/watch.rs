@@ -10,7 +10,7 @@ use skein_wire::event::{
     of_every_vehicle,
 };
 
-/// What each vehicle still owes: the outcome of its mission and, if it has flown, its landing.
+/// The debts of each vehicle: the outcome of its mission and, if it has flown, its landing.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct Watch {
     ground: NodeName,
@@ -37,7 +37,7 @@ impl Progress {
     }
 }
 
-/// How a mission went.
+/// The outcome of a mission.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MissionOutcome {
     /// The vehicles that did not do what they were sent for, and why.
@@ -46,7 +46,6 @@ pub struct MissionOutcome {
 
 impl MissionOutcome {
     /// Whether every vehicle did what it was sent for.
-    #[must_use]
     pub fn succeeded(&self) -> bool {
         self.failed.is_empty()
     }
@@ -57,15 +56,13 @@ impl Watch {
     pub const NAME: &'static str = "watch";
 
     /// Watches these vehicles.
-    #[must_use]
     pub fn new(ground: NodeName, vehicles: impl IntoIterator<Item = NodeName>) -> Self {
         let vehicles =
             vehicles.into_iter().map(|vehicle| (vehicle.to_string(), Progress::default())).collect();
         Self { ground, vehicles, told: false }
     }
 
-    /// How the mission went, once every vehicle is on the ground and knows.
-    #[must_use]
+    /// The outcome of the mission, once every vehicle is on the ground and knows.
     pub fn outcome(&self) -> Option<MissionOutcome> {
         let mut failed = BTreeMap::new();
         for (vehicle, progress) in &self.vehicles {

@@ -1,4 +1,4 @@
-//! What the station records: all that it hears.
+//! The station's recording: all that it hears.
 
 use std::path::Path;
 use std::time::Duration;
@@ -19,7 +19,7 @@ const PATH_PERIOD: Duration = Duration::from_millis(500);
 /// says so and goes on without it.
 pub struct Recording {
     recorder: Option<Recorder>,
-    /// How many vehicles the file shows by now.
+    /// The number of vehicles that the file shows by now.
     shown: usize,
     paths_due: Duration,
 }
@@ -39,12 +39,12 @@ impl Recording {
         Ok(Self { recorder: Some(Recorder::create(&path)?), shown: 0, paths_due: Duration::ZERO })
     }
 
-    /// What stands in the world.
+    /// The obstacles of the world.
     pub fn scene(&mut self, now: Duration, scene: &Scene) {
         self.write(|recorder| recorder.scene(now, &scene.solids));
     }
 
-    /// What has happened, and where the vehicles are.
+    /// Writes the events since the last call, and the states and poses of the vehicles.
     pub fn take_in(&mut self, now: Duration, station: &GroundCore, happened: &[Happened]) {
         for happened in happened {
             self.write(|recorder| recorder.trace(station.name(), happened));

@@ -1,7 +1,7 @@
 //! The messages to browsers: `scene`, `fleet` and `orders` as they are now, `events` as they happen, `why` a vehicle does
 //! what it does, to whoever asks about it, and answers to requests.
 //!
-//! The console's own types are made of these: see `typescript.rs`.
+//! The console's own types are made of these: see `tests.rs`.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -6,14 +6,13 @@
 //!
 //! Only this computer can open it, and only pages that it serves itself may speak to it.
 
-mod assets;
 mod client;
 mod feed;
 mod request;
 mod server;
 mod subscription;
 #[cfg(test)]
-mod typescript;
+mod tests;
 
 use std::net::SocketAddr;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -33,15 +32,12 @@ const ORDERS_WAITING: usize = 64;
 /// Why the console cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum ConsoleError {
-    /// Others could reach it.
     #[error(
         "console address `{address}` is not on the loopback interface: use 127.0.0.1, and a tunnel from elsewhere"
     )]
     NotLoopback { address: SocketAddr },
-    /// The address cannot be listened on.
     #[error("console address `{address}`: {source}; use another port, or 0 for any that is free")]
     Listen { address: SocketAddr, source: std::io::Error },
-    /// The system gives no thread.
     #[error("the console's thread cannot be started: {0}")]
     Thread(std::io::Error),
 }
@@ -56,9 +52,6 @@ pub struct Console {
 
 impl Console {
     /// Serves the console at `address`; port 0 is any free one. `wake` is called when an order waits to be taken.
-    ///
-    /// # Errors
-    /// [`ConsoleError`] when the address is taken, or not on the loopback interface.
     pub fn serve(address: SocketAddr, wake: impl Fn() + Send + Sync + 'static) -> Result<Self, ConsoleError> {
         if !address.ip().is_loopback() {
             return Err(ConsoleError::NotLoopback { address });
@@ -76,7 +69,6 @@ impl Console {
     }
 
     /// The address for a browser.
-    #[must_use]
     pub fn url(&self) -> String {
         format!("http://{}", self.address)
     }

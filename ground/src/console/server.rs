@@ -14,7 +14,6 @@ use axum::routing::get;
 use axum::serve::ListenerExt as _;
 use tokio::sync::{Semaphore, oneshot};
 
-use super::assets::ASSETS;
 use super::client;
 use super::request::Mailbox;
 use super::subscription::Subscription;
@@ -25,6 +24,32 @@ const MOST_BROWSERS: usize = 64;
 const LONGEST_REQUEST: usize = 64 << 10;
 /// The page needs nothing from elsewhere, and belongs in no other page.
 const CONTENT_POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; frame-ancestors 'none'";
+
+/// One file of the page.
+struct Asset {
+    path: &'static str,
+    content_type: &'static str,
+    body: &'static [u8],
+}
+
+/// All files of the page. Without Node at build time, the first says what to install.
+const ASSETS: [Asset; 3] = [
+    Asset {
+        path: "/",
+        content_type: "text/html; charset=utf-8",
+        body: include_bytes!(concat!(env!("OUT_DIR"), "/console/index.html")),
+    },
+    Asset {
+        path: "/app.js",
+        content_type: "text/javascript; charset=utf-8",
+        body: include_bytes!(concat!(env!("OUT_DIR"), "/console/app.js")),
+    },
+    Asset {
+        path: "/app.css",
+        content_type: "text/css; charset=utf-8",
+        body: include_bytes!(concat!(env!("OUT_DIR"), "/console/app.css")),
+    },
+];
 
 #[derive(Clone)]
 struct Shared {

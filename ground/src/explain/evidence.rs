@@ -1,28 +1,33 @@
-//! What is known of the swarm at a moment.
+//! The evidence about the swarm at a moment.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
+use nalgebra::Vector3;
 use skein_dbp::{Board, Happened, NodeName};
 use skein_wire::State;
 use skein_wire::event::{Advance, Declared as _, Enter, Events as _, Goto, Homeward, Plan, Takeoff};
 
 use super::party::Party;
-use super::stillness::Stillness;
 
-/// How many of a vehicle's latest events are remembered.
+/// The number of a vehicle's latest events that are remembered.
 const EVENTS_KEPT: usize = 4;
 /// Of how many b-threads of a node it is remembered that they ask for movement: quotas of the bids allow no more names.
 const MOST_MOVERS: usize = 64;
-/// What a vehicle's movement is made of, take-off apart.
+/// The events that make up a vehicle's movement, take-off apart.
 type Moves = (Goto, Plan, Advance, Homeward, Enter);
 
-/// What has been heard up to a moment: feed it in the order in which it was heard.
+/// A vehicle that stays this near to a place stands still, m: a hovering one sways.
+const RADIUS_M: f64 = 0.5;
+/// Only who has stayed this long stands still; others turn around.
+const LEAST: Duration = Duration::from_secs(2);
+
+/// Everything heard up to a moment: feed it in the order in which it was heard.
 #[derive(Clone, Debug, Default)]
 pub struct Evidence {
     vehicles: BTreeMap<NodeName, Vehicle>,
     boards: BTreeMap<NodeName, Noted<Board>>,
-    /// Who has requested a take-off, of any vehicle.
+    /// The b-threads that have requested a take-off, of any vehicle.
     launchers: BTreeSet<Party>,
 }
 
@@ -33,7 +38,7 @@ pub(super) struct Noted<T> {
     pub(super) what: T,
 }
 
-/// What is known of one vehicle.
+/// The evidence about one vehicle.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Vehicle {
     pub(super) state: Option<Noted<State>>,
@@ -113,5 +118,41 @@ impl Vehicle {
         let mut events: Vec<&Happened> = self.events.iter().chain(&self.leave).collect();
         events.sort_by_key(|happened| happened.at);
         events.into_iter().rev().take(EVENTS_KEPT)
+    }
+}
+
+/// The place that a vehicle was last seen to come to, and when.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Stillness(Option<(Vector3<f64>, Duration)>);
+
+impl Stillness {
+    /// At `now` the vehicle is at `position`, metres.
+    pub(super) fn note(&mut self, now: Duration, position: &Vector3<f64>) {
+        if self.0.is_none_or(|(place, _)| (place - position).norm() > RADIUS_M) {
+            self.0 = Some((*position, now));
+        }
+    }
+
+    /// Since when it stands still; none if it moves, or has just come to a halt.
+    pub(super) fn since(&self, now: Duration) -> Option<Duration> {
+        self.0.map(|(_, since)| since).filter(|since| now.saturating_sub(*since) >= LEAST)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_sways_stands_still_and_who_creeps_does_not() {
+        let (mut sways, mut flies) = (Stillness::default(), Stillness::default());
+        for tenth in 0..100_u32 {
+            let (now, t) = (Duration::from_millis(u64::from(tenth) * 100), f64::from(tenth) / 10.0);
+            sways.note(now, &Vector3::new((3.0 * t).sin() * 0.2, 0.0, 2.0));
+            flies.note(now, &Vector3::new(0.4 * t, 0.0, 2.0));
+            assert_eq!(flies.since(now), None, "at {t} s");
+        }
+        assert_eq!(sways.since(Duration::from_millis(1900)), None);
+        assert_eq!(sways.since(Duration::from_secs(10)), Some(Duration::ZERO));
     }
 }

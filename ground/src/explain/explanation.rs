@@ -1,4 +1,4 @@
-//! What is said of a vehicle: for people as text, for programs as JSON.
+//! The explanation of a vehicle: for people as text, for programs as JSON.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use skein_dbp::Happened;
 
-/// Who is slower than this does not get anywhere, m/s.
+/// A vehicle slower than this does not get anywhere, m/s.
 const SLOW_M_S: f64 = 0.2;
 
 /// Why a vehicle does what it does at a moment, and what would have to change for it to move if it stands still.
@@ -19,15 +19,15 @@ pub struct Explanation {
     pub time_s: f64,
     /// Where it is and what it does; none of one that has not been heard.
     pub situation: Option<Situation>,
-    /// What has happened at it last, newest first.
+    /// Its latest events, newest first.
     pub events: Vec<EventNote>,
-    /// What is requested of it now, by its own b-threads and by others.
+    /// The requests for its events now, by its own b-threads and by others.
     pub requests: Vec<Request>,
     /// The limits on its motion, and whose they are.
     pub limits: Vec<String>,
-    /// What would let it move: one will do. Empty while it moves.
+    /// The changes that would let it move: one will do. Empty while it moves.
     pub changes: Vec<Change>,
-    /// What all this cannot be sure of.
+    /// The doubts about all this.
     pub doubts: Vec<String>,
 }
 
@@ -35,11 +35,11 @@ pub struct Explanation {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Situation {
-    /// How old this is.
+    /// The age of this.
     pub age_s: f64,
     /// The autopilot's mode.
     pub mode: String,
-    /// What the vehicle is about, as it says.
+    /// The vehicle's task, as it says.
     pub task: String,
     /// Whether its motors are armed.
     pub armed: bool,
@@ -62,7 +62,7 @@ pub struct EventNote {
     pub event: String,
     /// Where it was decided.
     pub home: String,
-    /// Who requested it; nobody if the node reports it.
+    /// The b-threads that requested it; none if the node reports it.
     pub requested_by: Vec<String>,
     /// At which priority, and which requests it went before.
     pub choice: Option<String>,
@@ -77,11 +77,11 @@ pub struct Request {
     pub by: String,
     /// At which priority.
     pub priority: Option<i32>,
-    /// Who blocks it at its home.
+    /// The b-threads that block it at its home.
     pub blocked_by: Vec<Blocker>,
 }
 
-/// Who blocks a request.
+/// A b-thread that blocks a request.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Blocker {
@@ -89,7 +89,7 @@ pub struct Blocker {
     pub bthread: String,
     /// Whether it runs where it blocks.
     pub local: bool,
-    /// How long ago it renewed its block, if that comes from elsewhere.
+    /// The time since it renewed its block, if that comes from elsewhere.
     pub lease_age_s: Option<f64>,
     /// After what age the block lapses.
     pub lease_s: Option<f64>,
@@ -121,7 +121,6 @@ impl From<&Happened> for EventNote {
 
 impl Explanation {
     /// The first line: what the vehicle does, where, and since when.
-    #[must_use]
     pub fn headline(&self) -> String {
         let Some(situation) = &self.situation else { return format!("{}: never heard", self.vehicle) };
         let Situation { mode, task, position: [x, y, z], speed_m_s, still_since_s, age_s, .. } = situation;

@@ -1,4 +1,4 @@
-//! Who keeps a vehicle from moving, and who keeps them.
+//! The chain of b-threads that keep a vehicle from moving.
 
 use std::collections::BTreeSet;
 
@@ -21,20 +21,20 @@ const LONGEST_CHAIN: usize = 8;
 const MOST_FOLLOWED: usize = 4;
 /// B-threads that are asked in all: boards may be as tangled as those who bid like.
 const MOST_ASKED: usize = 256;
-/// What a standing vehicle lacks first; other requests come after these.
+/// The requests that a standing vehicle lacks first; others come after these.
 type First = (Advance, Homeward, Enter, Takeoff, Goto);
 
 /// Follows who waits for whom, from one vehicle on.
 pub(super) struct Inquiry<'a> {
     evidence: &'a Evidence,
     vehicle: &'a NodeName,
-    /// Who waits for whom, so far.
+    /// The chain of b-threads that wait for one another, so far.
     path: Vec<Party>,
     /// The same in sentences.
     because: Vec<String>,
-    /// Whose reasons have been given.
+    /// The b-threads whose reasons have been given.
     asked: BTreeSet<Party>,
-    /// How many more may be asked.
+    /// The number of b-threads that may still be asked.
     left: usize,
     changes: Vec<Change>,
 }
@@ -245,7 +245,6 @@ impl<'a> Inquiry<'a> {
         }
     }
 
-    /// The request of `party` as its home has it.
     fn find_at_home(&self, party: &Party, request: &'a BoardRequest) -> Option<Found<'a>> {
         let home = first_two_chunks(request.event.name()).and_then(|home| NodeName::new(home).ok());
         let home = self.board(home.as_ref().unwrap_or(&party.node))?;
@@ -302,7 +301,7 @@ impl<'a> Inquiry<'a> {
         }
     }
 
-    /// What `party` is called when one speaks of the vehicle.
+    /// The name of `party` when one speaks of the vehicle.
     fn name(&self, party: &Party) -> String {
         party.name_at(self.vehicle)
     }

@@ -30,7 +30,6 @@ mod explanation;
 mod inquiry;
 mod party;
 mod recorded;
-mod stillness;
 mod waits;
 
 use std::time::Duration;
@@ -49,8 +48,7 @@ use self::party::Party;
 /// A board that is older than this may no longer be so: its node tells it anew every three seconds.
 const OLD_BOARD: Duration = Duration::from_secs(5);
 
-/// What can be said of a vehicle at `now`; none of one that nobody has named.
-#[must_use]
+/// The explanation of a vehicle at `now`; none of one that nobody has named.
 pub fn explain(evidence: &Evidence, now: Duration, vehicle: &NodeName) -> Option<Explanation> {
     let known = evidence.vehicle(vehicle)?;
     let board = evidence.board(vehicle);
@@ -86,7 +84,7 @@ pub fn explain(evidence: &Evidence, now: Duration, vehicle: &NodeName) -> Option
     })
 }
 
-/// What is requested at a node, and who blocks it.
+/// The requests at a node, each with its blockers.
 fn requests(board: &Board) -> Vec<Request> {
     let of_row = |row: &skein_dbp::BoardRow| {
         let (by, priority) = (row.bthread.clone(), row.priority);
@@ -108,7 +106,7 @@ fn limits(board: &Board) -> Limits {
     Limits::of(board.node.as_str(), stated)
 }
 
-/// Who blocks under this name at a node.
+/// The blocker of this name at a node.
 fn blocker(board: &Board, name: &str) -> Blocker {
     let party = Party::read(&board.node, name);
     let lease = board.row(name).and_then(|row| row.lease);
@@ -121,7 +119,7 @@ fn blocker(board: &Board, name: &str) -> Blocker {
     }
 }
 
-/// What the explanation cannot be sure of.
+/// The doubts about the explanation.
 fn doubts(evidence: &Evidence, now: Duration, vehicle: &NodeName) -> Vec<String> {
     let mut doubts = Vec::new();
     match evidence.board(vehicle) {

@@ -22,7 +22,7 @@ impl Party {
         }
     }
 
-    /// What it is called at a node.
+    /// Its name at a node.
     pub(super) fn name_at(&self, node: &NodeName) -> String {
         if self.node == *node { self.bthread.clone() } else { self.to_string() }
     }

@@ -14,24 +14,15 @@ use super::Evidence;
 /// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedError {
-    /// The file cannot be opened.
     #[error("{}: {source}", path.display())]
     Open { path: PathBuf, source: std::io::Error },
-    /// It is no MCAP file, or nothing of it can be read.
     #[error("{} is no recording that can be read: {source}; expected an MCAP file such as mission.mcap", path.display())]
     Unreadable { path: PathBuf, source: McapError },
-    /// A message of Skein's is none.
     #[error("{}: a message on {topic} at {at_s:.3} s cannot be read: {source}", path.display())]
-    Message {
-        path: PathBuf,
-        topic: String,
-        /// When it was recorded, seconds since the run began.
-        at_s: f64,
-        source: DecodeError,
-    },
+    Message { path: PathBuf, topic: String, at_s: f64, source: DecodeError },
 }
 
-/// What a recording holds about who requests, blocks and waits, and about the vehicles. Times are the run's, from 0.
+/// A recording of boards, events and states of vehicles. Times are the run's, from 0.
 pub struct Recorded {
     notes: Vec<(Duration, Note)>,
     span: (Duration, Duration),
@@ -46,9 +37,6 @@ enum Note {
 
 impl Recorded {
     /// Reads a recording. One that was cut short counts as far as it goes.
-    ///
-    /// # Errors
-    /// [`RecordedError`] names the file and what is wrong with it.
     pub fn open(path: &Path) -> Result<Self, RecordedError> {
         let file =
             std::fs::read(path).map_err(|source| RecordedError::Open { path: path.to_owned(), source })?;
@@ -88,25 +76,20 @@ impl Recorded {
     }
 
     /// The times of its first and last message; none if it holds none.
-    #[must_use]
     pub fn span(&self) -> Option<(Duration, Duration)> {
         self.is_begun().then_some(self.span)
     }
 
     /// Whether it was brought to its end, and not cut short.
-    #[must_use]
     pub fn is_complete(&self) -> bool {
         self.complete
     }
 
     /// Whether it tells what b-threads bid; recordings of earlier versions do not.
-    #[must_use]
     pub fn has_boards(&self) -> bool {
         self.notes.iter().any(|(_, note)| matches!(note, Note::Board(_)))
     }
 
-    /// What was known at a time.
-    #[must_use]
     pub fn evidence_at(&self, at: Duration) -> Evidence {
         let mut evidence = Evidence::default();
         for (_, note) in &self.notes {

@@ -1,4 +1,4 @@
-//! What a b-thread waits for, in words.
+//! The events that a b-thread waits for, in words.
 
 use skein_bp::EventSet;
 use skein_dbp::facts::Confirmed;
@@ -7,7 +7,7 @@ use skein_wire::event::{Declared as _, HandBack, OrderGiven, OrderTaken, What};
 
 /// Alternatives that are told one by one.
 const MOST_TOLD: usize = 6;
-/// What an operator may say to free a b-thread, and as the console's buttons name it.
+/// The orders that may free a b-thread, as the console's buttons name them.
 const ORDERS: [(What, &str); 6] = [
     (What::Resume, "Resume"),
     (What::Return, "Return"),
@@ -17,7 +17,7 @@ const ORDERS: [(What, &str); 6] = [
     (What::HandBack, "Hand back"),
 ];
 
-/// What has to happen for a b-thread that waits for `set` to go on; nobody requests any of it.
+/// The ways for a b-thread that waits for `set` to go on; nobody requests any of it.
 pub(super) fn in_words(set: &EventSet, vehicle: &NodeName) -> Vec<String> {
     let mut alternatives = Vec::new();
     split(set, &mut alternatives);
@@ -93,7 +93,6 @@ fn confirmed_at(set: &EventSet) -> Option<&str> {
     (kind == Confirmed::NAME).then_some(node)
 }
 
-/// The one name that all events of the set have.
 fn literal_name(set: &EventSet) -> Option<&str> {
     match set {
         EventSet::Named(name) if name.is_literal() => Some(name.as_str()),

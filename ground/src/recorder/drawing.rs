@@ -74,7 +74,6 @@ pub fn pose(pose: &Isometry3<f64>) -> Pose {
     Pose { position: Some(vector(&pose.translation.vector)), orientation: Some(quaternion(&pose.rotation)) }
 }
 
-/// A vector.
 pub fn vector(v: &Vector3<f64>) -> Vector {
     Vector { x: v.x, y: v.y, z: v.z }
 }

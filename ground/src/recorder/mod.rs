@@ -52,17 +52,16 @@ const WORLD: &str = "world";
 /// Why a recording cannot be made or continued.
 #[derive(Debug, Error)]
 pub enum RecorderError {
-    /// The file cannot be made.
     #[error("cannot record to `{}`: {source}; give a folder that can be written to", path.display())]
     Create { path: PathBuf, source: std::io::Error },
-    /// The file cannot be continued, for instance because the disk is full.
     #[error("recording to `{}` failed: {source}", path.display())]
     Write { path: PathBuf, source: McapError },
 }
 
 /// Writes one mission to a file.
 ///
-/// Times are the run's and should not go back; a message that is late gets the time of the newest before it.
+/// Times are the run's and should not go back; a message that is late gets the time of the newest before it. What
+/// cannot be written is [`RecorderError::Write`].
 ///
 /// ```
 /// use std::time::Duration;
@@ -106,9 +105,6 @@ struct Channel {
 
 impl Recorder {
     /// Makes the file, and the folders above it, if they are missing; a file that is there is replaced.
-    ///
-    /// # Errors
-    /// [`RecorderError::Create`] with the path.
     pub fn create(path: &Path) -> Result<Self, RecorderError> {
         let failed = |source| RecorderError::Create { path: path.to_owned(), source };
         if let Some(folder) = path.parent() {
@@ -135,18 +131,12 @@ impl Recorder {
     }
 
     /// The obstacles of the world, for `/scene`.
-    ///
-    /// # Errors
-    /// [`RecorderError::Write`], as for all that follow.
     pub fn scene(&mut self, now: Duration, solids: &[Solid]) -> Result<(), RecorderError> {
         let entities = vec![drawing::obstacles(timestamp(now), solids)];
         self.write("/scene", now, &SceneUpdate { entities, ..SceneUpdate::default() })
     }
 
     /// The vehicles as spheres that move with their frames, each with its name, for `/scene`.
-    ///
-    /// # Errors
-    /// [`RecorderError::Write`].
     pub fn vehicles(&mut self, now: Duration, hulls: &[(&str, f64)]) -> Result<(), RecorderError> {
         let hull = |(index, (vehicle, radius_m)): (usize, &(&str, f64))| {
             drawing::hull(timestamp(now), vehicle, *radius_m, index)
@@ -156,9 +146,6 @@ impl Recorder {
     }
 
     /// The poses of the vehicles (body FLU to world ENU, metres), for `/tf` and `/uav/N/pose`: all in one call.
-    ///
-    /// # Errors
-    /// [`RecorderError::Write`].
     pub fn poses(&mut self, now: Duration, poses: &[(&str, Isometry3<f64>)]) -> Result<(), RecorderError> {
         if now < self.poses_due {
             return Ok(());
@@ -184,9 +171,6 @@ impl Recorder {
     }
 
     /// The path a vehicle plans to fly (world ENU, metres), for `/uav/N/path`; it replaces the one before.
-    ///
-    /// # Errors
-    /// [`RecorderError::Write`].
     pub fn path(
         &mut self,
         now: Duration,
@@ -198,9 +182,6 @@ impl Recorder {
     }
 
     /// One turn of a vehicle's lidar, for `/uav/N/scan`.
-    ///
-    /// # Errors
-    /// [`RecorderError::Write`].
     pub fn scan(&mut self, now: Duration, vehicle: &str, scan: &Scan) -> Result<(), RecorderError> {
         if self.scans_due.get(vehicle).is_some_and(|due| now < *due) {
             return Ok(());
@@ -220,9 +201,6 @@ impl Recorder {
     }
 
     /// A message for people, for `/log`; `name` is the node or part that speaks.
-    ///
-    /// # Errors
-    /// [`RecorderError::Write`].
     pub fn log(
         &mut self,
         now: Duration,
@@ -241,9 +219,6 @@ impl Recorder {
     }
 
     /// An event that `node` selected or heard of, for `/skein/trace`, at the event's own time.
-    ///
-    /// # Errors
-    /// [`RecorderError::Write`].
     pub fn trace(&mut self, node: &NodeName, happened: &Happened) -> Result<(), RecorderError> {
         let event = TraceEvent::new(node, happened);
         self.write_own("/skein/trace", "skein.TraceEvent", happened.at, &event)
@@ -251,9 +226,6 @@ impl Recorder {
 
     /// The state of a vehicle, for `/uav/N/state`, unless it has been written already; its path has a topic of its
     /// own.
-    ///
-    /// # Errors
-    /// [`RecorderError::Write`].
     pub fn state(&mut self, now: Duration, state: &State) -> Result<(), RecorderError> {
         let made = (state.incarnation, state.time);
         if self.states.get(&state.node).is_some_and(|(last, due)| now < *due || *last == made) {
@@ -265,9 +237,6 @@ impl Recorder {
     }
 
     /// The board of a node, for `/uav/N/board`, unless it has been written already.
-    ///
-    /// # Errors
-    /// [`RecorderError::Write`].
     pub fn board(&mut self, now: Duration, board: &Board) -> Result<(), RecorderError> {
         let made = (board.incarnation, board.at);
         if self.boards.insert(board.node.clone(), made) == Some(made) {
@@ -278,9 +247,6 @@ impl Recorder {
     }
 
     /// Completes the file; a recording that is dropped before is completed too, but cannot tell of errors.
-    ///
-    /// # Errors
-    /// [`RecorderError::Write`].
     pub fn finish(mut self) -> Result<(), RecorderError> {
         match self.writer.finish() {
             Ok(_) => Ok(()),

@@ -63,7 +63,7 @@ use crate::event_set::EventSet;
 use crate::pattern::Pattern;
 use crate::program::Program;
 
-/// How the names of b-threads begin that stand for the world around a program under verification.
+/// Prefix of the names of b-threads that stand for the world around a program under verification.
 pub const WORLD: &str = "world/";
 
 /// The settings of behaviours by their names: the table `[behaviours]` of a configuration.
@@ -125,13 +125,11 @@ impl<'a> Model<'a> {
     }
 
     /// The rules that were added.
-    #[must_use]
     pub fn rules(&self) -> &[Arc<str>] {
         &self.rules
     }
 
     /// The b-threads that stand for the world, by name.
-    #[must_use]
     pub fn world(&self) -> &[Arc<str>] {
         &self.world
     }
@@ -166,13 +164,12 @@ struct Known {
 #[derive(Clone, Default)]
 pub struct Behaviours(BTreeMap<&'static str, Known>);
 
-/// What is wrong with a table `[behaviours]`.
+/// A fault in a table `[behaviours]`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{field}`: {problem}")]
 pub struct BehaviourError {
     /// The field at fault, such as `behaviours.dwell.for_s`.
     pub field: String,
-    /// What is wrong, and what was expected.
     pub problem: String,
 }
 
@@ -275,14 +272,11 @@ impl Chosen {
     }
 
     /// The events that they bring to `node` in which `whose` has a say.
-    #[must_use]
     pub fn events(&self, node: &str, whose: Whose) -> EventSet {
         let declared = self.declarations(node).flatten().filter(|event| event.whose == whose);
         declared.fold(EventSet::None, |set, event| set.or(EventSet::named(format!("{node}/{}", event.name))))
     }
 
-    /// Whether one of those that are for `node` waits for the event of this name.
-    #[must_use]
     pub fn hear(&self, node: &str, event: &str) -> bool {
         self.of(node).any(|choice| choice.known.hears.contains(&event))
     }
@@ -293,7 +287,6 @@ impl Chosen {
     }
 
     /// The settings of those that are for `node`: what its configuration states.
-    #[must_use]
     pub fn settings(&self, node: &str) -> Settings {
         self.of(node).map(|choice| (choice.name.to_owned(), choice.settings.clone())).collect()
     }

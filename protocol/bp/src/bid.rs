@@ -155,7 +155,6 @@ impl Bid {
         self.0.hold_when_lost
     }
 
-    /// The priority, if one was given.
     pub fn given_priority(&self) -> Option<i32> {
         self.0.priority
     }

@@ -9,7 +9,7 @@ use crate::bthread::{AnyBThread, DEFAULT_BTHREAD_PRIORITY};
 use crate::event::Event;
 use crate::event_set::EventSet;
 use crate::index::{Index, Place};
-use crate::strategy::Strategy;
+use crate::program::Strategy;
 
 /// Most bids that stay in the indexes after they were replaced; an event has at most as many candidates too many.
 const BIDS_LEFT_FILED: usize = 16;

@@ -54,7 +54,7 @@ pub struct Declaration {
     pub fields: &'static [Field],
 }
 
-/// Who may have a say in an event.
+/// The nodes that have a say in an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Whose {
     /// Its home alone: from afar it is neither requested nor blocked.
@@ -66,8 +66,6 @@ pub enum Whose {
 }
 
 impl Declaration {
-    /// The field of this name.
-    #[must_use]
     pub fn field(&self, name: &str) -> Option<&'static Field> {
         self.fields.iter().find(|field| field.name == name)
     }
@@ -92,7 +90,6 @@ pub enum Kind {
     Whole,
     Number,
     Text,
-    /// One of these texts.
     Word(&'static [&'static str]),
     /// A datum of this kind, or none.
     Optional(&'static Kind),
@@ -100,7 +97,6 @@ pub enum Kind {
 
 impl Kind {
     /// Whether an event may have this value in a field of this kind.
-    #[must_use]
     pub fn takes(self, value: &Value) -> bool {
         match self {
             Self::Flag => matches!(value, Value::Bool(_)),
@@ -112,8 +108,6 @@ impl Kind {
         }
     }
 
-    /// Whether it is a number, or none.
-    #[must_use]
     pub fn is_number(self) -> bool {
         match self {
             Self::Whole | Self::Number => true,
@@ -200,92 +194,33 @@ pub trait Datum: Sized {
     fn read(value: Option<&Value>) -> Option<Self>;
 }
 
-impl Datum for bool {
-    const KIND: Kind = Kind::Flag;
-    type Plain = Self;
+macro_rules! data {
+    ($($type:ty, $kind:expr, |$own:ident| $write:expr, |$value:ident| $read:expr;)+) => {
+        $(impl Datum for $type {
+            const KIND: Kind = $kind;
+            type Plain = Self;
 
-    fn write(self) -> Option<Value> {
-        Some(self.into())
-    }
+            fn write(self) -> Option<Value> {
+                let $own = self;
+                Some($write.into())
+            }
 
-    fn read(value: Option<&Value>) -> Option<Self> {
-        match value? {
-            Value::Bool(flag) => Some(*flag),
-            _ => None,
-        }
-    }
+            fn read(value: Option<&Value>) -> Option<Self> {
+                let $value = value?;
+                $read
+            }
+        })+
+    };
 }
 
-impl Datum for i64 {
-    const KIND: Kind = Kind::Whole;
-    type Plain = Self;
-
-    fn write(self) -> Option<Value> {
-        Some(self.into())
-    }
-
-    fn read(value: Option<&Value>) -> Option<Self> {
-        value?.as_whole()
-    }
-}
-
-/// A counter. Beyond [`i64::MAX`] it is told as that.
-impl Datum for u64 {
-    const KIND: Kind = Kind::Whole;
-    type Plain = Self;
-
-    fn write(self) -> Option<Value> {
-        Some(i64::try_from(self).unwrap_or(i64::MAX).into())
-    }
-
-    fn read(value: Option<&Value>) -> Option<Self> {
-        value?.as_whole()?.try_into().ok()
-    }
-}
-
-impl Datum for f64 {
-    const KIND: Kind = Kind::Number;
-    type Plain = Self;
-
-    fn write(self) -> Option<Value> {
-        Some(self.into())
-    }
-
-    fn read(value: Option<&Value>) -> Option<Self> {
-        value?.as_number()
-    }
-}
-
-impl Datum for Arc<str> {
-    const KIND: Kind = Kind::Text;
-    type Plain = Self;
-
-    fn write(self) -> Option<Value> {
-        Some(self.into())
-    }
-
-    fn read(value: Option<&Value>) -> Option<Self> {
-        match value? {
-            Value::Text(text) => Some(text.clone()),
-            _ => None,
-        }
-    }
-}
-
-impl Datum for String {
-    const KIND: Kind = Kind::Text;
-    type Plain = Self;
-
-    fn write(self) -> Option<Value> {
-        Some(self.into())
-    }
-
-    fn read(value: Option<&Value>) -> Option<Self> {
-        match value? {
-            Value::Text(text) => Some((**text).to_owned()),
-            _ => None,
-        }
-    }
+data! {
+    bool, Kind::Flag, |flag| flag, |value| value.as_flag();
+    i64, Kind::Whole, |whole| whole, |value| value.as_whole();
+    // A counter beyond `i64::MAX` is told as that.
+    u64, Kind::Whole, |count| i64::try_from(count).unwrap_or(i64::MAX), |value| value.as_whole()?.try_into().ok();
+    f64, Kind::Number, |number| number, |value| value.as_number();
+    Arc<str>, Kind::Text, |text| text, |value| value.as_text().cloned();
+    String, Kind::Text, |text| text, |value| value.as_text().map(|text| text.to_string());
 }
 
 /// A datum of another kind than `T` counts as none.
@@ -311,13 +246,11 @@ impl Field {
     }
 
     /// Whether a number is within the range, if there is one of each.
-    #[must_use]
     pub fn takes_number(&self, number: Option<f64>) -> bool {
         number.zip(self.range.as_ref()).is_none_or(|(number, range)| range.contains(&number))
     }
 
-    /// What it may be, in words: `number in m, at least 0`.
-    #[must_use]
+    /// The values it may have, in words: `number in m, at least 0`.
     pub fn expected(&self) -> String {
         let unit = if self.unit.is_empty() { String::new() } else { format!(" in {}", self.unit) };
         let range = match self.range.as_ref().map(|range| (range.start(), range.end())) {
@@ -332,7 +265,6 @@ impl Field {
     }
 }
 
-/// The events that have this datum.
 #[doc(hidden)]
 pub fn with_datum(name: &'static str, datum: impl Datum) -> EventSet {
     datum.write().map_or(EventSet::None, |value| EventSet::field_is(name, value))
@@ -377,7 +309,6 @@ macro_rules! event {
         impl $name {
             $(
                 #[doc = concat!("The events whose `", stringify!($field), "` is this.")]
-                #[must_use]
                 $vis fn $field(value: impl Into<<$type as $crate::catalogue::Datum>::Plain>) -> $crate::EventSet {
                     $crate::catalogue::with_datum(stringify!($field), value.into())
                 }
@@ -448,12 +379,10 @@ macro_rules! words {
             /// Their words, in the same order.
             pub const WORDS: &[&str] = &[$($word),+];
 
-            #[must_use]
             pub const fn word(self) -> &'static str {
                 match self { $(Self::$variant => $word),+ }
             }
 
-            #[must_use]
             pub fn of_word(word: &str) -> Option<Self> {
                 match word { $($word => Some(Self::$variant),)+ _ => None }
             }
@@ -474,10 +403,7 @@ macro_rules! words {
             }
 
             fn read(value: Option<&$crate::Value>) -> Option<Self> {
-                match value? {
-                    $crate::Value::Text(word) => Self::of_word(word),
-                    _ => None,
-                }
+                Self::of_word(value?.as_text()?)
             }
         }
 

@@ -13,7 +13,6 @@ pub struct Malformed {
     pub column: usize,
     /// The path of the field, such as `vehicle[2].start_m`; empty for the whole.
     pub field: String,
-    /// What was found, and what was expected.
     pub problem: String,
 }
 
@@ -30,9 +29,6 @@ impl fmt::Display for Malformed {
 impl std::error::Error for Malformed {}
 
 /// Reads a configuration.
-///
-/// # Errors
-/// [`Malformed`] at the first thing that is not as expected.
 pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, Malformed> {
     let malformed = |error: &toml::de::Error, field: String| {
         let (line, column) = line_and_column(text, error.span().map_or(0, |span| span.start));

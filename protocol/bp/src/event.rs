@@ -93,18 +93,12 @@ impl Event {
 
     /// The text under `key`.
     pub fn text(&self, key: &str) -> Option<&str> {
-        match self.get(key)? {
-            Value::Text(text) => Some(text),
-            _ => None,
-        }
+        self.get(key)?.as_text().map(|text| &**text)
     }
 
     /// The truth value under `key`.
     pub fn bool(&self, key: &str) -> Option<bool> {
-        match self.get(key)? {
-            Value::Bool(b) => Some(*b),
-            _ => None,
-        }
+        self.get(key)?.as_flag()
     }
 
     /// All data, in key order.

@@ -51,7 +51,6 @@ pub enum EventSet {
         /// The greatest corner.
         max: [Real; 3],
     },
-    /// Events that are not in the set.
     Not(Box<EventSet>),
     /// Events in each of the sets; of no sets: every event.
     And(Vec<EventSet>),
@@ -85,7 +84,6 @@ impl EventSet {
         Self::Region { min: min.map(Real::from), max: max.map(Real::from) }
     }
 
-    /// Events in one of the sets.
     pub fn any_of<S: Into<EventSet>>(sets: impl IntoIterator<Item = S>) -> Self {
         sets.into_iter().fold(Self::None, |union, set| union.or(set))
     }
@@ -232,7 +230,6 @@ impl EventSet {
     }
 
     /// The set without those alternatives that surely hold nothing of `other`, judged by names alone.
-    #[must_use]
     pub fn about(&self, other: &EventSet) -> EventSet {
         match self {
             Self::Or(sets) => Self::any_of(sets.iter().map(|set| set.about(other))),

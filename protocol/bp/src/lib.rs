@@ -37,7 +37,6 @@ mod board;
 mod bthread;
 pub mod catalogue;
 pub mod configuration;
-pub mod conformance;
 mod event;
 mod event_set;
 mod explain;
@@ -48,7 +47,6 @@ mod program;
 mod scope;
 pub mod script;
 mod selection;
-mod strategy;
 mod tie;
 mod value;
 pub mod verify;
@@ -59,9 +57,8 @@ pub use event::Event;
 pub use event_set::EventSet;
 pub use explain::Explanation;
 pub use pattern::Pattern;
-pub use program::{PASSED_OVER_LIMIT, Program, ProgramConfig, ProgramError};
+pub use program::{PASSED_OVER_LIMIT, Program, ProgramConfig, ProgramError, Strategy};
 pub use selection::{Names, Origin, Rival, Selection};
-pub use strategy::Strategy;
 pub use value::{Real, Value};
 
 // `words!` writes it out where it is called.

@@ -2,7 +2,6 @@
 
 mod asking;
 mod config;
-mod error;
 mod parts;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -18,12 +17,22 @@ use crate::index::Place;
 use crate::selection::{Names, Origin, Rival, Selection};
 use crate::tie::TieBreak;
 
-pub use config::{PASSED_OVER_LIMIT, ProgramConfig};
-pub use error::ProgramError;
+pub use config::{PASSED_OVER_LIMIT, ProgramConfig, Strategy};
 pub(crate) use parts::Rest;
 
 /// Spawns in one selection, or rounds of deadlines in one step, after which they count as endless.
 const RUNAWAY_LIMIT: usize = 1000;
+
+/// The reason why a program cannot go on.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ProgramError {
+    #[error("the superstep did not settle within {limit} selections; look at the b-threads that kept requesting: {}", .bthreads.join(", "))]
+    Unsettled { limit: u32, bthreads: Vec<Arc<str>>, selections: Vec<Selection> },
+    #[error("b-thread `{bthread}` failed: {message}")]
+    Failed { bthread: Arc<str>, message: String },
+    #[error("`{event}` is not selectable now; selectable are {selectable:?}")]
+    NotSelectable { event: Event, selectable: Vec<Event> },
+}
 
 /// A behavioural program: b-threads, the events that wait to happen, and the rules by which they do.
 ///

@@ -3,7 +3,6 @@
 use std::fmt;
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
 use crate::event::Event;
@@ -11,25 +10,15 @@ use crate::event::Event;
 /// Names of b-threads. Most events move one or two, which need no allocation.
 pub type Names = SmallVec<[Arc<str>; 2]>;
 
-/// The source of a selected event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Origin {
-    /// Requested by a b-thread or a proxy.
-    Internal,
-    /// Taken from the external queue.
-    External,
-    /// Selected elsewhere and delivered here as a fact.
-    Occurred,
-}
-
-impl fmt::Display for Origin {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Internal => "internal",
-            Self::External => "external",
-            Self::Occurred => "occurred",
-        })
+crate::words! {
+    /// The source of a selected event.
+    pub enum Origin {
+        /// Requested by a b-thread or a proxy.
+        Internal = "internal",
+        /// Taken from the external queue.
+        External = "external",
+        /// Selected elsewhere and delivered here as a fact.
+        Occurred = "occurred",
     }
 }
 
@@ -58,7 +47,6 @@ pub struct Selection {
 pub struct Rival {
     pub bthread: Arc<str>,
     pub event: Event,
-    /// At which priority.
     pub priority: Option<i32>,
     /// Whether somebody blocked it; if not, its priority was lower, or it lost the tie.
     pub blocked: bool,

@@ -88,7 +88,6 @@ pub enum Value {
     Int(i64),
     /// A real number, in the unit its key names.
     Real(Real),
-    /// A text.
     Text(Arc<str>),
 }
 
@@ -160,6 +159,14 @@ impl Value {
         }
     }
 
+    pub fn as_flag(&self) -> Option<bool> {
+        if let Self::Bool(flag) = self { Some(*flag) } else { None }
+    }
+
+    pub fn as_text(&self) -> Option<&Arc<str>> {
+        if let Self::Text(text) = self { Some(text) } else { None }
+    }
+
     /// The whole number held, `2.0` included; `None` for others.
     pub fn as_whole(&self) -> Option<i64> {
         match self {
@@ -179,53 +186,18 @@ impl Value {
     }
 }
 
-impl From<bool> for Value {
-    fn from(value: bool) -> Self {
-        Self::Bool(value)
-    }
+macro_rules! from_plain {
+    ($($plain:ty => $kind:ident),+) => {
+        $(impl From<$plain> for Value {
+            fn from(value: $plain) -> Self {
+                Self::$kind(value.into())
+            }
+        })+
+    };
 }
 
-impl From<i64> for Value {
-    fn from(value: i64) -> Self {
-        Self::Int(value)
-    }
-}
-
-impl From<i32> for Value {
-    fn from(value: i32) -> Self {
-        Self::Int(value.into())
-    }
-}
-
-impl From<u32> for Value {
-    fn from(value: u32) -> Self {
-        Self::Int(value.into())
-    }
-}
-
-impl From<f64> for Value {
-    fn from(value: f64) -> Self {
-        Self::Real(value.into())
-    }
-}
-
-impl From<&str> for Value {
-    fn from(value: &str) -> Self {
-        Self::Text(value.into())
-    }
-}
-
-impl From<String> for Value {
-    fn from(value: String) -> Self {
-        Self::Text(value.into())
-    }
-}
-
-impl From<Arc<str>> for Value {
-    fn from(value: Arc<str>) -> Self {
-        Self::Text(value)
-    }
-}
+from_plain!(bool => Bool, i64 => Int, i32 => Int, u32 => Int, f64 => Real);
+from_plain!(&str => Text, String => Text, Arc<str> => Text);
 
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -1,6 +1,8 @@
 //! The kernel against conformance cases, and the runner against itself.
 
-use skein_bp::conformance::Suite;
+mod suite;
+
+use suite::Suite;
 
 #[test]
 fn own_cases_hold() {

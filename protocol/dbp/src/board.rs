@@ -34,7 +34,7 @@ pub struct BoardRow {
     pub blocks: EventSet,
     /// The events that end it; not known of b-threads elsewhere.
     pub interrupts: EventSet,
-    /// What it states to hold meanwhile.
+    /// The statements that hold meanwhile.
     pub states: Vec<Event>,
     /// The priority of its requests.
     pub priority: Option<i32>,
@@ -74,7 +74,6 @@ impl Board {
     pub const MAX_SIZE: usize = 128 << 10;
 
     /// A board of these rows, cut to the quotas.
-    #[must_use]
     pub fn new(node: NodeName, incarnation: u64, at: Duration, rows: Vec<BoardRow>) -> Self {
         let (given, mut room) = (rows.len(), Self::MAX_SIZE);
         let fits = |row: BoardRow| {
@@ -88,13 +87,11 @@ impl Board {
     }
 
     /// The bid of a b-thread of this name here.
-    #[must_use]
     pub fn row(&self, bthread: &str) -> Option<&BoardRow> {
         self.rows.iter().find(|row| row.bthread == bthread)
     }
 
     /// Whether this says the same as an `earlier` one, but for the time that has passed.
-    #[must_use]
     pub fn repeats(&self, earlier: &Self) -> bool {
         (&self.node, self.incarnation, self.left_out)
             == (&earlier.node, earlier.incarnation, earlier.left_out)
@@ -103,7 +100,6 @@ impl Board {
     }
 
     /// Whether the same requests as on an `earlier` one are blocked, by the same b-threads.
-    #[must_use]
     pub fn stalls_as(&self, earlier: &Self) -> bool {
         self.blocked().eq(earlier.blocked())
     }
@@ -117,7 +113,6 @@ impl Board {
 
 impl BoardRow {
     /// The row of a b-thread at its own node; `blockers` gives who blocks an event there.
-    #[must_use]
     pub fn new(bthread: impl Into<String>, bid: &Bid, blockers: impl Fn(&Event) -> Vec<String>) -> Self {
         let request = |event: &Event| BoardRequest { event: event.clone(), blocked_by: blockers(event) };
         Self {

@@ -16,7 +16,6 @@ pub(crate) const LEAST_LEASE: Duration = Duration::from_millis(10);
 /// The settings of a [`Node`](crate::Node): itself and the fleet.
 #[derive(Clone, Debug)]
 pub struct NodeConfig {
-    /// Its own name.
     pub name: NodeName,
     /// Its incarnation: a durable counter that grows with each start.
     pub incarnation: u64,
@@ -56,7 +55,6 @@ pub struct NodeConfig {
 
 impl NodeConfig {
     /// The usual settings for a node in a fleet.
-    #[must_use]
     pub fn new(name: NodeName, incarnation: u64, roster: Vec<NodeName>) -> Self {
         let gateway = EventSet::named(name.event_name("order"));
         Self {

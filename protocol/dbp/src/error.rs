@@ -12,21 +12,8 @@ pub enum NodeError {
     /// The program cannot go on.
     #[error(transparent)]
     Program(#[from] ProgramError),
-    /// The b-threads kept requesting.
     #[error("{node}: the step did not settle within {limit} selections; look at the b-threads that kept requesting: {}", .bthreads.join(", "))]
-    Unsettled {
-        node: NodeName,
-        /// The limit, from [`NodeConfig::settle_limit`](crate::NodeConfig::settle_limit).
-        limit: usize,
-        /// The b-threads that requested the last events.
-        bthreads: Vec<Arc<str>>,
-    },
-    /// A b-thread requests events of two homes at one synchronisation point, so that both could occur.
+    Unsettled { node: NodeName, limit: usize, bthreads: Vec<Arc<str>> },
     #[error("{node}: b-thread `{bthread}` requests events of {} at one synchronisation point; request at one home only", .homes.join(" and "))]
-    TwoHomes {
-        node: NodeName,
-        /// The b-thread at fault.
-        bthread: String,
-        homes: Vec<String>,
-    },
+    TwoHomes { node: NodeName, bthread: String, homes: Vec<String> },
 }

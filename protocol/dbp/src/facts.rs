@@ -127,19 +127,16 @@ skein_bp::events! {
 }
 
 /// All facts of `node`.
-#[must_use]
 pub fn all(node: &NodeName) -> EventSet {
     EventSet::any_of(FACTS.iter().map(|fact| EventSet::named(node.event_name(fact.name))))
 }
 
 /// [`Confirmed`] for one b-thread of `node`: what a b-thread waits for after it has stated its block.
-#[must_use]
 pub fn confirmed(node: &NodeName, bthread: &str) -> EventSet {
     Confirmed::any_at(node).and(Confirmed::bthread(bthread))
 }
 
 /// [`BlockLapsed`] for one b-thread of `node`.
-#[must_use]
 pub fn block_lapsed(node: &NodeName, bthread: &str) -> EventSet {
     BlockLapsed::any_at(node).and(BlockLapsed::bthread(bthread))
 }

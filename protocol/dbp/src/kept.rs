@@ -33,7 +33,6 @@ pub struct KeptBlock {
     /// The life of that node in which the block was stated last, or another of its lives that have ended.
     pub incarnation: u64,
     pub bthread: String,
-    /// At which of its synchronisation points.
     pub sync: u64,
     pub block: EventSet,
 }

@@ -49,7 +49,6 @@ mod channel;
 mod clock;
 mod config;
 mod error;
-mod explain;
 pub mod facts;
 mod guest;
 mod history;
@@ -70,7 +69,6 @@ pub use board::{Board, BoardLease, BoardRequest, BoardRow};
 pub use channel::peers::Peer;
 pub use config::NodeConfig;
 pub use error::NodeError;
-pub use explain::NodeExplanation;
 pub use home::authority::{Authority, Grant, Role, SCRIPT};
 pub use home::table::RemoteParty;
 pub use joint::roster::{Roster, RosterError, SWARM};
@@ -82,6 +80,6 @@ pub use message::{
 #[cfg(feature = "mutants")]
 pub use mutant::Mutant;
 pub use name::{NodeName, NodeNameError, first_two_chunks, is_chunk};
-pub use node::{Node, NodeStats};
+pub use node::{Node, NodeExplanation, NodeStats};
 pub use rule::{Lift, NewRoster, RULES};
 pub use run::{BoardChange, ChannelMove, Happened};

@@ -34,8 +34,6 @@ pub enum Message {
 }
 
 impl Message {
-    /// The node that speaks.
-    #[must_use]
     pub fn sender(&self) -> &NodeName {
         match self {
             Self::Bid(bid) => &bid.node,
@@ -101,7 +99,6 @@ impl RemoteBid {
     const MOST_REQUESTS: usize = 64;
 
     /// Whether a home takes it in at this place, counted from 0, among its sender's bids there.
-    #[must_use]
     pub fn is_within_quota(&self, place: usize) -> bool {
         place < Self::MOST_BIDS && self.requests.len() <= Self::MOST_REQUESTS
     }
@@ -141,7 +138,6 @@ pub struct BidAck {
 pub struct Refusal {
     /// The b-thread whose bid it is.
     pub bthread: String,
-    /// Its synchronisation point.
     pub sync: u64,
     pub reason: RefusalReason,
 }
@@ -174,7 +170,6 @@ skein_bp::words! {
 
 impl RefusalReason {
     /// Whether a bid refused for this reason blocks nothing.
-    #[must_use]
     pub fn voids_block(self) -> bool {
         matches!(
             self,
@@ -196,7 +191,6 @@ pub struct ServedRequest {
     pub incarnation: u64,
     /// The b-thread that requested.
     pub bthread: String,
-    /// At which of its synchronisation points.
     pub sync: u64,
 }
 
@@ -212,7 +206,6 @@ pub struct Occurrence {
     /// 0.
     pub term: u64,
     pub event: Event,
-    /// The remote requests it served.
     pub requests_served: Vec<ServedRequest>,
     /// The b-threads that requested it, as the home names them: remote ones as `node#bthread`. For people.
     pub requested_by: Vec<Arc<str>>,
@@ -226,7 +219,6 @@ pub struct Occurrence {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Repair {
     pub home: NodeName,
-    /// Of which of its lives.
     pub incarnation: u64,
     /// First number missed.
     pub from_seq: u64,
@@ -257,7 +249,6 @@ pub struct Presence {
 /// A node's word on joint events, in its sign of life (G8).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JointWord {
-    /// The term that the node is in.
     pub term: u64,
     /// The coordinator: how many decisions the term has seen; a member: how many of them it has applied.
     pub decided: u64,

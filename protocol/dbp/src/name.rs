@@ -2,7 +2,6 @@
 
 use std::borrow::Borrow;
 use std::fmt;
-use std::str::FromStr;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -26,7 +25,6 @@ pub struct NodeName(Arc<str>);
     "`{given}` is not a node name: expected two chunks of letters, digits, `_`, `.` or `-`, such as `uav/3`, of at most {MAX_LENGTH} bytes"
 )]
 pub struct NodeNameError {
-    /// The text at fault.
     pub given: String,
 }
 
@@ -41,25 +39,21 @@ impl NodeName {
     }
 
     /// The name as text, `uav/3`.
-    #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }
 
     /// The first chunk: what kind of node this is, `uav`.
-    #[must_use]
     pub fn kind(&self) -> &str {
         self.0.split('/').next().unwrap_or_default()
     }
 
     /// The second chunk: which of its kind, `3`.
-    #[must_use]
     pub fn id(&self) -> &str {
         self.0.split('/').nth(1).unwrap_or_default()
     }
 
     /// The name of this node's event `what`: `uav/3/takeoff` for `takeoff`.
-    #[must_use]
     pub fn event_name(&self, what: &str) -> String {
         format!("{}/{what}", self.0)
     }
@@ -80,10 +74,7 @@ impl Datum for NodeName {
     }
 
     fn read(value: Option<&Value>) -> Option<Self> {
-        match value? {
-            Value::Text(text) => is_name(text).then(|| Self(text.clone())),
-            _ => None,
-        }
+        value?.as_text().filter(|text| is_name(text)).cloned().map(Self)
     }
 }
 
@@ -94,7 +85,6 @@ impl From<&NodeName> for NodeName {
 }
 
 /// Whether `text` may be one chunk of a name.
-#[must_use]
 pub fn is_chunk(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'.' | b'-'))
 }
@@ -102,7 +92,6 @@ pub fn is_chunk(text: &str) -> bool {
 /// The first two chunks of an event's name, if it has more than two: `uav/3` for `uav/3/order/land`.
 ///
 /// An event of fewer chunks has no home: it is local to whoever selects it and never travels.
-#[must_use]
 pub fn first_two_chunks(event_name: &str) -> Option<&str> {
     let first = event_name.find('/')?;
     let second = first + 1 + event_name.get(first + 1..)?.find('/')?;
@@ -112,14 +101,6 @@ pub fn first_two_chunks(event_name: &str) -> Option<&str> {
 impl fmt::Display for NodeName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
-    }
-}
-
-impl FromStr for NodeName {
-    type Err = NodeNameError;
-
-    fn from_str(name: &str) -> Result<Self, NodeNameError> {
-        Self::new(name)
     }
 }
 

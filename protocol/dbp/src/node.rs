@@ -6,10 +6,11 @@ mod standing;
 mod stepping;
 
 use std::collections::BTreeSet;
+use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use skein_bp::{Event, EventSet, Program, ProgramError, Selection};
+use skein_bp::{Event, EventSet, Explanation, Program, ProgramError, Selection};
 
 use crate::board::{Board, BoardLease, BoardRow};
 use crate::channel::Channel;
@@ -17,10 +18,10 @@ use crate::channel::peers::Peer;
 use crate::clock::Clock;
 use crate::config::NodeConfig;
 use crate::error::NodeError;
-use crate::explain::NodeExplanation;
 use crate::facts::Misdirected;
 use crate::guest::Guest;
 use crate::home::Home;
+use crate::home::table::RemoteParty;
 use crate::joint::Joint;
 use crate::joint::roster::Roster;
 use crate::kept::Kept;
@@ -69,7 +70,6 @@ pub(crate) type Select<'a> =
 /// Making and feeding a node.
 impl Node {
     /// A node that runs `program`. Settings out of their range are brought into it.
-    #[must_use]
     pub fn new(config: NodeConfig, program: Program) -> Self {
         let mut config = config.in_range();
         let Kept { blocks, roster, term, mut decisions } = std::mem::take(&mut config.kept);
@@ -137,7 +137,6 @@ impl Node {
     }
 
     /// The promises that must outlive this node.
-    #[must_use]
     pub fn kept(&self) -> Kept {
         let roster = self.joint.roster();
         Kept {
@@ -149,7 +148,6 @@ impl Node {
     }
 
     /// The roster of joint events in the present term.
-    #[must_use]
     pub fn roster(&self) -> Option<&Roster> {
         self.joint.roster()
     }
@@ -172,7 +170,6 @@ impl Node {
     }
 
     /// When [`step`](Self::step) is due even if no message comes.
-    #[must_use]
     pub fn next_deadline(&self) -> Duration {
         if self.clock.started.is_none() || !self.run.news.is_empty() {
             return self.clock.now();
@@ -192,17 +189,14 @@ impl Node {
 
 /// Asking a node.
 impl Node {
-    #[must_use]
     pub fn name(&self) -> &NodeName {
         &self.config.name
     }
 
-    #[must_use]
     pub fn incarnation(&self) -> u64 {
         self.config.incarnation
     }
 
-    #[must_use]
     pub fn program(&self) -> &Program {
         &self.run.program
     }
@@ -217,7 +211,6 @@ impl Node {
         self.channel.peers.iter()
     }
 
-    #[must_use]
     pub fn stats(&self) -> NodeStats {
         self.stats
     }
@@ -229,7 +222,6 @@ impl Node {
 
     /// The b-threads that request, block and wait for the events of a set, and behind each remote one its node and the
     /// age of its lease: `node.explain("uav/3/takeoff")`.
-    #[must_use]
     pub fn explain(&self, question: impl Into<EventSet>) -> NodeExplanation {
         let local = self.run.program.explain(question);
         let requesters = local.requested.iter().map(|(name, _)| name);
@@ -241,7 +233,6 @@ impl Node {
     }
 
     /// Every bid on this node's table now.
-    #[must_use]
     pub fn board(&self) -> Board {
         let (program, now) = (&self.run.program, self.clock.now());
         let blockers = |event: &Event| match self.routes().of(event) {
@@ -263,5 +254,25 @@ impl Node {
 
     fn routes(&self) -> Routes<'_> {
         Routes { here: &self.home.events, roster: self.joint.roster(), peers: &self.channel.peers }
+    }
+}
+
+/// The program's explanation, and the remote b-threads behind the proxies in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NodeExplanation {
+    /// The b-threads that request, block and wait for the events asked about; remote ones as `node#bthread`.
+    pub local: Explanation,
+    /// The remote b-threads among them.
+    pub remote: Vec<RemoteParty>,
+}
+
+impl fmt::Display for NodeExplanation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.local.fmt(f)?;
+        for RemoteParty { node, bthread, lease_age, lease } in &self.remote {
+            let (age, lease) = (lease_age.as_secs_f64(), lease.as_secs_f64());
+            writeln!(f, "  {node}#{bthread} was renewed {age:.2} s ago and lapses at {lease:.2} s")?;
+        }
+        Ok(())
     }
 }

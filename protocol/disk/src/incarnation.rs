@@ -11,10 +11,8 @@ use crate::node_file::path_of;
 /// Why the number cannot be had.
 #[derive(Debug, thiserror::Error)]
 pub enum IncarnationError {
-    /// The file cannot be read or written.
     #[error("`{}`: {source}; this node's incarnation is kept there, so it must be a folder that can be written to", path.display())]
     File { path: PathBuf, source: io::Error },
-    /// The file holds something else.
     #[error("`{}` holds {found:?}: expected a number; put one there that is greater than any this node has had", path.display())]
     Content { path: PathBuf, found: String },
 }
@@ -30,9 +28,6 @@ pub enum IncarnationError {
 /// # std::fs::remove_dir_all(folder)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-///
-/// # Errors
-/// [`IncarnationError`] names the file at fault.
 pub fn next_incarnation(folder: &Path, node: &NodeName) -> Result<u64, IncarnationError> {
     let path = path_of(folder, node, "incarnation");
     let failed = |source| IncarnationError::File { path: path.clone(), source };

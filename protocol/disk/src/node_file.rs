@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use skein_wire::NodeName;
 
-/// `<folder>/<node>.<what>`.
 pub fn path_of(folder: &Path, node: &NodeName, what: &str) -> PathBuf {
     folder.join(format!("{}.{what}", node.as_str().replace('/', "-")))
 }

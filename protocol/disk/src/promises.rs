@@ -11,10 +11,8 @@ use crate::node_file;
 /// The promises that were kept cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum PromisesError {
-    /// The file cannot be read.
     #[error("`{}`: {source}; what this node must not forget is kept there", path.display())]
     File { path: PathBuf, source: io::Error },
-    /// The file holds something else.
     #[error("`{}`: {source}; it should hold the blocks that this node must keep, as JSON. Remove it only if none of them is to hold any more", path.display())]
     Content { path: PathBuf, source: serde_json::Error },
 }

@@ -12,7 +12,6 @@ use crate::event::{
 const VEHICLE: &str = "uav";
 
 /// The roster of the first term: the ground station, which coordinates, and the vehicles of the fleet.
-#[must_use]
 pub fn joint_roster<'a>(ground: NodeName, fleet: impl IntoIterator<Item = &'a NodeName>) -> Roster {
     let vehicles = fleet.into_iter().filter(|node| node.kind() == VEHICLE).cloned();
     Roster::first(ground, vehicles)
@@ -20,7 +19,6 @@ pub fn joint_roster<'a>(ground: NodeName, fleet: impl IntoIterator<Item = &'a No
 
 /// Ground stations and operators' scripts launch, order and hold vehicles, change the roster and lift blocks; vehicles
 /// claim passages from one another, keep a joint launch back until they are ready, and may call one off.
-#[must_use]
 pub fn standard_authority() -> Authority {
     let joint = || EventSet::from(format!("{SWARM}/**"));
     let command = Grant {

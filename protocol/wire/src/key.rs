@@ -39,24 +39,16 @@ pub struct Fleet(Arc<str>);
 /// A text that is not one of Skein's keys.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum KeyError {
-    /// The fleet's name is not one chunk.
     #[error(
         "`{given}` is not a fleet name: expected one chunk of letters, digits, `_`, `.` or `-`, such as `demo`"
     )]
-    Fleet {
-        /// The text at fault.
-        given: String,
-    },
-    /// The key has another form.
+    Fleet { given: String },
     #[error(
         "`{given}` is not a key: expected `{ROOT}/<fleet>/<what>/<node>`, `<what>` one of {}, \
          and a second node where it is for one",
         words()
     )]
-    Form {
-        /// The text at fault.
-        given: String,
-    },
+    Form { given: String },
 }
 
 impl Fleet {
@@ -65,8 +57,6 @@ impl Fleet {
         if is_chunk(name) { Ok(Self(name.into())) } else { Err(KeyError::Fleet { given: name.into() }) }
     }
 
-    /// The name as text.
-    #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -82,7 +72,6 @@ impl Key {
     /// The key under which `sender` says to all what an `R` holds.
     ///
     /// Does not compile for a message that is for one node.
-    #[must_use]
     pub fn to_all<R: Record>(fleet: &Fleet, sender: NodeName) -> Self {
         const { assert!(R::KIND.may_be_for_all(), "this message is for one node") };
         Self { fleet: fleet.clone(), kind: &R::KIND, sender, recipient: None }
@@ -91,7 +80,6 @@ impl Key {
     /// The key under which `sender` says to one node what an `R` holds.
     ///
     /// Does not compile for a message that is for all.
-    #[must_use]
     pub fn to_one<R: Record>(fleet: &Fleet, sender: NodeName, recipient: NodeName) -> Self {
         const { assert!(R::KIND.may_be_for_one(), "this message is for all") };
         Self { fleet: fleet.clone(), kind: &R::KIND, sender, recipient: Some(recipient) }
@@ -117,37 +105,31 @@ impl Key {
             && recipient.is_none_or(|recipient| Some(recipient) == self.recipient.as_ref())
     }
 
-    #[must_use]
     pub fn fleet(&self) -> &Fleet {
         &self.fleet
     }
 
     /// Whether an `R` is put under it.
-    #[must_use]
     pub fn is_of<R: Record>(&self) -> bool {
         *self.kind == R::KIND
     }
 
-    #[must_use]
     pub fn sender(&self) -> &NodeName {
         &self.sender
     }
 
     /// Whom it is for; none if for all.
-    #[must_use]
     pub fn recipient(&self) -> Option<&NodeName> {
         self.recipient.as_ref()
     }
 
     /// The pattern, in Zenoh's language, of all keys under which an `R` is put for all.
-    #[must_use]
     pub fn pattern<R: Record>(fleet: &Fleet) -> String {
         const { assert!(R::KIND.may_be_for_all(), "this message is for one node") };
         pattern(fleet, &R::KIND)
     }
 
     /// The patterns of all keys that a node of this name wants to hear.
-    #[must_use]
     pub fn subscriptions(fleet: &Fleet, node: &NodeName) -> Vec<String> {
         let heard = || KINDS.iter().filter(|kind| kind.every_node_listens);
         let to_all = heard().filter(|kind| kind.may_be_for_all()).map(|kind| pattern(fleet, kind));
@@ -156,7 +138,6 @@ impl Key {
     }
 
     /// The same for a node that also reads the boards of all.
-    #[must_use]
     pub fn subscriptions_with_boards(fleet: &Fleet, node: &NodeName) -> Vec<String> {
         Self::subscriptions(fleet, node).into_iter().chain([Self::pattern::<Board>(fleet)]).collect()
     }

@@ -67,19 +67,16 @@ impl Limits {
     }
 
     /// Whether nothing is limited.
-    #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
     /// The greatest speed, m/s; infinite without a limit.
-    #[must_use]
     pub fn speed_m_s(&self) -> f64 {
         self.speed.as_ref().map_or(f64::INFINITY, |bound| bound.value)
     }
 
     /// The least and the greatest coordinates, m ENU; infinite without a limit.
-    #[must_use]
     pub fn region(&self) -> ([f64; 3], [f64; 3]) {
         let value = |bound: &Option<Bound>, none: f64| bound.as_ref().map_or(none, |bound| bound.value);
         (
@@ -89,7 +86,6 @@ impl Limits {
     }
 
     /// Why no place is within all limits, if none is: who says what.
-    #[must_use]
     pub fn contradiction(&self) -> Option<String> {
         if let Some(whose) = &self.unreadable {
             return Some(format!("{whose} states a limit that cannot be read"));
@@ -106,7 +102,6 @@ impl Limits {
     }
 
     /// Each bound in words, with whose it is: `script/low limits z to at most 4 m`.
-    #[must_use]
     pub fn in_words(&self) -> Vec<String> {
         let mut words = Vec::new();
         let mut say = |bound: &Option<Bound>, of: &str, how: &str, unit: &str| {

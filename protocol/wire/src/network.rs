@@ -107,7 +107,6 @@ struct Port {
 
 impl Network {
     /// A network of these habits, all chance drawn from `seed`.
-    #[must_use]
     pub fn new(config: NetworkConfig, seed: u64) -> Self {
         Self(Arc::new(Mutex::new(Air {
             config,
@@ -122,7 +121,6 @@ impl Network {
     }
 
     /// Connects a node. Two links of one name are two nodes that share it.
-    #[must_use]
     pub fn join(&self, node: &NodeName) -> MemoryLink {
         let mut air = self.lock();
         let port = air.next_port;
@@ -146,7 +144,6 @@ impl Network {
     }
 
     /// When the next message arrives, if one is on its way.
-    #[must_use]
     pub fn next_arrival(&self) -> Option<Duration> {
         self.lock().ports.values().filter_map(|port| port.arriving.keys().next()).map(|(at, _)| *at).min()
     }
@@ -170,7 +167,6 @@ impl Network {
         self.lock().groups.clear();
     }
 
-    #[must_use]
     pub fn stats(&self) -> NetworkStats {
         self.lock().stats
     }
@@ -183,7 +179,6 @@ impl Network {
 
 impl MemoryLink {
     /// When the next message arrives at this end, if one is on its way.
-    #[must_use]
     pub fn next_arrival(&self) -> Option<Duration> {
         let air = self.network.lock();
         air.ports.get(&self.port)?.arriving.keys().next().map(|(at, _)| *at)

@@ -62,7 +62,6 @@ pub struct NodeLinkStats {
 
 impl NodeLink {
     /// Couples `node` to its fleet.
-    #[must_use]
     pub fn new(node: Node, fleet: Fleet) -> Self {
         Self {
             node,
@@ -79,7 +78,6 @@ impl NodeLink {
     }
 
     /// Couples a node that is configured to be durable to its fleet and to where it keeps what it promises.
-    #[must_use]
     pub fn durable(node: Node, fleet: Fleet, store: Box<dyn Store>) -> Self {
         Self { store: Some(store), ..Self::new(node, fleet) }
     }
@@ -144,7 +142,6 @@ impl NodeLink {
         std::mem::take(&mut self.states)
     }
 
-    #[must_use]
     pub fn node(&self) -> &Node {
         &self.node
     }
@@ -154,12 +151,10 @@ impl NodeLink {
         &mut self.node
     }
 
-    #[must_use]
     pub fn fleet(&self) -> &Fleet {
         &self.fleet
     }
 
-    #[must_use]
     pub fn stats(&self) -> NodeLinkStats {
         self.stats
     }

@@ -32,7 +32,6 @@ pub struct MemoryStore<T = Kept>(Arc<Mutex<T>>);
 
 impl<T: Clone> MemoryStore<T> {
     /// The value that was kept last.
-    #[must_use]
     pub fn kept(&self) -> T {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }

@@ -12,7 +12,6 @@ use crate::proto::{self, TraceEvent};
 
 impl TraceEvent {
     /// The record of what `node` saw happen.
-    #[must_use]
     pub fn new(node: &NodeName, happened: &Happened) -> Self {
         let proto::Event { name, data } = (&happened.event).into();
         Self {

@@ -1,4 +1,4 @@
-//! How a session is joined to others, and where.
+//! The settings by which a session is joined to others.
 
 use std::net::{IpAddr, TcpListener};
 use std::path::{Path, PathBuf};
@@ -11,17 +11,16 @@ use crate::error::ZenohError;
 /// Longest message that Zenoh puts together from its fragments, in bytes: more than any that Skein reads.
 const MOST_REASSEMBLED: usize = 16 << 20;
 
-/// What a [`ZenohSession`](crate::ZenohSession) is told when it opens.
+/// The configuration of a [`ZenohSession`](crate::ZenohSession).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ZenohConfig {
     /// The fleet; sessions of other fleets are not heard.
     pub fleet: Fleet,
-    /// How it is joined to others, and where.
     pub network: NetworkSettings,
-    /// How many messages may wait to be put. Beyond, new ones are dropped: bids and states are repeated anyway,
+    /// Capacity for messages that wait to be put. Beyond, new ones are dropped: bids and states are repeated anyway,
     /// occurrences are repaired.
     pub outgoing_capacity: usize,
-    /// How many messages may wait for each link. Beyond, the oldest are dropped.
+    /// Capacity for messages that wait for each link. Beyond, the oldest are dropped.
     pub incoming_capacity: usize,
 }
 
@@ -32,18 +31,17 @@ pub struct ZenohConfig {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct NetworkSettings {
-    /// How it takes part.
     pub mode: Mode,
     /// Where others may connect; port 0 is any free one, see [`ZenohSession::locators`](crate::ZenohSession::locators).
     /// A client listens nowhere.
     pub listen: Vec<String>,
     /// Whom to connect to, again and again until it is there.
     pub connect: Vec<String>,
-    /// Who belongs to the fleet. Without it, only the loopback interface is used.
+    /// The certificates of the fleet. Without them, only the loopback interface is used.
     pub security: Option<Security>,
 }
 
-/// How a session takes part in the network.
+/// The role of a session in the network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
@@ -82,7 +80,6 @@ impl Default for NetworkSettings {
 
 impl ZenohConfig {
     /// A session of `fleet` that is joined to others as `network` says.
-    #[must_use]
     pub fn new(fleet: Fleet, network: NetworkSettings) -> Self {
         Self { fleet, network, outgoing_capacity: 4096, incoming_capacity: 4096 }
     }
@@ -90,7 +87,6 @@ impl ZenohConfig {
 
 impl NetworkSettings {
     /// A peer that listens on a free port of the loopback interface and connects to these endpoints.
-    #[must_use]
     pub fn connected_to(connect: Vec<String>) -> Self {
         Self { connect, ..Self::default() }
     }

@@ -26,7 +26,6 @@ mod error;
 mod inbox;
 mod link;
 mod queue;
-mod runtime;
 mod session;
 
 pub use bell::Bell;
@@ -35,5 +34,4 @@ pub use config::{Mode, NetworkSettings, Security, ZenohConfig};
 pub use error::ZenohError;
 pub use link::{ZenohLink, ZenohLinkStats};
 pub use queue::ZenohStats;
-pub use runtime::share_threads;
-pub use session::ZenohSession;
+pub use session::{ZenohSession, share_threads};

@@ -37,17 +37,14 @@ impl ZenohLink {
     }
 
     /// Rings when a message has arrived.
-    #[must_use]
     pub fn bell(&self) -> Bell {
         self.inbox.bell.clone()
     }
 
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.inbox.is_empty()
     }
 
-    #[must_use]
     pub fn stats(&self) -> ZenohLinkStats {
         ZenohLinkStats {
             received: self.inbox.received.load(Ordering::Relaxed),

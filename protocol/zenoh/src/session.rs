@@ -29,6 +29,20 @@ const TRY_AGAIN: Duration = Duration::from_millis(200);
 /// whole messages it waits a millisecond, and not again before there is room.
 const MOST_WHOLE: usize = 32 << 10;
 
+/// As it comes, Zenoh accepts, reads, routes and sends on threads of their own, so that a message wakes one thread
+/// which finds it and another which reads it. Here two threads do all of that, and a message wakes one.
+const SHARED: &str = "ZENOH_RUNTIME='(acc: (handover: rx), net: (handover: rx), tx: (handover: rx))'";
+
+/// Lets all of Zenoh's work in this process be done by the same two threads, unless the environment says otherwise
+/// (`ZENOH_RUNTIME`): messages come and go faster.
+///
+/// For the first line of `main`: Zenoh looks at the environment when the first session opens, and no other thread may
+/// run while it is changed.
+pub fn share_threads() {
+    // It is one line, which can be read.
+    let _ = dotenvy::from_read(SHARED.as_bytes());
+}
+
 /// A session that any number of links of one process share. Cloning gives another handle to the same session, which
 /// closes with its last handle or link.
 ///
@@ -89,17 +103,11 @@ impl ZenohSession {
     }
 
     /// A link for `node`, which hears from now on. Two links of one name are two nodes that share it.
-    ///
-    /// # Errors
-    /// [`ZenohError::Subscribe`] when Zenoh does not let it listen.
     pub fn link(&self, node: &NodeName) -> Result<ZenohLink, ZenohError> {
         self.listen(Key::subscriptions(&self.0.fleet, node))
     }
 
     /// A link that hears what is put under keys of these patterns: a sensor's scans, a world's scene.
-    ///
-    /// # Errors
-    /// [`ZenohError::Subscribe`] names the pattern at fault.
     pub fn listen(&self, patterns: Vec<String>) -> Result<ZenohLink, ZenohError> {
         let port = self.0.next_port.fetch_add(1, Ordering::Relaxed);
         let inbox = Arc::new(Inbox::new(self.0.incoming_capacity));
@@ -113,19 +121,16 @@ impl ZenohSession {
     }
 
     /// The endpoints of this session, for others to connect to.
-    #[must_use]
     pub fn locators(&self) -> &[String] {
         &self.0.locators
     }
 
     /// To how many other sessions this one is connected now.
-    #[must_use]
     pub fn connected_peers(&self) -> usize {
         let (answer, peers) = sync_channel(1);
         self.0.entry.ask(Command::CountPeers { answer }).ok().and_then(|()| peers.recv().ok()).unwrap_or(0)
     }
 
-    #[must_use]
     pub fn stats(&self) -> ZenohStats {
         self.0.entry.stats()
     }

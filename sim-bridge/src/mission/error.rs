@@ -7,45 +7,21 @@ use thiserror::Error;
 /// Why a mission file cannot be flown.
 #[derive(Debug, Error)]
 pub enum MissionError {
-    /// A file that cannot be read.
     #[error("cannot read `{}`: {source}", path.display())]
     Unreadable { path: PathBuf, source: std::io::Error },
     #[error("{file}:{line}:{column}: {message}")]
-    Syntax {
-        /// The mission file.
-        file: String,
-        /// Line from 1.
-        line: usize,
-        /// Column from 1.
-        column: usize,
-        message: String,
-    },
-    /// JSON, but not what a mission says in this place.
+    Syntax { file: String, line: usize, column: usize, message: String },
     #[error("{file}:{line}: field `{field}`: expected {expected}, found {found}")]
-    Field {
-        /// The mission file.
-        file: String,
-        /// Line from 1 of the value, or of what should hold it.
-        line: usize,
-        /// Path of the value, such as `mission.items[3].params[4]`.
-        field: String,
-        expected: String,
-        found: String,
-    },
-    /// Neither of the formats that are read.
+    Field { file: String, line: usize, field: String, expected: String, found: String },
     #[error(
         "{file}: expected a QGroundControl plan (a member `mission`) or an LSC mission (a member `agents`)"
     )]
-    Unknown {
-        /// The mission file.
-        file: String,
-    },
+    Unknown { file: String },
 }
 
 /// Something in a mission file that is read over.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
-    /// The mission file.
     pub file: String,
     /// Line from 1.
     pub line: usize,

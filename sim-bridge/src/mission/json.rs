@@ -13,9 +13,6 @@ pub struct Document<'a> {
 
 impl<'a> Document<'a> {
     /// Parses `text`, in which a `#` outside of strings starts a comment; `file` is what errors call it.
-    ///
-    /// # Errors
-    /// [`MissionError::Syntax`] with line and column.
     pub fn parse(text: &'a str, file: &'a str) -> Result<Self, MissionError> {
         match serde_json::from_str(&without_comments(text)) {
             Ok(root) => Ok(Self { file, text, root }),
@@ -65,10 +62,6 @@ impl<'a> Node<'a> {
         Some(self.below(value, Step::Member(name)))
     }
 
-    /// The member of that name.
-    ///
-    /// # Errors
-    /// There is none, or it is null.
     pub fn member(&self, name: &'a str) -> Result<Node<'a>, MissionError> {
         self.optional(name).ok_or_else(|| {
             let expected = format!("a member `{name}`");
@@ -80,26 +73,17 @@ impl<'a> Node<'a> {
     }
 
     /// The elements of an array.
-    ///
-    /// # Errors
-    /// It is no array.
     pub fn elements(&self) -> Result<Vec<Node<'a>>, MissionError> {
         let array = self.value.as_array().ok_or_else(|| self.mismatch("an array"))?;
         Ok(array.iter().enumerate().map(|(i, value)| self.below(value, Step::Element(i))).collect())
     }
 
     /// A number. JSON knows no infinities, so it is finite.
-    ///
-    /// # Errors
-    /// It is no number.
     pub fn number(&self) -> Result<f64, MissionError> {
         self.value.as_f64().ok_or_else(|| self.mismatch("a number"))
     }
 
     /// A number in a closed range.
-    ///
-    /// # Errors
-    /// It is no number, or out of the range.
     pub fn number_in(&self, from: f64, to: f64, unit: &str) -> Result<f64, MissionError> {
         let number = self.number()?;
         if (from..=to).contains(&number) {
@@ -109,33 +93,19 @@ impl<'a> Node<'a> {
     }
 
     /// A whole number of at least 0.
-    ///
-    /// # Errors
-    /// It is something else.
     pub fn whole_number(&self) -> Result<u64, MissionError> {
         self.value.as_u64().ok_or_else(|| self.mismatch("a whole number"))
     }
 
     /// True or false.
-    ///
-    /// # Errors
-    /// It is something else.
     pub fn truth(&self) -> Result<bool, MissionError> {
         self.value.as_bool().ok_or_else(|| self.mismatch("true or false"))
     }
 
-    /// A string.
-    ///
-    /// # Errors
-    /// It is something else.
     pub fn text(&self) -> Result<&'a str, MissionError> {
         self.value.as_str().ok_or_else(|| self.mismatch("a string"))
     }
 
-    /// Exactly `N` numbers.
-    ///
-    /// # Errors
-    /// It is no array, has another length, or holds something else.
     pub fn numbers<const N: usize>(&self) -> Result<[f64; N], MissionError> {
         let numbers = self.elements()?.iter().map(Node::number).collect::<Result<Vec<_>, _>>()?;
         let length = numbers.len();

@@ -20,7 +20,6 @@ pub struct LscAgent {
     pub start: Vector3<f64>,
     /// Its last hover, world ENU, m.
     pub goal: Vector3<f64>,
-    /// Radius of the vehicle, m.
     pub radius_m: f64,
     /// Greatest speed on each axis, m/s.
     pub max_speed_m_s: Vector3<f64>,
@@ -32,9 +31,6 @@ pub struct LscAgent {
 
 impl LscMission {
     /// Reads a mission; `file` is what errors call it.
-    ///
-    /// # Errors
-    /// With file, line, field and what was expected there.
     pub fn read(text: &str, file: &str) -> Result<Self, MissionError> {
         let document = Document::parse(text, file)?;
         let root = document.root();

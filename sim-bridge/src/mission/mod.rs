@@ -68,9 +68,6 @@ impl MissionSet {
     ///
     /// `datum` is where the world's origin is on the earth, if the world says. A plan that was drawn elsewhere, or
     /// flies in a world that does not say, has its planned home set on the origin.
-    ///
-    /// # Errors
-    /// With file, line, field and what was expected there.
     pub fn read(text: &str, file: &str, datum: Option<Datum>) -> Result<Self, MissionError> {
         let document = Document::parse(text, file)?;
         let root = document.root();
@@ -85,9 +82,6 @@ impl MissionSet {
 }
 
 /// Reads mission files in order; the first plan's datum holds for those after it.
-///
-/// # Errors
-/// The first that is wrong with any of them.
 pub fn read_files(paths: &[PathBuf], datum: Option<Datum>) -> Result<MissionSet, MissionError> {
     let mut all = MissionSet::default();
     for path in paths {

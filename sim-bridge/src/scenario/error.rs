@@ -8,41 +8,17 @@ use thiserror::Error;
 
 use crate::mission::MissionError;
 
-/// Why a scenario cannot be flown.
+/// Why a scenario cannot be flown. Lines, columns and vehicles are numbered from 1; places are ENU, in metres.
 #[derive(Debug, Error)]
 pub enum ScenarioError {
-    /// Neither a built-in name nor a file.
     #[error("unknown scenario `{name}`: expected one of {known}, or the path of a scenario file (.toml)")]
-    Unknown {
-        name: String,
-        /// The built-in names, separated by commas.
-        known: String,
-    },
-    /// A file that cannot be read.
+    Unknown { name: String, known: String },
     #[error("cannot read `{}`: {source}", path.display())]
     Unreadable { path: PathBuf, source: std::io::Error },
-    /// Not TOML, an unknown key, or a value of the wrong type or range.
     #[error("{file}:{line}:{column}: {}{message}", at_field(.field))]
-    Malformed {
-        /// The scenario file.
-        file: String,
-        /// Line from 1.
-        line: usize,
-        /// Column from 1, in characters.
-        column: usize,
-        /// Path of the field, such as `vehicle[2].start_m`; empty at top level.
-        field: String,
-        message: String,
-    },
-    /// Fields that are sound alone but not together.
+    Malformed { file: String, line: usize, column: usize, field: String, message: String },
     #[error("{file}: {field}: {message}")]
-    Contradiction {
-        /// The scenario file.
-        file: String,
-        /// Path of the field.
-        field: String,
-        message: String,
-    },
+    Contradiction { file: String, field: String, message: String },
     /// A world file that cannot be read as SDF.
     #[error(transparent)]
     Sdf(#[from] SdfError),
@@ -55,117 +31,40 @@ pub enum ScenarioError {
     /// A mission file that cannot be read.
     #[error(transparent)]
     Mission(#[from] MissionError),
-    /// Nothing to fly.
     #[error(
         "scenario `{scenario}` has no vehicles: expected at least 1; give --vehicles N or [[vehicle]] tables"
     )]
-    NoVehicles {
-        /// Name of the scenario.
-        scenario: String,
-    },
-    /// More vehicles than MAVLink system numbers.
+    NoVehicles { scenario: String },
     #[error("{vehicles} vehicles are too many: expected at most {limit}")]
-    TooManyVehicles {
-        vehicles: usize,
-        /// The largest swarm.
-        limit: usize,
-    },
-    /// More vehicles than the file describes.
+    TooManyVehicles { vehicles: usize, limit: usize },
     #[error("scenario `{scenario}` describes {described} vehicles, {wanted} were asked for")]
-    TooFewDescribed {
-        /// Name of the scenario.
-        scenario: String,
-        wanted: usize,
-        /// `[[vehicle]]` tables in the file.
-        described: usize,
-    },
-    /// Several missions, but not one for each vehicle.
+    TooFewDescribed { scenario: String, wanted: usize, described: usize },
     #[error(
         "{missions} missions for {vehicles} vehicles: give one mission that all fly in trail, or one for each vehicle"
     )]
-    MissionCount {
-        missions: usize,
-        /// Vehicles of the scenario.
-        vehicles: usize,
-    },
-    /// A vehicle that would start within an obstacle.
+    MissionCount { missions: usize, vehicles: usize },
     #[error("vehicle {vehicle}: start {} is inside obstacle `{obstacle}` (its hull overlaps by {overlap_m:.2} m); move the start", place(.position))]
-    StartInObstacle {
-        /// Number of the vehicle, from 1.
-        vehicle: usize,
-        /// Name of the obstacle.
-        obstacle: String,
-        /// ENU, metres.
-        position: Vector3<f64>,
-        overlap_m: f64,
-    },
-    /// A start or waypoint out of the world.
+    StartInObstacle { vehicle: usize, obstacle: String, position: Vector3<f64>, overlap_m: f64 },
     #[error("vehicle {vehicle}: {what} {} is outside the world, which reaches from {} to {}", place(.position), place(.min), place(.max))]
     OutsideBounds {
-        /// Number of the vehicle, from 1.
         vehicle: usize,
-        /// `start`, `goal` or `waypoint 2`.
         what: String,
-        /// ENU, metres.
         position: Vector3<f64>,
-        /// Lowest corner of the world.
         min: Vector3<f64>,
-        /// Highest corner of the world.
         max: Vector3<f64>,
     },
-    /// A goal or waypoint under the ground.
     #[error("vehicle {vehicle}: {what} {} is not above the ground: expected a height above 0 m", place(.position))]
-    BelowGround {
-        /// Number of the vehicle, from 1.
-        vehicle: usize,
-        /// `goal` or `waypoint 2`.
-        what: String,
-        /// ENU, metres.
-        position: Vector3<f64>,
-    },
-    /// A goal or waypoint where nobody may fly.
+    BelowGround { vehicle: usize, what: String, position: Vector3<f64> },
     #[error("vehicle {vehicle}: {what} {} is in a no-fly zone, in a threat or in terrain: no path leads there", place(.position))]
-    Closed {
-        /// Number of the vehicle, from 1.
-        vehicle: usize,
-        /// `goal` or `waypoint 2`.
-        what: String,
-        /// ENU, metres.
-        position: Vector3<f64>,
-    },
-    /// Two vehicles that would stand in one another.
+    Closed { vehicle: usize, what: String, position: Vector3<f64> },
     #[error(
         "{what}s of vehicles {first} and {second} are {distance_m:.2} m apart: expected at least {least_m:.2} m"
     )]
-    TooClose {
-        /// `start` or `goal`.
-        what: &'static str,
-        /// Number of one vehicle, from 1.
-        first: usize,
-        /// Number of the other.
-        second: usize,
-        /// Horizontal distance, in metres.
-        distance_m: f64,
-        /// The need of their hulls, in metres.
-        least_m: f64,
-    },
-    /// A vehicle without a way.
+    TooClose { what: &'static str, first: usize, second: usize, distance_m: f64, least_m: f64 },
     #[error("vehicle {vehicle} has nowhere to go: give it waypoints or a mission")]
-    NoWaypoints {
-        /// Number of the vehicle, from 1.
-        vehicle: usize,
-    },
-    /// No room for a start or goal.
+    NoWaypoints { vehicle: usize },
     #[error("vehicle {vehicle}: no place for its {what} near {}: everything within {reach_m} m is too close to an obstacle, to another vehicle or to the bounds", place(.near))]
-    NoRoom {
-        /// Number of the vehicle, from 1.
-        vehicle: usize,
-        /// `start` or `goal`.
-        what: &'static str,
-        /// ENU, metres.
-        near: Vector3<f64>,
-        reach_m: f64,
-    },
+    NoRoom { vehicle: usize, what: &'static str, near: Vector3<f64>, reach_m: f64 },
 }
 
 fn at_field(field: &str) -> String {

@@ -199,9 +199,6 @@ struct SphereTable {
 
 impl ScenarioFile {
     /// Reads TOML; `file` is what errors call it.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Malformed`] at the first thing that is not as expected.
     pub fn parse(text: &str, file: &str) -> Result<Self, ScenarioError> {
         let table = configuration::read(text).map_err(|malformed| {
             let Malformed { line, column, field, problem: message } = malformed;

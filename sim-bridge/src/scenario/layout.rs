@@ -37,7 +37,6 @@ pub struct Layout {
     pub obstacles: Vec<Obstacle>,
     /// Flight volume; leaving it counts as a collision.
     pub bounds: Aabb,
-    /// One route a vehicle.
     pub routes: Vec<Route>,
     /// Notes for the user, such as on a parameter that had to give way.
     pub notes: Vec<String>,

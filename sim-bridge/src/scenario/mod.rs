@@ -18,7 +18,6 @@ mod open;
 mod placement;
 mod targets;
 mod window;
-mod world_file;
 
 use std::path::{Path, PathBuf};
 
@@ -36,7 +35,6 @@ use skein_world::{Aabb, Scene, VehicleModel, WindConfig};
 pub use error::ScenarioError;
 pub use layout::SPACING_M;
 pub use missions::apply_missions;
-pub use world_file::read_world;
 
 use crate::autopilots::make::Make;
 use crate::mission::{self, MissionSet};
@@ -162,7 +160,6 @@ pub struct Order {
     pub who: Who,
 }
 
-/// A script on one vehicle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VehicleScript {
     /// The vehicle's number, from 1.
@@ -204,9 +201,6 @@ impl Scenario {
     }
 
     /// A built-in scenario; `vehicles` is the scenario's own number where `None`.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Unknown`] lists the names there are; others as [`Scenario::validate`].
     pub fn built_in(name: &str, vehicles: Option<usize>, seed: u64) -> Result<Self, ScenarioError> {
         match BUILT_IN.iter().find(|(known, _)| *known == name) {
             Some((_, text)) => Self::from_toml(text, &format!("{name}.toml"), vehicles, seed),
@@ -218,9 +212,6 @@ impl Scenario {
     }
 
     /// A scenario from the text of its file; `file` names it in errors, and paths inside are relative to it.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Malformed`] with line, column and field; others as [`Scenario::validate`].
     pub fn from_toml(
         text: &str,
         file: &str,
@@ -244,17 +235,11 @@ impl Scenario {
     }
 
     /// The scenario that a command line names: built in, or the path of a file; with its overrides.
-    ///
-    /// # Errors
-    /// Whatever is wrong with any of the files, or with all together.
     pub fn open(name: &str, overrides: &Overrides, seed: u64) -> Result<Self, ScenarioError> {
         Self::open_with(name, overrides, seed, &Behaviours::default())
     }
 
     /// The same for a program with these behaviours.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
     pub fn open_with(
         name: &str,
         overrides: &Overrides,
@@ -300,9 +285,6 @@ impl Scenario {
     }
 
     /// Moves each start and goal that stands too near an obstacle to the nearest clear place, and notes it.
-    ///
-    /// # Errors
-    /// [`ScenarioError::NoRoom`] where there is none.
     pub fn settle(&mut self) -> Result<(), ScenarioError> {
         let (mut starts, mut goals) = (Vec::new(), Vec::new());
         for i in 0..self.vehicles.len() {
@@ -478,6 +460,17 @@ fn text_of(name: &str) -> Result<Option<String>, ScenarioError> {
     let path = Path::new(name);
     let names_a_file = path.extension().is_some() || path.components().count() > 1;
     if names_a_file { read(path).map(Some) } else { Ok(None) }
+}
+
+/// Reads a Gazebo world, or a `.csv` of boxes; returns what of it could not be read as lines for people.
+pub fn read_world(path: &Path) -> Result<(Scene, Vec<String>), ScenarioError> {
+    let text = read(path)?;
+    let name = path.display().to_string();
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+        return Ok((Scene::from_csv(&text, &name)?, Vec::new()));
+    }
+    let (scene, warnings) = Scene::from_sdf(&text, &name)?;
+    Ok((scene, warnings.iter().map(ToString::to_string).collect()))
 }
 
 fn read(path: &Path) -> Result<String, ScenarioError> {

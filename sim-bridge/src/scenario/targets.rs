@@ -37,13 +37,10 @@ pub struct Targets {
 /// Why there are no routes.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TargetsError {
-    /// The line to start from has not two ends.
     #[error("{0} places, expected two: the ends of the line that the vehicles stand on")]
     Line(usize),
-    /// There is nowhere to fly.
     #[error("expected at least one target")]
     NoTarget,
-    /// A zone that routes cannot be planned around.
     #[error(
         "routes are planned around circles: expected `centre_m` and `radius_m` for each of `airspace.no_fly`"
     )]
@@ -51,14 +48,10 @@ pub enum TargetsError {
     /// A start or a target is no place to plan from or to.
     #[error(transparent)]
     Route(#[from] RouteError),
-    /// The best route that was found is not feasible.
     #[error(
         "no route was found for vehicle {vehicle} that keeps clear of terrain, zones and the others; leave more room between them"
     )]
-    NoRoute {
-        /// Its number, from 1.
-        vehicle: usize,
-    },
+    NoRoute { vehicle: usize },
 }
 
 /// A route and how fast it is flown.

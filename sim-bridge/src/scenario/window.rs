@@ -15,13 +15,11 @@ pub struct Window {
     /// Width of the opening from south to north, in metres.
     #[serde(deserialize_with = "positive")]
     pub opening_width_m: f64,
-    /// Height of the opening, in metres.
     #[serde(deserialize_with = "positive")]
     pub opening_height_m: f64,
     /// Height of the opening's centre, which is the nominal flight height too, in metres.
     #[serde(deserialize_with = "positive")]
     pub centre_height_m: f64,
-    /// Thickness of the wall, in metres.
     #[serde(deserialize_with = "positive")]
     pub wall_thickness_m: f64,
     /// From the wall to the nearest start, in metres.

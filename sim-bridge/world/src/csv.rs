@@ -34,9 +34,6 @@ impl Scene {
     /// assert_eq!(scene.clearance(&[0.0, 0.0, 1.0].into()), 1.75);
     /// # Ok::<(), skein_world::CsvError>(())
     /// ```
-    ///
-    /// # Errors
-    /// [`CsvError`], with line and column.
     pub fn from_csv(text: &str, source_name: &str) -> Result<Self, CsvError> {
         let mut obstacles = Vec::new();
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);

@@ -26,7 +26,6 @@ const LEAST_COSINE: f64 = 0.2;
 pub struct Hull {
     /// Centre, world ENU, m.
     pub centre: Vector3<f64>,
-    /// Radius, m.
     pub radius_m: f64,
 }
 

@@ -101,7 +101,6 @@ impl Quadrotor {
         touchdown
     }
 
-    /// The kind of vehicle.
     pub fn model(&self) -> &VehicleModel {
         &self.model
     }

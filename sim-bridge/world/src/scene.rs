@@ -60,7 +60,6 @@ impl Scene {
         self
     }
 
-    /// Name of the world.
     pub fn name(&self) -> &str {
         &self.name
     }

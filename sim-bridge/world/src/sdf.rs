@@ -76,43 +76,20 @@ impl fmt::Display for Warning {
 /// Why a world file was refused.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum SdfError {
-    /// Not well-formed XML.
     #[error("{place}: {message}; {advice}")]
     Malformed { place: Place, message: String, advice: &'static str },
-    /// Text that is not what the element must hold.
     #[error("{place}: <{element}> holds `{found}`; expected {expected}")]
-    Value {
-        /// Start of the element.
-        place: Place,
-        /// Name of the element.
-        element: String,
-        found: String,
-        expected: &'static str,
-    },
-    /// An element without a child that it needs.
+    Value { place: Place, element: String, found: String, expected: &'static str },
     #[error("{place}: <{element}> needs {expected} inside; add it")]
-    Missing {
-        /// Start of the element.
-        place: Place,
-        /// Name of the element.
-        element: String,
-        expected: &'static str,
-    },
-    /// Models inside of models beyond the limit.
+    Missing { place: Place, element: String, expected: &'static str },
     #[error("{place}: models nest deeper than {DEPTH_LIMIT} levels; flatten the file")]
-    TooDeep {
-        /// Start of the model that is one too many.
-        place: Place,
-    },
+    TooDeep { place: Place },
 }
 
 impl Scene {
     /// Reads a Gazebo world (or a bare model) from the text of an SDF file; `source_name` is what
     /// messages call it. Nothing is fetched: models that the file includes by name are left out
     /// with a warning. Everything stands still, whether static or not.
-    ///
-    /// # Errors
-    /// [`SdfError`], always with file, line and column.
     pub fn from_sdf(text: &str, source_name: &str) -> Result<(Self, Vec<Warning>), SdfError> {
         let document = Document::parse(text).map_err(|error| malformed(text, source_name, &error))?;
         let mut reader = Reader::new(&document, source_name);

@@ -163,7 +163,6 @@ impl Referee {
 struct Solids {
     /// All that have an end, under one bounding volume hierarchy.
     bodies: Option<Compound>,
-    /// Those that have none.
     planes: Vec<(DPose3, SharedShape)>,
 }
 

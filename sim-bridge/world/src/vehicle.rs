@@ -21,7 +21,6 @@ const BUILT_IN: [(&str, &str); 2] = [
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VehicleModel {
-    /// Name of the kind.
     pub name: String,
     /// Take-off mass, kg.
     pub mass_kg: f64,
@@ -195,40 +194,16 @@ pub struct RangefinderModel {
 /// Why a vehicle file was refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum VehicleError {
-    /// Not TOML, a missing or unknown field, or a value of the wrong type.
     #[error("{source_name}:{line}:{column}: {message}")]
-    Syntax {
-        source_name: String,
-        /// Line from 1.
-        line: usize,
-        /// Column from 1.
-        column: usize,
-        message: String,
-    },
-    /// A number outside of its range.
+    Syntax { source_name: String, line: usize, column: usize, message: String },
     #[error("{source_name}: field `{field}` is {found}; expected {expected}")]
-    Range {
-        source_name: String,
-        /// Dotted name of the field.
-        field: &'static str,
-        found: f64,
-        expected: &'static str,
-    },
-    /// No built-in vehicle has this name.
+    Range { source_name: String, field: &'static str, found: f64, expected: &'static str },
     #[error("no built-in vehicle `{name}`; there are: {known}")]
-    Unknown {
-        /// The name asked for.
-        name: String,
-        /// The names that exist.
-        known: String,
-    },
+    Unknown { name: String, known: String },
 }
 
 impl VehicleModel {
     /// Reads a vehicle file; `source_name` is what messages call it.
-    ///
-    /// # Errors
-    /// [`VehicleError::Syntax`] with line and column, or [`VehicleError::Range`] with the field.
     pub fn from_toml(text: &str, source_name: &str) -> Result<Self, VehicleError> {
         let model: Self = toml::from_str(text).map_err(|error| {
             let (line, column) = line_and_column(text, error.span().map_or(0, |span| span.start));
@@ -244,9 +219,6 @@ impl VehicleModel {
     }
 
     /// The built-in vehicle of that name: `x500` (2 kg) or `crazyflie` (27 g).
-    ///
-    /// # Errors
-    /// [`VehicleError::Unknown`], which lists the names that exist.
     pub fn built_in(name: &str) -> Result<Self, VehicleError> {
         match BUILT_IN.iter().find(|(known, _)| *known == name) {
             Some((known, text)) => Self::from_toml(text, &format!("vehicles/{known}.toml")),

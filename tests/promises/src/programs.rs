@@ -1,4 +1,4 @@
-//! What b-threads of a story do.
+//! The b-threads of a story.
 
 use std::fmt;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use skein_dbp::{NodeName, facts};
 
 use crate::seconds::Seconds;
 
-/// What one b-thread does, for ever.
+/// The behaviour of one b-thread, for ever.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Role {
     /// Requests one event after another, numbered.

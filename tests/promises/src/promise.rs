@@ -55,7 +55,7 @@ pub struct Violation {
     pub at: Duration,
     /// Where it was seen.
     pub node: NodeName,
-    /// What happened, in words.
+    /// The breach in words.
     pub what: String,
 }
 

@@ -21,7 +21,7 @@ const MOST_LENGTHS: u32 = 4;
 /// A node that has something to do at once does it so much later.
 const SHORTEST_STEP: Duration = Duration::from_micros(100);
 
-/// How a story is played.
+/// The settings with which a story is played.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Settings {
     /// How many of the last things that happened are told.
@@ -40,18 +40,16 @@ impl Settings {
     }
 }
 
-/// What came of a run.
+/// The result of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// The first breach of a promise, which ends the run.
     pub violation: Option<Violation>,
-    /// How much time passed in it.
     pub simulated: Duration,
     /// Steps of nodes, each of which was judged.
     pub steps: u64,
     /// What occurred at its home.
     pub occurrences: u64,
-    /// What went wrong.
     pub faults: Faults,
     /// The last things that happened, for people.
     pub told: Vec<String>,
@@ -135,7 +133,6 @@ struct Player<'a> {
     sensed: i64,
     /// What an operator has told it since its last step.
     ordered: Vec<Event>,
-    /// What survives its restarts.
     store: MemoryStore,
 }
 

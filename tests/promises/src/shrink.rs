@@ -9,7 +9,7 @@ use crate::promise::Violation;
 use crate::run::{Outcome, Settings, run};
 use crate::story::{Cast, Fault, Ordered, Story};
 
-/// How many runs shrinking may take.
+/// The most runs that shrinking may take.
 const MOST_RUNS: usize = 400;
 /// How many of the last things that happened are told.
 const TOLD: usize = 16;
@@ -18,7 +18,6 @@ const TOLD: usize = 16;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shrunk {
     pub story: Story,
-    /// What it breaks.
     pub violation: Violation,
     /// The last things that happen in it.
     pub told: Vec<String>,

@@ -37,7 +37,7 @@ pub struct Story {
 pub struct Cast {
     pub name: NodeName,
     pub lease: Duration,
-    /// How many occurrences it keeps for those who missed them.
+    /// The number of occurrences it keeps for those who missed them.
     pub history: usize,
     /// Whether its events are `guarded`: a restart does not let slip what others block.
     pub guarded: bool,
@@ -51,7 +51,7 @@ pub struct Cast {
     pub grants: Option<Grants>,
     /// When it is started first.
     pub joins: Duration,
-    /// How often something happens to it from outside.
+    /// The period of events from outside.
     pub senses: Option<Duration>,
     /// Its b-threads, by name.
     pub roles: Vec<(String, Role)>,
@@ -125,7 +125,6 @@ pub enum Fault {
     Restart {
         /// When it is killed.
         at: Duration,
-        /// How long it is gone.
         lasts: Duration,
         node: usize,
     },

@@ -16,26 +16,12 @@ pub struct HeightGrid {
 /// Why heights are no grid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HeightGridError {
-    /// The spacing is no length.
     #[error("`spacing_m` is {0}: expected a number above 0")]
     Spacing(f64),
-    /// There are too few heights.
     #[error("`heights_m` has {rows} rows of {columns}: expected two or more of two or more")]
-    TooFew {
-        rows: usize,
-        /// Heights in the first.
-        columns: usize,
-    },
-    /// Rows differ in length.
+    TooFew { rows: usize, columns: usize },
     #[error("`heights_m`: row {row} has {found} heights, the first has {expected}")]
-    Ragged {
-        /// Number of the row, from 1.
-        row: usize,
-        found: usize,
-        /// Those of the first.
-        expected: usize,
-    },
-    /// A number is not finite.
+    Ragged { row: usize, found: usize, expected: usize },
     #[error("`corner_m` or `heights_m` holds a number that is not finite")]
     NotFinite,
 }
@@ -43,9 +29,6 @@ pub enum HeightGridError {
 impl HeightGrid {
     /// The grid whose south-western node is `corner` (ENU, metres), with rows from south to north of heights from
     /// west to east, metres.
-    ///
-    /// # Errors
-    /// [`HeightGridError`] says which number is at fault.
     pub fn new(
         corner: Vector2<f64>,
         spacing_m: f64,
@@ -69,13 +52,11 @@ impl HeightGrid {
     }
 
     /// Its south-western node (ENU, metres).
-    #[must_use]
     pub fn corner(&self) -> Vector2<f64> {
         self.corner
     }
 
     /// From node to node, metres.
-    #[must_use]
     pub fn spacing_m(&self) -> f64 {
         self.spacing_m
     }
@@ -85,8 +66,6 @@ impl HeightGrid {
         self.heights_m.chunks_exact(self.columns)
     }
 
-    /// Height at a place, metres.
-    #[must_use]
     pub fn height_m(&self, x: f64, y: f64) -> f64 {
         let (column, east) = self.cell(x - self.corner.x, self.columns);
         let (row, north) = self.cell(y - self.corner.y, self.heights_m.len() / self.columns);

@@ -26,7 +26,6 @@ pub struct KeepOut {
     airspace: Airspace,
     margin_m: f64,
     terrain_clearance_m: f64,
-    /// Whether there is any terrain.
     has_terrain: bool,
     /// `sqrt(1 + slope^2)` of the steepest slope.
     steepness: f64,
@@ -35,7 +34,6 @@ pub struct KeepOut {
 impl KeepOut {
     /// The zones of `airspace` with `margin_m` around them, and what is lower than `terrain_clearance_m` above its
     /// terrain, if it has any.
-    #[must_use]
     pub fn new(airspace: Airspace, margin_m: f64, terrain_clearance_m: f64) -> KeepOut {
         let steepness = airspace.steepest().hypot(1.0);
         let has_terrain = !airspace.mountains.is_empty() || airspace.heights.is_some();
@@ -44,14 +42,12 @@ impl KeepOut {
 
     /// Distance to the nearest place that is closed, margin and clearance included, metres: a lower bound. Negative
     /// inside.
-    #[must_use]
     pub fn room_m(&self, point: &Vector3<f64>) -> f64 {
         let zones_m = self.off_zones_m(point) - self.margin_m;
         zones_m.min(self.off_terrain_m(point, self.terrain_clearance_m))
     }
 
     /// Distance to the nearest zone or the ground itself, without margin, metres: a lower bound. Negative inside.
-    #[must_use]
     pub fn bare_room_m(&self, point: &Vector3<f64>) -> f64 {
         self.off_zones_m(point).min(self.off_terrain_m(point, 0.0))
     }
@@ -73,7 +69,6 @@ impl KeepOut {
 
     /// How much of the straight way between two points is closed, metres; what it cuts off by less than some
     /// centimetres is not counted.
-    #[must_use]
     pub fn inside_m(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
         let length_m = (to - from).norm();
         let (mut at_m, mut inside_m) = (0.0, 0.0);
@@ -89,7 +84,6 @@ impl KeepOut {
     /// The points of zones and ground, without margin, that are nearest to `point`, of those within `reach_m`: one
     /// for each zone, one for each edge of a polygon. What keeps clear of the points keeps clear of the zones. None
     /// from inside a zone, so that they do not hold back who leaves it.
-    #[must_use]
     pub fn walls(&self, point: &Vector3<f64>, reach_m: f64) -> Vec<Vector3<f64>> {
         let Airspace { threats, no_fly, prisms, .. } = &self.airspace;
         if !(0.0..reach_m).contains(&self.bare_room_m(point)) {
@@ -115,7 +109,6 @@ impl KeepOut {
 
     /// What a lidar at `origin` would see of the zones, if they could be seen: where each of so many level rays, evenly
     /// around, meets one within `reach_m`. Nothing from inside.
-    #[must_use]
     pub fn seen_from(&self, origin: &Vector3<f64>, rays: usize, reach_m: f64) -> Vec<Vector3<f64>> {
         if !(0.0..reach_m).contains(&self.bare_room_m(origin)) {
             return Vec::new();
@@ -138,7 +131,6 @@ impl KeepOut {
 
     /// A place near `point`, at its height, that is open and that `accepts` takes: `point` itself if it is one, else
     /// about the nearest.
-    #[must_use]
     pub fn nearest_open(
         &self,
         point: &Vector3<f64>,
@@ -150,7 +142,6 @@ impl KeepOut {
 
     /// Least distance to a zone, margin included, of the way straight down from `point` to the ground, metres:
     /// negative where it leads through one. The ground is at `ground_m`, or is the terrain.
-    #[must_use]
     pub fn room_below_m(&self, point: &Vector3<f64>, ground_m: f64) -> f64 {
         let mut below = *point;
         let mut room_m = f64::INFINITY;
@@ -225,7 +216,7 @@ fn at_height(level: Vector2<f64>, height_m: f64, floor_m: f64, ceiling_m: f64) -
     level.push(height_m.max(floor_m).min(ceiling_m))
 }
 
-/// How far a height is from a band of heights, metres; negative inside.
+/// The distance of a height from a band of heights, metres; negative inside.
 fn off_band_m(height_m: f64, floor_m: f64, ceiling_m: f64) -> f64 {
     (floor_m - height_m).max(height_m - ceiling_m)
 }

@@ -5,7 +5,7 @@ use super::open_list::{Open, OpenList};
 use crate::grid::{Bricks, Lattice, MOVES, Packed, moved, octile};
 use crate::map::VoxelIndex;
 
-/// How hard a search tries, and for how long.
+/// The effort of a search: how near the cheapest way it must come, and its budget.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
     /// Weight of the heuristic that the search begins with, at least 1: the greater, the sooner there is a first
@@ -25,14 +25,12 @@ impl Effort {
     pub const OPTIMAL: Effort = Effort { weight: 1.0, bound: 1.0, budget: usize::MAX };
 
     /// Weighted A*: a path that costs at most `bound` times the least.
-    #[must_use]
     pub fn weighted(bound: f64) -> Effort {
         Effort { weight: bound, bound, budget: usize::MAX }
     }
 
     /// Budgeted A*: soon a path, then better ones, until one costs at most `bound` times the least or `budget` cells
     /// have been expanded.
-    #[must_use]
     pub fn budgeted(bound: f64, budget: usize) -> Effort {
         Effort { weight: FIRST_WEIGHT.max(bound), bound, budget }
     }
@@ -40,7 +38,7 @@ impl Effort {
 
 /// The weight that a budgeted search begins with.
 const FIRST_WEIGHT: f64 = 1.5;
-/// What is left of the excess weight from one round to the next.
+/// Share of the excess weight that the next round keeps.
 const TIGHTENED: f64 = 0.25;
 
 /// A way through a grid.
@@ -58,16 +56,10 @@ pub struct Route {
 /// Why there is no way.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Unsolved {
-    /// The goal cannot be reached.
     #[error("everything reachable from the start was searched ({expanded} cells)")]
     Unreachable { expanded: usize },
-    /// The budget was spent first.
     #[error("no way was found within {expanded} expansions")]
-    Spent {
-        expanded: usize,
-        /// The way to the cell reached that is nearest to the goal by the heuristic.
-        partial: Vec<VoxelIndex>,
-    },
+    Spent { expanded: usize, partial: Vec<VoxelIndex> },
 }
 
 /// A search over a [`Lattice`], and the memory that searches reuse, so that the next one allocates little and clears
@@ -98,14 +90,14 @@ pub struct Search {
     effort: Effort,
     weight: f64,
     goal_g: f64,
-    /// What the path known is proven to cost at most.
+    /// Proven bound on the cost of the path known.
     bound: f64,
     expanded: usize,
     /// The cell reached that is nearest to the goal by the heuristic, and how near.
     nearest: (VoxelIndex, f64),
 }
 
-/// What a search knows of a cell; valid if `generation` is the search's own.
+/// A cell's record in a search; valid if `generation` is the search's own.
 #[derive(Clone, Copy, Debug, Default)]
 struct Node {
     g: f64,
@@ -145,9 +137,6 @@ impl Default for Search {
 
 impl Search {
     /// Searches from start to goal, both cells of the lattice, until there is an answer.
-    ///
-    /// # Errors
-    /// There is no way, or none was found within the budget.
     ///
     /// ```
     /// use skein_planning::global::{Effort, Search};
@@ -227,7 +216,6 @@ impl Search {
     }
 
     /// Cells expanded so far.
-    #[must_use]
     pub fn expanded(&self) -> usize {
         self.expanded
     }
@@ -370,8 +358,7 @@ fn g_of(open: &Open) -> f64 {
     f64::from_bits(!open.tie)
 }
 
-/// What a way through neighbours costs; infinite if a step of it does not exist.
-#[must_use]
+/// The cost of a way through neighbours; infinite if a step of it does not exist.
 pub fn cost_of(lattice: &impl Lattice, cells: &[VoxelIndex]) -> f64 {
     let step_cost = |pair: &[VoxelIndex]| {
         let mut found = f64::INFINITY;

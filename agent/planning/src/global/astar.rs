@@ -10,7 +10,7 @@ use crate::map::{ClearanceMap, VoxelIndex};
 use crate::path::Path;
 use crate::region::Region;
 
-/// How [`plan`] searches.
+/// The settings of [`plan`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AstarConfig {
     /// Clearance that every voxel of the path must have, metres: hull radius, tracking error and position
@@ -50,7 +50,6 @@ impl Default for AstarConfig {
 pub struct Disc {
     /// Centre (ENU, metres); its height does not matter.
     pub centre: Vector3<f64>,
-    /// Radius, metres.
     pub radius_m: f64,
 }
 
@@ -82,52 +81,27 @@ pub struct Plan {
 /// Why there is no path.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// The start is not in the map's window.
     #[error("start ({:.2}, {:.2}, {:.2}) is outside the map's window; recentre the map on the vehicle", .start.x, .start.y, .start.z)]
     StartOutside { start: Vector3<f64> },
-    /// The goal is not in the map's window.
     #[error("goal ({:.2}, {:.2}, {:.2}) is outside the map's window; plan to a nearer one", .goal.x, .goal.y, .goal.z)]
     GoalOutside { goal: Vector3<f64> },
-    /// The goal is too near an obstacle, or in a disc.
     #[error("goal ({:.2}, {:.2}, {:.2}) has a clearance of {clearance_m:.2} m, expected {required_m:.2} m or more", .goal.x, .goal.y, .goal.z)]
-    GoalBlocked {
-        goal: Vector3<f64>,
-        /// Clearance there, metres.
-        clearance_m: f64,
-        /// Clearance required, metres.
-        required_m: f64,
-    },
-    /// The goal is in a place that is closed.
+    GoalBlocked { goal: Vector3<f64>, clearance_m: f64, required_m: f64 },
     #[error("goal ({:.2}, {:.2}, {:.2}) is in or next to a no-fly zone or a threat, or too low above the terrain, by {inside_m:.2} m", .goal.x, .goal.y, .goal.z)]
-    GoalClosed {
-        goal: Vector3<f64>,
-        /// How deep it is inside, metres.
-        inside_m: f64,
-    },
-    /// The goal is outside the box that the path is to stay in.
+    GoalClosed { goal: Vector3<f64>, inside_m: f64 },
     #[error("goal ({:.2}, {:.2}, {:.2}) is outside what limits allow, by {outside_m:.2} m", .goal.x, .goal.y, .goal.z)]
-    GoalBeyondLimits {
-        goal: Vector3<f64>,
-        /// How far outside it is, metres.
-        outside_m: f64,
-    },
-    /// No path exists in what is known.
+    GoalBeyondLimits { goal: Vector3<f64>, outside_m: f64 },
     #[error("no path: everything reachable from the start was searched ({expanded} voxels)")]
     Unreachable { expanded: usize },
-    /// The budget was spent first.
     #[error("no path within the budget of {budget} expansions")]
-    BudgetExhausted {
-        budget: usize,
-        /// The way to the voxel nearest to the goal (by the heuristic) that was reached.
-        partial: Path,
-    },
+    BudgetExhausted { budget: usize, partial: Path },
 }
 
 /// Room in a voxel that is occupied or outside.
 const BLOCKED: i32 = i32::MIN;
-/// What a metre costs more on the way out of a place that is closed: the way out is about the shortest.
+/// Extra cost of a metre on the way out of a closed place, so that the way out is about the shortest.
 const CLOSED_WEIGHT: f64 = 20.0;
-/// How finely depth in a disc is told apart.
+/// Steps of depth in a disc that are told apart.
 const DISC_STEPS: f64 = 64.0;
 /// So much of a voxel may stick out of the box that a path stays in: half of it, whatever the rounding.
 pub(super) const HALF_A_VOXEL: f64 = 0.501;
@@ -153,9 +127,6 @@ const SPACE_EXPANSIONS: usize = 4;
 /// the way out that is about the shortest, for a metre inside costs 20 metres more.
 ///
 /// The layers searched are tracked in `map` from then on.
-///
-/// # Errors
-/// See [`PlanError`].
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -197,7 +168,6 @@ pub struct Astar {
     is_begun: bool,
 }
 
-/// What is searched.
 #[derive(Clone, Copy, Debug, Default)]
 struct Extent {
     start: VoxelIndex,
@@ -313,7 +283,7 @@ struct Rooms<'a> {
     start: VoxelIndex,
     /// Whether height changes evenly along the path.
     planar: bool,
-    /// How deep the start is in what is closed, metres; 0 outside.
+    /// Depth of the start in a closed place, metres; 0 outside.
     start_depth_m: f64,
 }
 

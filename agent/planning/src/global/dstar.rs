@@ -8,7 +8,7 @@ use crate::grid::{Grid, OccupancyGrid, StepCosts};
 use crate::map::{ClearanceMap, VoxelIndex};
 use crate::region::Region;
 
-/// How [`Dstar`] plans.
+/// The settings of [`Dstar`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DstarConfig {
     /// Clearance that every voxel of the path must have, metres.

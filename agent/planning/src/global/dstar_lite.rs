@@ -81,7 +81,6 @@ const OPEN_AT_LEAST: usize = 4096;
 
 impl DStarLite {
     /// A search from `goal` to `start`, both cells of the lattice. [`DStarLite::plan`] does the work.
-    #[must_use]
     pub fn new(lattice: &impl ReversibleLattice, start: VoxelIndex, goal: VoxelIndex) -> DStarLite {
         let mut search = DStarLite {
             nodes: Bricks::default(),
@@ -102,7 +101,6 @@ impl DStarLite {
     }
 
     /// Where the way ends.
-    #[must_use]
     pub fn goal(&self) -> VoxelIndex {
         self.goal
     }

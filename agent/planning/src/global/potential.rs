@@ -28,7 +28,6 @@ const CORE_M: f64 = 0.1;
 impl Potential {
     /// The potential, with gain `eta` (metres squared), of those `obstacles` in whose field a vehicle at
     /// `position` is that heads along `heading`.
-    #[must_use]
     pub fn gated(
         position: &Vector3<f64>,
         heading: &Vector3<f64>,
@@ -42,13 +41,11 @@ impl Potential {
     }
 
     /// Whether it is zero everywhere.
-    #[must_use]
     pub fn is_zero(&self) -> bool {
         self.obstacles.is_empty() || self.gain <= 0.0
     }
 
     /// `U` at a place.
-    #[must_use]
     pub fn at(&self, place: &Vector3<f64>) -> f64 {
         let mut sum = 0.0;
         for obstacle in &self.obstacles {
@@ -78,7 +75,6 @@ impl Potential {
 /// assert!(!is_in_field(&Vector3::new(1.0, 0.2, 0.0), &ahead, 1.0));
 /// assert!(!is_in_field(&Vector3::new(-1.0, 0.0, 0.0), &ahead, 1.0));
 /// ```
-#[must_use]
 pub fn is_in_field(heading: &Vector3<f64>, offset: &Vector3<f64>, influence_m: f64) -> bool {
     let distance = offset.norm();
     if distance < influence_m {

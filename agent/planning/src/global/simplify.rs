@@ -10,7 +10,6 @@ use crate::path::Path;
 const COLLINEAR_SIN: f64 = 1e-6;
 
 /// Of collinear waypoints keeps the ends only (Zhang 2019, elision).
-#[must_use]
 pub fn elide_collinear(path: &Path) -> Path {
     let mut kept: Vec<Vector3<f64>> = Vec::new();
     for point in path.points() {
@@ -31,13 +30,11 @@ pub fn elide_collinear(path: &Path) -> Path {
 /// In sight means that all voxels of the straight line have `clearance_m`, or as much as the part of the path
 /// that it replaces has, if that is less: the way out of a tight place is not made tighter. Nor does a straight line
 /// lead further through places that are closed ([`ClearanceMap::keep_out`]) than what it replaces.
-#[must_use]
 pub fn simplify(map: &ClearanceMap, path: &Path, clearance_m: f64) -> Path {
     simplify_around(map, path, clearance_m, &[])
 }
 
 /// As [`simplify`], and leads no deeper into a disc than the path does.
-#[must_use]
 pub fn simplify_around(map: &ClearanceMap, path: &Path, clearance_m: f64, discs: &[Disc]) -> Path {
     let path = elide_collinear(path);
     let points = path.points();
@@ -71,7 +68,7 @@ pub fn simplify_around(map: &ClearanceMap, path: &Path, clearance_m: f64, discs:
     Path::new(kept).unwrap_or(path)
 }
 
-/// How deep in a disc a straight line leads, metres; 0 outside.
+/// The greatest depth in a disc along a straight line, metres; 0 outside.
 fn depth_m(disc: &Disc, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
     let (offset, leg) = ((disc.centre - from).xy(), (to - from).xy());
     let along = offset.dot(&leg) / leg.norm_squared();

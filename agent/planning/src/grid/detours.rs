@@ -18,7 +18,6 @@ const SAME_LENGTH: f64 = 1e-9;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Worth {
     None,
-    /// Those of one step.
     Direct,
     /// Those of two steps too: steps from no cell cost more beyond their length than those from the one passed by.
     Any,

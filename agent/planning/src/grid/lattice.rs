@@ -1,4 +1,4 @@
-//! What a search must know of a grid: its size, its steps, and what they cost.
+//! The grid as a search knows it: its size, its steps, and their costs.
 
 use super::detours::{self, Worth};
 use super::moves::LENGTHS;
@@ -39,7 +39,7 @@ pub trait ReversibleLattice: Lattice {
     fn steps_into(&self, cell: VoxelIndex, visit: impl FnMut(usize, f64));
 }
 
-/// What steps cost on a [`Grid`], and which there are.
+/// The steps on a [`Grid`] and their costs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepCosts {
     /// Cost of a step through a face, across an edge and across a corner.
@@ -85,7 +85,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// What a step from `cell` costs beyond its length, given its neighbourhood.
+    /// The cost of a step from `cell` beyond its length, given its neighbourhood.
     #[inline]
     fn penalty(&self, cell: VoxelIndex, around: u32) -> f64 {
         let factor = self.costs.collision_factor;

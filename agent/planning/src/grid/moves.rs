@@ -17,7 +17,6 @@ pub struct Move {
     pub by: [i8; 3],
     /// Along how many axes it leads, less one: 0 through a face, 1 across an edge, 2 across a corner.
     pub kind: usize,
-    /// Length in cells.
     pub length: f64,
     /// The box that a body sweeps on its way, without the cell it leaves, as bits of a neighbourhood
     /// ([`OccupancyGrid::blocked_around`](super::OccupancyGrid::blocked_around)).
@@ -82,7 +81,6 @@ pub(crate) fn unswept(blocked: u32) -> u32 {
     !spread(spread(spread(blocked, x, 1), y, 3), z, 9) & NEIGHBOURHOOD & !CENTRE
 }
 
-/// The numbers of the moves with these ends.
 #[inline]
 pub(crate) fn moves_to(mut ends: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
@@ -124,7 +122,6 @@ impl Packed {
 
 /// Cost of the shortest way between two cells on an empty grid whose steps through a face, across an edge and across a
 /// corner cost `[1, sqrt 2, sqrt 3]` times the unit, or anything else for which the longer diagonals pay.
-#[must_use]
 #[inline]
 pub fn octile(from: VoxelIndex, to: VoxelIndex, costs: [f64; 3]) -> f64 {
     let apart = [from.x.abs_diff(to.x), from.y.abs_diff(to.y), from.z.abs_diff(to.z)];

@@ -16,7 +16,7 @@ const ABOVE_AND_BELOW: u32 = FACES[2][0] | FACES[2][1];
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("a grid of {} x {} x {} cells, expected 1 to 2,000,000 along each axis and no more in all than 256 MB hold at a bit for each", .size[0], .size[1], .size[2])]
 pub struct SizeError {
-    /// What was asked for: cells along x, y and z.
+    /// The size asked for: cells along x, y and z.
     pub size: [usize; 3],
 }
 
@@ -35,9 +35,6 @@ pub struct OccupancyGrid {
 
 impl OccupancyGrid {
     /// A grid of free cells, so many along x, y and z.
-    ///
-    /// # Errors
-    /// No cells, or too many.
     pub fn new(size: [usize; 3]) -> Result<OccupancyGrid, SizeError> {
         let [nx, _, nz] = size;
         let is_possible = size.iter().all(|side| (1..=MOST_ALONG_AN_AXIS).contains(side));
@@ -65,20 +62,17 @@ impl OccupancyGrid {
     }
 
     /// Cells along x, y and z.
-    #[must_use]
     pub fn size(&self) -> [usize; 3] {
         self.size
     }
 
     /// Whether a cell lies in the grid.
-    #[must_use]
     pub fn contains(&self, cell: VoxelIndex) -> bool {
         let [nx, ny, nz] = self.size;
         cell.x < nx && cell.y < ny && cell.z < nz
     }
 
     /// Whether a cell is blocked; outside all are.
-    #[must_use]
     pub fn is_blocked(&self, cell: VoxelIndex) -> bool {
         !self.contains(cell) || {
             let (byte, bit) = self.place(cell);
@@ -97,7 +91,6 @@ impl OccupancyGrid {
 
     /// Which of the 27 cells around a cell of the grid, itself included, are blocked: a bit for each, lowest first, x
     /// fastest, z slowest.
-    #[must_use]
     #[inline(always)]
     pub fn blocked_around(&self, cell: VoxelIndex) -> u32 {
         let slab = self.row * self.layer;
@@ -119,7 +112,6 @@ impl OccupancyGrid {
 
     /// Which of the 27 cells around a cell of the grid lie outside, in the order of
     /// [`OccupancyGrid::blocked_around`].
-    #[must_use]
     pub fn outside_around(&self, cell: VoxelIndex) -> u32 {
         let at = [cell.x, cell.y, cell.z];
         let mut outside = 0;

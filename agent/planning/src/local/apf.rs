@@ -33,16 +33,16 @@ impl Default for ApfConfig {
     }
 }
 
-/// What to fly now.
+/// The velocity to fly now, and the place on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guidance {
     /// Velocity wanted (ENU, m/s), no faster than the speed given.
     pub velocity: Vector3<f64>,
     /// The point of the path that attracts (ENU, metres).
     pub carrot: Vector3<f64>,
-    /// How far along the path the vehicle is, metres.
+    /// The vehicle's place along the path, metres.
     pub station_m: f64,
-    /// How far off the path it is, metres.
+    /// Its distance from the path, metres.
     pub off_path_m: f64,
     /// The repulsive part of the velocity, before the speed was limited.
     pub repulsion: Vector3<f64>,
@@ -64,7 +64,6 @@ pub struct Guidance {
 /// assert_eq!(guidance.velocity, Vector3::new(2.0, 0.0, 0.0));
 /// assert_eq!(guidance.station_m, 1.0);
 /// ```
-#[must_use]
 pub fn follow(
     map: &ClearanceMap,
     path: &Path,
@@ -89,7 +88,6 @@ pub fn follow(
 }
 
 /// The repulsive velocity of the map's obstacles at a place, horizontal (ENU, m/s).
-#[must_use]
 pub fn repulsion(map: &ClearanceMap, position: &Vector3<f64>, config: &ApfConfig) -> Vector3<f64> {
     let mut sum = Vector3::zeros();
     for obstacle in map.obstacles_around(position, config.influence_m).points() {
@@ -105,7 +103,6 @@ pub fn repulsion(map: &ClearanceMap, position: &Vector3<f64>, config: &ApfConfig
 }
 
 /// `velocity`, no longer than `speed_m_s`.
-#[must_use]
 pub fn limited(velocity: Vector3<f64>, speed_m_s: f64) -> Vector3<f64> {
     let speed = velocity.norm();
     if speed > speed_m_s { velocity * (speed_m_s.max(0.0) / speed) } else { velocity }

@@ -1,4 +1,4 @@
-//! How fast one may fly: no faster than one can stop (a correction of Xu 2023).
+//! Speed limits: no faster than one can stop (a correction of Xu 2023).
 
 use crate::path::Path;
 
@@ -18,7 +18,7 @@ pub struct BrakingConfig {
     pub latency_s: f64,
     /// Distance kept to the end of the sensed free space, metres.
     pub margin_m: f64,
-    /// How far a corner may be cut or overshot, metres.
+    /// The distance by which a corner may be cut or overshot, metres.
     pub corner_tolerance_m: f64,
 }
 
@@ -57,7 +57,6 @@ pub enum SpeedLimit {
 /// let speed = skein_planning::local::braking::stopping_speed(10.0, 0.86, 0.5);
 /// assert!((speed - 3.74).abs() < 0.01);
 /// ```
-#[must_use]
 pub fn stopping_speed(distance_m: f64, decel_m_s2: f64, latency_s: f64) -> f64 {
     if distance_m.is_nan() || distance_m <= 0.0 {
         return 0.0;
@@ -66,18 +65,11 @@ pub fn stopping_speed(distance_m: f64, decel_m_s2: f64, latency_s: f64) -> f64 {
     (lag * lag + 2.0 * decel_m_s2 * distance_m).sqrt() - lag
 }
 
-/// Distance needed to stop, metres: the inverse of [`stopping_speed`].
-#[must_use]
-pub fn stopping_distance(speed_m_s: f64, decel_m_s2: f64, latency_s: f64) -> f64 {
-    speed_m_s * latency_s + speed_m_s * speed_m_s / (2.0 * decel_m_s2)
-}
-
 /// The speed cap at `station_m` of a path, m/s, and what sets it. `sensed_free_m` is how far ahead the way is
 /// known to be free.
 ///
 /// Towards corners and the goal the cap falls as the braking trapezoid `v^2 = v_c^2 + 2 a s` does; a corner
 /// is rounded at the radius that stays within the tolerance, with `decel_m_s2` across.
-#[must_use]
 pub fn speed_cap(
     path: &Path,
     station_m: f64,
@@ -109,7 +101,6 @@ pub fn speed_cap(
 /// The next speed of a set-point that was `previous_m_s`: down to the cap at once, up to it by the
 /// acceleration over `step_s`, and from rest at a share `k = 0.3` of the cap at once, so that it does not
 /// crawl (Xu 2023, speed planning).
-#[must_use]
 pub fn ramp(previous_m_s: f64, cap_m_s: f64, step_s: f64, config: &BrakingConfig) -> f64 {
     const START_FLOOR: f64 = 0.3;
     let risen = previous_m_s.max(0.0) + config.accel_m_s2 * step_s;
@@ -143,7 +134,8 @@ mod tests {
             distance in 0.01..60.0_f64, decel in 0.3..6.0_f64, latency in 0.0..1.5_f64,
         ) {
             let speed = stopping_speed(distance, decel, latency);
-            prop_assert!((stopping_distance(speed, decel, latency) - distance).abs() < 1e-9);
+            let needed = speed * latency + speed * speed / (2.0 * decel);
+            prop_assert!((needed - distance).abs() < 1e-9);
         }
 
         #[test]

@@ -10,7 +10,7 @@ pub struct EscapeConfig {
     pub window: Duration,
     /// Least progress along the path over the window, metres.
     pub min_progress_m: f64,
-    /// How long an escape lasts once begun.
+    /// The duration of an escape once begun.
     pub escape_for: Duration,
     /// Share of the attraction that is left during an escape (Wang 2023: the attractive gain is reduced).
     pub attraction: f64,
@@ -27,7 +27,7 @@ impl Default for EscapeConfig {
     }
 }
 
-/// What the detector says of the last window.
+/// The detector's verdict on the last window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The vehicle gets on, or it is too early to tell.
@@ -60,7 +60,6 @@ pub struct EscapeDetector {
 
 impl EscapeDetector {
     /// A detector that has seen nothing.
-    #[must_use]
     pub fn new(config: EscapeConfig) -> EscapeDetector {
         EscapeDetector { config, progress: VecDeque::new(), escaping_until: None }
     }
@@ -95,7 +94,6 @@ impl EscapeDetector {
     }
 
     /// The factor for the attraction now: 1, or less during an escape.
-    #[must_use]
     pub fn attraction(&self) -> f64 {
         if self.escaping_until.is_some() { self.config.attraction } else { 1.0 }
     }

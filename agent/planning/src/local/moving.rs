@@ -10,12 +10,12 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use crate::map::ClearanceMap;
 use crate::separation::Neighbour;
 
-/// How returns are grouped and followed.
+/// The rules by which returns are grouped and followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovingConfig {
     /// Neighbouring returns further apart than this are of two things, metres.
     pub gap_m: f64,
-    /// What is wider than this does not move, metres.
+    /// The widest thing that can move, metres.
     pub widest_m: f64,
     /// Of fewer returns than this no place is known.
     pub fewest_returns: usize,
@@ -40,7 +40,7 @@ pub struct MovingConfig {
     pub most_surprise_m: f64,
     /// Standard deviation of a place that has just been seen, metres, and its growth while unseen, m/s.
     pub sigma_m: [f64; 2],
-    /// What has not been seen for this long is forgotten, seconds.
+    /// Things unseen for this long are forgotten, seconds.
     pub forget_s: f64,
 }
 
@@ -70,7 +70,7 @@ impl Default for MovingConfig {
 struct Track {
     id: u32,
     first_seen: Vector3<f64>,
-    /// What was seen of it first: a place on its surface.
+    /// The place on its surface that was seen first.
     first_surface: Vector3<f64>,
     position: Vector3<f64>,
     velocity: Vector3<f64>,
@@ -107,7 +107,6 @@ pub struct Tracker {
 
 impl Tracker {
     /// A tracker that has seen nothing.
-    #[must_use]
     pub fn new(config: MovingConfig) -> Tracker {
         Tracker { config, tracks: Vec::new(), next_id: u32::MAX }
     }

@@ -38,7 +38,6 @@ pub struct SpeedConfig {
 
 impl SpeedConfig {
     /// The same for another cruising speed: its first and last phases are as long as the same acceleration makes them.
-    #[must_use]
     pub fn cruising_at(self, cruise_m_s: f64) -> SpeedConfig {
         let ratio = cruise_m_s / self.cruise_m_s;
         SpeedConfig {
@@ -80,7 +79,6 @@ impl Default for SpeedConfig {
 /// assert_eq!([at(0.0), at(50.0), at(100.0)], [1.5, 5.0, 0.0]);
 /// assert!((at(10.0) - 3.25).abs() < 1e-12);
 /// ```
-#[must_use]
 pub fn trapezoid(flown_m: f64, remaining_m: f64, config: &SpeedConfig) -> f64 {
     let share = |way_m: f64, phase_m: f64| (way_m / phase_m).clamp(0.0, 1.0);
     let up = config.start_share + (1.0 - config.start_share) * share(flown_m, config.speed_up_m);
@@ -95,7 +93,6 @@ pub fn trapezoid(flown_m: f64, remaining_m: f64, config: &SpeedConfig) -> f64 {
 /// still stop straight before it, `v cos u <= v_stop(g)`, and its stop along its own way, begun when it may have
 /// become faster by `a t`, brings it no nearer than that: `v cos u (t + (v + a t) / 2a) <= g`. The least over all
 /// obstacles counts, but never less than [`SpeedConfig::beside_m_s`].
-#[must_use]
 pub fn unhindered_speed(
     place: &Vector3<f64>,
     ahead: &Vector3<f64>,
@@ -117,7 +114,6 @@ pub fn unhindered_speed(
 
 /// Speed, m/s, from which a vehicle at `place` that goes in the unit direction `ahead` stops gently before the first
 /// of the `obstacles` that stands in its way.
-#[must_use]
 pub fn speed_to_stop(
     place: &Vector3<f64>,
     ahead: &Vector3<f64>,
@@ -136,7 +132,6 @@ pub fn speed_to_stop(
 }
 
 /// Speed, m/s, from which one slows down gently to `speed_m_s` over `way_m`.
-#[must_use]
 pub fn run_up(speed_m_s: f64, way_m: f64, config: &SpeedConfig) -> f64 {
     let lag = config.brake_m_s2 * config.latency_s;
     let way_m = (way_m - speed_m_s * config.latency_s).max(0.0);
@@ -146,7 +141,6 @@ pub fn run_up(speed_m_s: f64, way_m: f64, config: &SpeedConfig) -> f64 {
 /// The next velocity of a set-point that was `previous`, on its way to `wanted`, after `step_s`: it turns and changes
 /// its speed by no more than `accel_m_s2`. Slowing down comes first: who turns away from what is ahead has not yet
 /// passed it.
-#[must_use]
 pub fn step(previous: &Vector3<f64>, wanted: &Vector3<f64>, step_s: f64, accel_m_s2: f64) -> Vector3<f64> {
     let most = accel_m_s2 * step_s;
     let speed = previous.norm();

@@ -18,7 +18,7 @@ const SAME_CHOICE: f64 = 0.2;
 /// every way out leads straight away.
 const WAY_OUT_M: f64 = 0.1;
 
-/// How the histogram is made and read.
+/// The settings by which the histogram is made and read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VfhConfig {
     /// Sectors of a turn, 4 or more.
@@ -45,7 +45,6 @@ pub struct VfhConfig {
 
 impl VfhConfig {
     /// The published histogram: 12 sectors of 30 degrees.
-    #[must_use]
     pub fn published() -> VfhConfig {
         VfhConfig { sectors: 12, low_m: 0.3, high_m: 0.8, ..VfhConfig::default() }
     }
@@ -69,7 +68,7 @@ impl Default for VfhConfig {
     }
 }
 
-/// What a sector is, by its density alone.
+/// The state of a sector, by its density alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SectorState {
     /// 0 in the paper.
@@ -80,7 +79,7 @@ pub enum SectorState {
     Uncertain,
 }
 
-/// How crowded each sector of a turn is. Sectors are counted counter-clockwise from east.
+/// The density of each sector of a turn. Sectors are counted counter-clockwise from east.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Histogram {
     densities_m: Vec<f64>,
@@ -94,7 +93,6 @@ impl Histogram {
     /// divided by the sector's rays, so that thresholds depend neither on their number nor on that of the sectors.
     ///
     /// Of a lidar that pitches with its vehicle the returns of the ground are to be left out before.
-    #[must_use]
     pub fn of(origin: &Vector3<f64>, points: &[Vector3<f64>], rays: usize, config: &VfhConfig) -> Histogram {
         let sectors = config.sectors.max(4);
         let share = sectors as f64 / rays.max(sectors) as f64;
@@ -114,19 +112,16 @@ impl Histogram {
     }
 
     /// Distance to the nearest return, metres; infinite without one.
-    #[must_use]
     pub fn nearest_m(&self) -> f64 {
         self.nearest_m.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
     /// The density of each sector, metres: 0 is empty, and `dmax` is full of what is at hand.
-    #[must_use]
     pub fn densities_m(&self) -> &[f64] {
         &self.densities_m
     }
 
     /// Each sector by its density: `H < low` free, `low <= H <= high` uncertain, `H > high` blocked.
-    #[must_use]
     pub fn states(&self, config: &VfhConfig) -> Vec<SectorState> {
         let state = |density_m: &f64| match *density_m {
             density_m if density_m < config.low_m => SectorState::Free,
@@ -140,7 +135,6 @@ impl Histogram {
 /// Decides the uncertain sectors: one stays what it was, unless both its neighbours are surely otherwise.
 ///
 /// `was_blocked` has each sector's last decision. Without one an uncertain sector counts as blocked, as in the paper.
-#[must_use]
 pub fn decide(states: &[SectorState], was_blocked: Option<&[bool]>) -> Vec<bool> {
     let count = states.len();
     let decided = |(k, state): (usize, &SectorState)| match state {
@@ -161,7 +155,7 @@ pub fn decide(states: &[SectorState], was_blocked: Option<&[bool]>) -> Vec<bool>
 pub struct Opening {
     /// The rightmost bearing, radians counter-clockwise from east.
     pub from: f64,
-    /// How far it reaches from there, counter-clockwise, radians; a turn where nothing is blocked.
+    /// Its width from there, counter-clockwise, radians; a turn where nothing is blocked.
     pub width: f64,
 }
 
@@ -175,7 +169,6 @@ impl Opening {
 
 /// Every opening: runs of free sectors that are wide enough to keep `radius_m`, at the distance of the nearest return
 /// in the blocked sectors that bound them.
-#[must_use]
 pub fn openings(histogram: &Histogram, blocked: &[bool], radius_m: f64) -> Vec<Opening> {
     let count = blocked.len();
     let Some(first) = blocked.iter().position(|blocked| *blocked) else {
@@ -230,7 +223,6 @@ pub struct Vfh {
 
 impl Vfh {
     /// A planner that has seen nothing, and takes all to be free.
-    #[must_use]
     pub fn new(config: VfhConfig) -> Vfh {
         let all = vec![Opening { from: -PI, width: TAU }];
         Vfh {
@@ -285,7 +277,6 @@ impl Vfh {
 
     /// Distance that every opening of the newest scan leaves, metres: the safety radius, or less where the vehicle is
     /// nearer than that to something.
-    #[must_use]
     pub fn kept_m(&self) -> f64 {
         self.kept_m
     }
@@ -297,13 +288,11 @@ impl Vfh {
 }
 
 /// The horizontal bearing of a direction, radians counter-clockwise from east, in `[-pi, pi]`.
-#[must_use]
 pub fn bearing(direction: &Vector3<f64>) -> f64 {
     direction.y.atan2(direction.x)
 }
 
 /// The horizontal unit vector of a bearing.
-#[must_use]
 pub fn direction(bearing: f64) -> Vector3<f64> {
     let (sin, cos) = bearing.sin_cos();
     Vector3::new(cos, sin, 0.0)

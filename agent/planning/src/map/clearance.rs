@@ -82,35 +82,30 @@ impl ClearanceMap {
     }
 
     /// The same map of a world in which some places are known to be closed: searches keep out of them.
-    #[must_use]
     pub fn with_keep_out(self, keep_out: KeepOut) -> ClearanceMap {
         ClearanceMap { keep_out: Some(keep_out), ..self }
     }
 
     /// The places that are closed, if any are known.
-    #[must_use]
     pub fn keep_out(&self) -> Option<&KeepOut> {
         self.keep_out.as_ref()
     }
 
     /// Whether the straight way between two points is open all along.
-    #[must_use]
     pub fn is_open(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
         self.inside_m(from, to) == 0.0
     }
 
-    /// How much of the straight way between two points is closed, metres.
+    /// The length of the straight way between two points that is closed, metres.
     pub(crate) fn inside_m(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
         self.keep_out.as_ref().map_or(0.0, |keep_out| keep_out.inside_m(from, to))
     }
 
-    #[must_use]
     pub fn voxels(&self) -> &VoxelMap {
         &self.voxels
     }
 
     /// Distance beyond which clearance is not told apart, metres.
-    #[must_use]
     pub fn truncation_m(&self) -> f64 {
         (f64::from(self.reach) - 0.5) * self.voxels.config().resolution_m
     }
@@ -164,13 +159,11 @@ impl ClearanceMap {
     /// Horizontal distance from `point` to the nearest obstacle in its layer, metres, at most
     /// [`ClearanceMap::truncation_m`]; 0 inside an obstacle. Places outside the window have no known
     /// obstacle.
-    #[must_use]
     pub fn clearance(&self, point: &Vector3<f64>) -> f64 {
         self.nearest(point).map_or(self.truncation_m(), |nearest| nearest.distance_m)
     }
 
     /// The nearest obstacle in the layer of `point`, if there is one within [`ClearanceMap::truncation_m`].
-    #[must_use]
     pub fn nearest(&self, point: &Vector3<f64>) -> Option<Nearest> {
         let voxel = self.voxels.index_of(point)?;
         let offset = self.offset_at(voxel);
@@ -183,7 +176,6 @@ impl ClearanceMap {
     }
 
     /// The nearest obstacle point in each direction around `point`, of those within `radius_m`, in its layer.
-    #[must_use]
     pub fn obstacles_around(&self, point: &Vector3<f64>, radius_m: f64) -> Sectors {
         let mut sectors = Sectors::new(*point);
         let Some(centre) = self.voxels.index_of(point) else { return sectors };
@@ -210,14 +202,12 @@ impl ClearanceMap {
 
     /// Whether every voxel that the segment passes through has at least `clearance_m` (from the voxel's
     /// centre).
-    #[must_use]
     pub fn is_segment_clear(&self, from: &Vector3<f64>, to: &Vector3<f64>, clearance_m: f64) -> bool {
         self.segment_clearance(from, to) >= self.required(clearance_m)
     }
 
     /// Whether the stretch of `path` between two stations has at least `clearance_m` in every voxel: no need to plan
     /// anew.
-    #[must_use]
     pub fn is_path_clear(&self, path: &Path, from_m: f64, to_m: f64, clearance_m: f64) -> bool {
         let inner = path.points().iter().zip(path.stations()).filter(|(_, at)| **at > from_m && **at < to_m);
         let mut before = path.point_at(from_m);
@@ -229,7 +219,6 @@ impl ClearanceMap {
 
     /// Distance from `origin` along the horizontal `direction` to the first occupied voxel, metres, if there
     /// is one within `max_m`.
-    #[must_use]
     pub fn ray(&self, origin: &Vector3<f64>, direction: &Vector3<f64>, max_m: f64) -> Option<f64> {
         let unit = Vector3::new(direction.x, direction.y, 0.0).try_normalize(1e-9)?;
         let resolution_m = self.voxels.config().resolution_m;

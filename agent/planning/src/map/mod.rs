@@ -1,4 +1,4 @@
-//! What a vehicle has seen of its surroundings: evidence in voxels, and the distance to the nearest obstacle.
+//! The surroundings that a vehicle has seen: evidence in voxels, and the distance to the nearest obstacle.
 
 mod clearance;
 mod fading;

@@ -19,7 +19,6 @@ pub struct Sectors {
 
 impl Sectors {
     /// No point yet, seen from `origin` (ENU, metres).
-    #[must_use]
     pub fn new(origin: Vector3<f64>) -> Sectors {
         Sectors { origin, nearest: [None; SECTORS] }
     }

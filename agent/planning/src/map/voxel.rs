@@ -59,41 +59,21 @@ impl Default for VoxelMapConfig {
 /// Why a map cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MapError {
-    /// A length that must be positive and finite is not.
     #[error("map: `{field}` is {value}, expected a positive number of metres")]
-    NotPositive {
-        /// The field of [`VoxelMapConfig`] or parameter at fault.
-        field: &'static str,
-        /// What it was.
-        value: f64,
-    },
-    /// The column above and below a hit is taller than evidence can count.
+    NotPositive { field: &'static str, value: f64 },
     #[error("map: `vertical_extent_m` is {value}, expected 0 to 100 times `resolution_m`")]
-    Extent {
-        /// What it was.
-        value: f64,
-    },
-    /// The time constant with which hits fade is none.
+    Extent { value: f64 },
     #[error(
         "map: `fade_tau_s` is {value}, expected a positive number of seconds, or infinity to keep all hits"
     )]
-    Fading {
-        /// What it was.
-        value: f64,
-    },
-    /// The window has more voxels than memory should hold.
+    Fading { value: f64 },
     #[error(
         "map: `size_m` / `resolution_m` makes {voxels:.0} voxels, expected at most {limit}; take a smaller window or larger voxels"
     )]
-    TooLarge {
-        /// Voxels asked for.
-        voxels: f64,
-        /// Most that are allowed.
-        limit: usize,
-    },
+    TooLarge { voxels: f64, limit: usize },
 }
 
-/// What is known of a place.
+/// The map's knowledge of a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VoxelState {
     Unknown,
@@ -109,7 +89,6 @@ pub struct RayEnd {
     /// End of the ray (ENU, metres): the place of the return, or a point at maximum range on a ray without
     /// return.
     pub point: Vector3<f64>,
-    /// Whether something was hit there.
     pub hit: bool,
 }
 
@@ -163,7 +142,7 @@ pub struct VoxelMap {
     extent: usize,
     /// x runs fastest, z slowest: flight is mostly level.
     cells: Vec<Cell>,
-    /// How many hit voxels of the column block a voxel.
+    /// The number of hit voxels of the column that block a voxel.
     blocked_by: Vec<u8>,
     scan: u16,
     fading: Fading,
@@ -221,20 +200,16 @@ impl VoxelMap {
         Ok(map)
     }
 
-    /// The configuration it was made with.
-    #[must_use]
     pub fn config(&self) -> &VoxelMapConfig {
         &self.config
     }
 
     /// Voxels along east, north and up.
-    #[must_use]
     pub fn counts(&self) -> [usize; 3] {
         self.counts
     }
 
     /// Grows with each change of what is occupied; equal revisions mean equal obstacles.
-    #[must_use]
     pub fn revision(&self) -> u64 {
         self.revision
     }
@@ -328,8 +303,7 @@ impl VoxelMap {
         &self.changes
     }
 
-    /// What is known of the place `point` (ENU, metres); unknown outside the window.
-    #[must_use]
+    /// The state of the place `point` (ENU, metres); unknown outside the window.
     pub fn state(&self, point: &Vector3<f64>) -> VoxelState {
         self.index_of(point).map_or(VoxelState::Unknown, |voxel| self.state_of(voxel))
     }
@@ -344,7 +318,6 @@ impl VoxelMap {
     /// How far one can look from `origin` along the horizontal direction `direction` before something unknown
     /// or occupied, at most `max_m`, metres. A place counts as seen when any voxel of its column within the
     /// vertical extent was seen: the beam of a tilted lidar passes over or under the vehicle's own layer.
-    #[must_use]
     pub fn sensed_free_m(&self, origin: &Vector3<f64>, direction: &Vector3<f64>, max_m: f64) -> f64 {
         let level = Vector3::new(direction.x, direction.y, 0.0);
         let Some(unit) = level.try_normalize(1e-9) else { return 0.0 };
@@ -401,7 +374,6 @@ impl VoxelMap {
     }
 
     /// The voxel at `point` (ENU, metres); `None` outside the window.
-    #[must_use]
     pub fn index_of(&self, point: &Vector3<f64>) -> Option<VoxelIndex> {
         let local = self.to_local(point);
         let inside = (0..3).all(|axis| local[axis] >= 0.0 && local[axis] < self.counts[axis] as f64);
@@ -409,14 +381,12 @@ impl VoxelMap {
     }
 
     /// Centre of a voxel (ENU, metres).
-    #[must_use]
     pub fn centre_of(&self, voxel: VoxelIndex) -> Vector3<f64> {
         let within = Vector3::new(voxel.x as f64 + 0.5, voxel.y as f64 + 0.5, voxel.z as f64 + 0.5);
         (self.corner + within) * self.config.resolution_m
     }
 
     /// The point of the window that is nearest to `point`, half a voxel inside its border.
-    #[must_use]
     pub fn clamp(&self, point: &Vector3<f64>) -> Vector3<f64> {
         let local = self.to_local(point);
         let inside = Vector3::from_fn(|axis, _| local[axis].clamp(0.5, self.counts[axis] as f64 - 0.5));

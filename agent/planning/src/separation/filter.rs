@@ -66,7 +66,6 @@ impl Default for FilterConfig {
 impl FilterConfig {
     /// Two vehicles that know of one another's place and keep their distance both do not limit one another beyond
     /// this, centre to centre, metres: `separation + 2 v (t + v / 2a)` at the greatest speed `v`.
-    #[must_use]
     pub fn reach_m(&self) -> f64 {
         self.separation_m + 2.0 * self.max_speed_m_s * stop_s(self.max_speed_m_s, self)
     }
@@ -87,7 +86,7 @@ pub struct Motion {
     pub planar: bool,
 }
 
-/// What a velocity is limited by.
+/// The cause that limits a velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// The neighbour with this id.
@@ -98,7 +97,7 @@ pub enum Cause {
     Speed,
 }
 
-/// What the filter had to do.
+/// The filter's outcome.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
     /// Nothing: the velocity is the desired one.
@@ -122,7 +121,6 @@ pub enum Outcome {
 pub struct Filtered {
     /// The velocity (ENU, m/s). In planar flight its z is that of the desired velocity, untouched.
     pub velocity: Vector3<f64>,
-    /// What was done to it.
     pub outcome: Outcome,
 }
 
@@ -178,7 +176,6 @@ struct Limit {
 /// assert!(matches!(filtered.outcome, Outcome::Limited(_)));
 /// assert!(filtered.velocity.x < 0.8);
 /// ```
-#[must_use]
 pub fn filter(
     motion: &Motion,
     neighbours: &[Neighbour],
@@ -237,7 +234,6 @@ fn led(bound: f64, speed: f64) -> f64 {
 /// `k` standard deviations for the errors of both positions; what the neighbour may have done since it was heard that
 /// straight on does not foretell, with an acceleration of `a_j` for `u = min(age, fresh)`; the growth `c` of the
 /// ghost of one that is silent; and what the neighbour's hull is larger.
-#[must_use]
 pub fn distance_kept_m(sigma_m: f64, neighbour: &Neighbour, config: &FilterConfig) -> f64 {
     let unheard_s = neighbour.age_s.clamp(0.0, config.fresh_s);
     let swerve = 0.5 * config.decel_m_s2 * unheard_s * unheard_s;

@@ -38,7 +38,6 @@ pub(crate) fn nearest_2d(target: Vector2<f64>, radius: f64, spaces: &[HalfSpace<
     Some(best)
 }
 
-/// As [`nearest_2d`], in space.
 pub(crate) fn nearest_3d(target: Vector3<f64>, radius: f64, spaces: &[HalfSpace<3>]) -> Option<Vector3<f64>> {
     let mut best = clamped(target, radius);
     for (taken, space) in spaces.iter().enumerate() {

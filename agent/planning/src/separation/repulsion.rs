@@ -46,7 +46,6 @@ impl Default for RepulsionConfig {
 /// ends once the way is free, so vehicles that part are not bent.
 ///
 /// It makes encounters smooth, not safe: that is [`super::filter`]'s part.
-#[must_use]
 pub fn repulsion(
     position: &Vector3<f64>,
     desired: &Vector3<f64>,

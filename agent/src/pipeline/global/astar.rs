@@ -64,7 +64,7 @@ impl PathFinder for AstarFinder {
     }
 }
 
-/// How the search of this number is done, and around what; `None` when all was tried.
+/// The settings and the discs of the search of this number; `None` when all was tried.
 fn attempt(number: usize, task: &Task) -> Option<(AstarConfig, &[Disc])> {
     let level = AstarConfig { budget: LEVEL_BUDGET, ..AstarConfig::default() };
     let climbing =

@@ -14,7 +14,6 @@ pub use self::path_finder::{Found, PathFinder, Task};
 use crate::config::GlobalPlanner;
 
 /// The planner of this name.
-#[must_use]
 pub fn path_finder(planner: GlobalPlanner) -> Box<dyn PathFinder> {
     match planner {
         GlobalPlanner::Astar => Box::new(AstarFinder::default()),

@@ -21,7 +21,7 @@ pub struct Task {
     pub start: Vector3<f64>,
     /// Where it shall go, m ENU.
     pub goal: Vector3<f64>,
-    /// What makes some places dearer.
+    /// A potential that makes some places dearer.
     pub potential: Potential,
     /// Standing vehicles and ghosts, to be gone around if that is possible.
     pub discs: Vec<Disc>,
@@ -35,7 +35,6 @@ pub struct Task {
 
 impl Task {
     /// The request of one search, around these of its discs.
-    #[must_use]
     pub fn request<'a>(&'a self, discs: &'a [Disc]) -> Request<'a> {
         Request { start: self.start, goal: self.goal, potential: &self.potential, discs, within: self.within }
     }
@@ -53,7 +52,6 @@ pub struct Found {
 
 impl Found {
     /// A plan that keeps this clearance, without the corners it can do without.
-    #[must_use]
     pub fn of(plan: &Plan, map: &ClearanceMap, clearance_m: f64, discs: &[Disc]) -> Self {
         let path = simplify_around(map, &plan.path, clearance_m, discs);
         Self { path, clearance_m: Some(clearance_m) }

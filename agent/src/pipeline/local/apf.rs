@@ -22,13 +22,11 @@ pub struct Apf {
 
 impl Apf {
     /// The field of a vehicle of this envelope.
-    #[must_use]
     pub fn new(envelope: &Envelope) -> Self {
         Self::with_field(envelope, ApfConfig::default())
     }
 
     /// The same with gains and reaches of one's own.
-    #[must_use]
     pub fn with_field(envelope: &Envelope, field: ApfConfig) -> Self {
         Self { braking: envelope.braking(envelope.brake_m_s2), field, speed_m_s: 0.0 }
     }

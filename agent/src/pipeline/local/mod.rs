@@ -15,7 +15,6 @@ pub use skein_planning::local::vfh::Step;
 use crate::config::{Envelope, LocalPlanner};
 
 /// The planner of this name, for a vehicle of this envelope.
-#[must_use]
 pub fn path_follower(planner: LocalPlanner, envelope: &Envelope) -> Box<dyn PathFollower> {
     match planner {
         LocalPlanner::Apf => Box::new(Apf::new(envelope)),

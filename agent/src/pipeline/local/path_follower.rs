@@ -15,7 +15,7 @@ pub const TICK_S: f64 = 0.02;
 #[derive(Clone, Copy, Debug)]
 pub struct Place<'a> {
     pub path: &'a Path,
-    /// How far along the path the vehicle was at the last call, m.
+    /// The vehicle's place along the path at the last call, m.
     pub station_m: f64,
     /// Where the vehicle is, m ENU.
     pub position: &'a Vector3<f64>,
@@ -23,7 +23,7 @@ pub struct Place<'a> {
 
 /// Turns a path into the velocity to fly now.
 pub trait PathFollower: std::fmt::Debug + Send {
-    /// How the vehicle slows down and speeds up under this planner.
+    /// The braking and acceleration under this planner.
     fn braking(&self) -> &BrakingConfig;
 
     /// The velocity that follows the path, no faster than `cap_m_s`. `attraction` is 1, and less while a local

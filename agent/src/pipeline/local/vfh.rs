@@ -37,7 +37,6 @@ pub struct Vfh {
 
 impl Vfh {
     /// The planner of a vehicle of this envelope.
-    #[must_use]
     pub fn new(envelope: &Envelope) -> Self {
         let filter_m = envelope.obstacle_clearance_m();
         let speed = SpeedConfig {

@@ -73,7 +73,6 @@ pub struct Improved {
 
 impl Improved {
     /// For swarms in this space.
-    #[must_use]
     pub fn new(space: &SearchSpace, config: ImprovedConfig) -> Improved {
         let zeros = vec![0.0; space.dimensions()];
         Improved {
@@ -90,13 +89,11 @@ impl Improved {
     }
 
     /// `w` at present.
-    #[must_use]
     pub fn inertia(&self) -> f64 {
         self.inertia
     }
 
     /// The swarm is judged stuck, and escapes.
-    #[must_use]
     pub fn is_stuck(&self) -> bool {
         self.is_stuck
     }

@@ -12,38 +12,20 @@ pub struct SearchSpace {
 /// Why a box cannot be searched.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SearchSpaceError {
-    /// The bounds do not belong together.
     #[error(
         "{lower} lower bounds and {upper} upper bounds, expected as many of one as of the other, and at least one"
     )]
     Lengths { lower: usize, upper: usize },
-    /// A dimension has no width.
     #[error("dimension {dimension} runs from {lower} to {upper}, expected finite bounds in rising order")]
-    Bounds {
-        /// Which, from 0.
-        dimension: usize,
-        /// Its lower bound.
-        lower: f64,
-        /// Its upper bound.
-        upper: f64,
-    },
-    /// The dimensions cannot be cut into chains of this length.
+    Bounds { dimension: usize, lower: f64, upper: f64 },
     #[error("{dimensions} dimensions cannot be cut into chains of {chain}; give a length that divides them")]
-    Chain {
-        dimensions: usize,
-        /// The length asked for.
-        chain: usize,
-    },
-    /// The centre is not a position in the space.
+    Chain { dimensions: usize, chain: usize },
     #[error("a centre of {numbers} numbers, expected {dimensions}: one for each dimension")]
     Centre { dimensions: usize, numbers: usize },
 }
 
 impl SearchSpace {
     /// A box of dimensions that have nothing to do with one another.
-    ///
-    /// # Errors
-    /// If the bounds are no box.
     pub fn new(lower: Vec<f64>, upper: Vec<f64>) -> Result<SearchSpace, SearchSpaceError> {
         if lower.len() != upper.len() || lower.is_empty() {
             return Err(SearchSpaceError::Lengths { lower: lower.len(), upper: upper.len() });
@@ -59,9 +41,6 @@ impl SearchSpace {
 
     /// The same box, of which every `chain` successive dimensions are one quantity along a line, as the offsets of a
     /// route's waypoints are: neighbours belong together. [`super::Improved`] makes use of that.
-    ///
-    /// # Errors
-    /// If the dimensions cannot be cut so.
     pub fn in_chains_of(self, chain: usize) -> Result<SearchSpace, SearchSpaceError> {
         let dimensions = self.dimensions();
         if chain == 0 || !dimensions.is_multiple_of(chain) {
@@ -72,9 +51,6 @@ impl SearchSpace {
 
     /// The same box with another centre than its middle: where a good position is to be expected, as the direct way
     /// is for a route. It is brought into the box. [`super::Improved`] escapes towards it.
-    ///
-    /// # Errors
-    /// If it has not one number for each dimension.
     pub fn about(self, centre: Vec<f64>) -> Result<SearchSpace, SearchSpaceError> {
         if centre.len() != self.dimensions() {
             return Err(SearchSpaceError::Centre { dimensions: self.dimensions(), numbers: centre.len() });
@@ -83,30 +59,25 @@ impl SearchSpace {
         Ok(SearchSpace { centre, ..self })
     }
 
-    #[must_use]
     pub fn dimensions(&self) -> usize {
         self.lower.len()
     }
 
     /// Successive dimensions that belong together; 1 unless said.
-    #[must_use]
     pub fn chain(&self) -> usize {
         self.chain
     }
 
-    #[must_use]
     pub fn centre(&self) -> &[f64] {
         &self.centre
     }
 
     /// The least values.
-    #[must_use]
     pub fn lower(&self) -> &[f64] {
         &self.lower
     }
 
     /// The greatest values.
-    #[must_use]
     pub fn upper(&self) -> &[f64] {
         &self.upper
     }

@@ -78,13 +78,11 @@ impl Mover<'_> {
 
 impl Flock {
     /// Positions of all particles, one after another.
-    #[must_use]
     pub fn positions(&self) -> &[f64] {
         &self.positions
     }
 
     /// Mean distance of the particles from where they were `then`, along each dimension as a share of its width.
-    #[must_use]
     pub fn mean_distance(&self, then: &[f64]) -> f64 {
         let dimensions = self.space.dimensions();
         let moved = self.positions.iter().zip(then).enumerate();
@@ -96,7 +94,6 @@ impl Flock {
 
 impl<M: Motion> Swarm<M> {
     /// A swarm of `size` particles at places drawn evenly from the whole box, at rest.
-    #[must_use]
     pub fn new(space: &SearchSpace, motion: M, size: usize, seed: u64) -> Swarm<M> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let dimensions = space.dimensions();
@@ -120,7 +117,6 @@ impl<M: Motion> Swarm<M> {
     }
 
     /// The same swarm with its first particles at the places given, of which each is brought into the box.
-    #[must_use]
     pub fn starting_at<'a>(mut self, places: impl IntoIterator<Item = &'a [f64]>) -> Swarm<M> {
         let dimensions = self.flock.space.dimensions();
         for (position, place) in self.flock.positions.chunks_exact_mut(dimensions).zip(places) {
@@ -193,24 +189,19 @@ impl<M: Motion> Swarm<M> {
     }
 
     /// The best found so far.
-    #[must_use]
     pub fn best(&self) -> &Best {
         &self.best
     }
 
-    #[must_use]
     pub fn motion(&self) -> &M {
         &self.motion
     }
 
-    /// Number of particles.
-    #[must_use]
     pub fn size(&self) -> usize {
         self.flock.best_costs.len()
     }
 
     /// Evaluations spent so far.
-    #[must_use]
     pub fn evaluations(&self) -> usize {
         self.evaluations
     }

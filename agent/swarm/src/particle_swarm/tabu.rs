@@ -70,7 +70,6 @@ pub struct TabuSwarm {
 
 impl TabuSwarm {
     /// A swarm of `size` particles at places drawn evenly from the whole box: the same that [`Swarm::new`] draws.
-    #[must_use]
     pub fn new(space: &SearchSpace, config: TabuConfig, size: usize, seed: u64) -> TabuSwarm {
         let swarm = Swarm::new(space, Improved::new(space, config.swarm), size, seed);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -162,13 +161,11 @@ impl TabuSwarm {
     }
 
     /// The best found so far.
-    #[must_use]
     pub fn best(&self) -> &Best {
         self.swarm.best()
     }
 
     /// Evaluations spent so far.
-    #[must_use]
     pub fn evaluations(&self) -> usize {
         self.swarm.evaluations() + self.spent
     }

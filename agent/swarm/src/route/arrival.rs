@@ -20,7 +20,6 @@ pub struct Arrival {
 ///
 /// The last one flies at cruise. The others fly as much slower as their routes take less time, but at most `slowest`
 /// times slower: who would have to arrives early, and the spread says by how much.
-#[must_use]
 pub fn arrive_together(times_s: &[f64], slowest: f64) -> Arrival {
     let time_s = times_s.iter().copied().fold(0.0, f64::max);
     let slow = |own_s: &f64| if *own_s > 0.0 { (time_s / own_s).min(slowest) } else { slowest };
@@ -31,7 +30,6 @@ pub fn arrive_together(times_s: &[f64], slowest: f64) -> Arrival {
 
 /// Places around a target for so many vehicles to arrive at, in a line across the way to it, `spacing_m` apart. The
 /// line is moved into the airspace where the target is at its edge.
-#[must_use]
 pub fn arrival_slots(
     target: &Vector3<f64>,
     from: &Vector3<f64>,

@@ -13,17 +13,14 @@ const CORE_M: f64 = 1.0;
 /// A route's cost and its parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Assessment {
-    /// Length, metres.
     pub length_m: f64,
     /// Time flown at cruise, seconds.
     pub time_s: f64,
     /// `H`, metres.
     pub height_m: f64,
-    /// Repulsion, metres.
     pub repulsion_m: f64,
     /// Square of the share of the reserve that is used.
     pub reserve_used: f64,
-    /// Violation, metres.
     pub violation_m: f64,
     /// The whole cost, metres.
     pub cost_m: f64,
@@ -31,7 +28,6 @@ pub struct Assessment {
 
 impl Assessment {
     /// The route violates nothing.
-    #[must_use]
     pub fn is_feasible(&self) -> bool {
         self.violation_m <= 0.0
     }
@@ -39,14 +35,12 @@ impl Assessment {
 
 impl RouteCost {
     /// The cost of flying along these points (ENU, metres) among others. `O(legs (zones + samples) + PARTS vehicles)`.
-    #[must_use]
     pub fn assess(&self, route: &[Vector3<f64>], airspace: &Airspace, traffic: &Traffic) -> Assessment {
         self.assess_below(f64::INFINITY, route, airspace, traffic)
     }
 
     /// The same, as far as it is needed to know whether the cost is below a limit. All its parts only ever add to it,
     /// so what has reached the limit is left there.
-    #[must_use]
     pub(super) fn assess_below(
         &self,
         limit_m: f64,
@@ -75,7 +69,6 @@ impl RouteCost {
     }
 
     /// The cost of a leg by itself, without others and endurance.
-    #[must_use]
     pub fn assess_leg(&self, from: &Vector3<f64>, to: &Vector3<f64>, airspace: &Airspace) -> Assessment {
         let mut sum = Assessment::default();
         self.add_way(&(to - from), &mut sum);

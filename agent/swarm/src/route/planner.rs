@@ -49,7 +49,6 @@ pub struct Plan {
 
 impl Planner {
     /// Searches for a route. The same seed gives the same one.
-    #[must_use]
     pub fn plan(self, problem: &mut RouteProblem<'_>, effort: Effort, seed: u64) -> Plan {
         let space = problem.space();
         match self {
@@ -70,7 +69,6 @@ impl Planner {
 
 impl Plan {
     /// Lets a swarm in the problem's space search for a route.
-    #[must_use]
     pub fn by_swarm<M: Motion>(problem: &mut RouteProblem<'_>, mut swarm: Swarm<M>, effort: Effort) -> Plan {
         Plan::by(problem, effort, |problem, evaluations| {
             swarm.run(problem, evaluations);
@@ -98,9 +96,6 @@ impl Plan {
 
 /// Plans for vehicles one after another, each among those before it. `plan` is given the vehicle's number, from 0,
 /// and its problem.
-///
-/// # Errors
-/// The first error of [`RouteProblem::new`], or that `plan` gives.
 pub fn plan_in_turn<E: From<RouteError>>(
     airspace: &Airspace,
     cost: RouteCost,

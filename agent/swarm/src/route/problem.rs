@@ -25,15 +25,8 @@ pub struct RouteProblem<'a> {
 /// Why there is nothing to search.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RouteError {
-    /// An end of the route is not in the airspace.
     #[error("the route's {which} ({:.1}, {:.1}, {:.1}) is outside the airspace; move it, or make the airspace larger", .point.x, .point.y, .point.z)]
-    Outside {
-        /// "start" or "goal".
-        which: &'static str,
-        /// ENU, metres.
-        point: Vector3<f64>,
-    },
-    /// The airspace or the number of waypoints gives no box to search.
+    Outside { which: &'static str, point: Vector3<f64> },
     #[error("a route cannot be searched for: {0}")]
     Space(#[from] SearchSpaceError),
 }
@@ -72,29 +65,24 @@ impl<'a> RouteProblem<'a> {
     }
 
     /// The same with other weights.
-    #[must_use]
     pub fn weighed(&self, cost: RouteCost) -> RouteProblem<'a> {
         RouteProblem { cost, ..self.clone() }
     }
 
-    #[must_use]
     pub fn airspace(&self) -> &Airspace {
         self.airspace
     }
 
-    #[must_use]
     pub fn weights(&self) -> &RouteCost {
         &self.cost
     }
 
     /// Start and goal (ENU, metres).
-    #[must_use]
     pub fn ends(&self) -> (Vector3<f64>, Vector3<f64>) {
         (self.route[0], self.route[self.space.chain() + 1])
     }
 
     /// The cost of a route of any number of points (ENU, metres), part by part.
-    #[must_use]
     pub fn judge(&self, route: &[Vector3<f64>]) -> Assessment {
         self.cost.assess(route, self.airspace, self.traffic)
     }

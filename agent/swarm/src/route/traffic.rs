@@ -40,7 +40,6 @@ impl Traffic {
     }
 
     /// Least distance from any of the vehicles while flying along these points with them, metres; infinite without any.
-    #[must_use]
     pub fn separation_m(&self, route: &[Vector3<f64>], cost: &RouteCost) -> f64 {
         let mut least = f64::INFINITY;
         self.encounters(&Track::along(route, cost), f64::INFINITY, |distance_m| {

@@ -1,4 +1,4 @@
-//! How near two vehicles come in a step.
+//! The least distance of two vehicles in a step.
 
 use super::lattice::Move;
 
@@ -15,7 +15,6 @@ pub struct Apart {
 const INSTANTS: u8 = 16;
 
 /// The least distance of two vehicles in the same step, in half cells, heights divided by `downwash`.
-#[must_use]
 pub fn closest(one: &Move, other: &Move, downwash: f64) -> f64 {
     let relative = relative(one, other, downwash);
     (0..=INSTANTS).map(|instant| squared(&relative, instant)).fold(f64::INFINITY, f64::min).sqrt()
@@ -23,7 +22,6 @@ pub fn closest(one: &Move, other: &Move, downwash: f64) -> f64 {
 
 impl Apart {
     /// Whether two vehicles come nearer than this in the same step.
-    #[must_use]
     pub fn is_broken(&self, one: &Move, other: &Move) -> bool {
         // Each axis changes by two half cells at most for each of the two.
         let is_far = |axis: usize| {

@@ -11,19 +11,16 @@ pub struct Itinerary {
 
 impl Itinerary {
     /// At rest, now and for ever.
-    #[must_use]
     pub fn resting(step: u32, state: State) -> Self {
         Self { first_step: step, states: vec![state] }
     }
 
     /// In one state from `step` until `end`, which is what is known; after that it may go anywhere.
-    #[must_use]
     pub fn waiting(step: u32, state: State, end: u32) -> Self {
         Self { first_step: step, states: vec![state; end.saturating_sub(step) as usize + 1] }
     }
 
     /// `states` from `first_step` on; a rest is added if the last is none.
-    #[must_use]
     pub fn new(first_step: u32, mut states: Vec<State>) -> Self {
         if let Some(last) = states.last().filter(|last| !last.is_at_rest()) {
             states.push(last.braked());
@@ -40,26 +37,22 @@ impl Itinerary {
     }
 
     /// The state at a step; before the first the first, after the last the last. `None` of an empty itinerary.
-    #[must_use]
     pub fn at(&self, step: u32) -> Option<State> {
         let index = step.saturating_sub(self.first_step) as usize;
         self.states.get(index).or(self.states.last()).copied()
     }
 
-    /// What it does from `step` to the next.
-    #[must_use]
+    /// Its move from `step` to the next.
     pub fn movement(&self, step: u32) -> Option<Move> {
         Some(Move { from: self.at(step)?, to: self.at(step + 1)? })
     }
 
     /// The step from which on it rests.
-    #[must_use]
     pub fn end(&self) -> u32 {
         self.first_step + u32::try_from(self.states.len().saturating_sub(1)).unwrap_or(u32::MAX)
     }
 
-    /// What it does from `step` to the next, if it keeps to this until `committed` and then brakes.
-    #[must_use]
+    /// Its move from `step` to the next, if it keeps to this until `committed` and then brakes.
     pub fn committed(&self, step: u32, committed: u32) -> Option<Move> {
         let at = |step: u32| {
             let state = self.at(step.min(committed))?;
@@ -69,13 +62,10 @@ impl Itinerary {
     }
 
     /// All states, from the first.
-    #[must_use]
     pub fn states(&self) -> &[State] {
         &self.states
     }
 
-    /// The step of the first state.
-    #[must_use]
     pub fn first_step(&self) -> u32 {
         self.first_step
     }

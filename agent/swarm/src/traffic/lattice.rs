@@ -18,7 +18,7 @@ pub struct State {
     pub speed: [i8; 3],
 }
 
-/// What a vehicle does in one step.
+/// The motion of a vehicle in one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Move {
     /// At its beginning.
@@ -29,19 +29,16 @@ pub struct Move {
 
 impl State {
     /// At rest in the middle of a cell.
-    #[must_use]
     pub fn at_rest(cell: [i16; 3]) -> Self {
         Self { place: cell.map(|index| 2 * index), speed: [0; 3] }
     }
 
     /// Whether it moves on no axis.
-    #[must_use]
     pub fn is_at_rest(&self) -> bool {
         self.speed == [0; 3]
     }
 
     /// The state a step later, when the speed is `speed` then.
-    #[must_use]
     pub fn then(&self, speed: [i8; 3]) -> Self {
         let mut place = self.place;
         for ((place, before), after) in place.iter_mut().zip(self.speed).zip(speed) {
@@ -51,7 +48,6 @@ impl State {
     }
 
     /// The state a step later, when the vehicle brakes: at rest.
-    #[must_use]
     pub fn braked(&self) -> Self {
         self.then([0; 3])
     }
@@ -94,7 +90,6 @@ fn cruising(before: &[i8; 3], after: &[i8; 3]) -> usize {
 
 impl Move {
     /// Where it is at `phase` of the step, 0 to 1, in half cells.
-    #[must_use]
     pub fn place(&self, phase: f64) -> Vector3<f64> {
         Vector3::from_fn(|axis, _| {
             let (place, before, after) = self.axis(axis);
@@ -102,8 +97,7 @@ impl Move {
         })
     }
 
-    /// How fast it moves at `phase` of the step, 0 to 1, in cells per step.
-    #[must_use]
+    /// Its speed at `phase` of the step, 0 to 1, in cells per step.
     pub fn speed(&self, phase: f64) -> Vector3<f64> {
         Vector3::from_fn(|axis, _| {
             let (_, before, after) = self.axis(axis);
@@ -130,7 +124,6 @@ pub struct Lattice {
 impl Lattice {
     /// All cells whose middles lie between `least` and `greatest` (world ENU, m), with one in the middle of which is
     /// `through`. An axis with as little room as for one middle has one cell.
-    #[must_use]
     pub fn new(least: Vector3<f64>, greatest: Vector3<f64>, through: Vector3<f64>, cell_m: f64) -> Self {
         let slack = 1e-6;
         let below = (through - least).map(|room| (room / cell_m + slack).floor().max(0.0));
@@ -144,19 +137,16 @@ impl Lattice {
     }
 
     /// Length of a cell, m.
-    #[must_use]
     pub fn cell_m(&self) -> f64 {
         self.cell_m
     }
 
     /// Cells along each axis.
-    #[must_use]
     pub fn cells(&self) -> [usize; 3] {
         self.cells
     }
 
     /// At rest in the middle of the cell that a point is in, world ENU, m; `None` outside of all.
-    #[must_use]
     pub fn nearest(&self, point: &Vector3<f64>) -> Option<State> {
         let cell = ((point - self.first) / self.cell_m).map(f64::round);
         let inside = (0..3).all(|axis| cell[axis] >= 0.0 && cell[axis] < self.cells[axis] as f64);
@@ -164,7 +154,6 @@ impl Lattice {
     }
 
     /// A place in half cells, as world ENU, m.
-    #[must_use]
     pub fn point(&self, place: &Vector3<f64>) -> Vector3<f64> {
         self.first + place * (0.5 * self.cell_m)
     }
@@ -175,7 +164,6 @@ impl Lattice {
     /// where the vehicle really is, which lags behind its commands; at most one. Two vehicles that do not hear one
     /// another cannot have commitments that meet, if the range of radio is at least twice this and the distance to be
     /// kept.
-    #[must_use]
     pub fn reach_m(&self, ahead_steps: f64) -> f64 {
         let speeds = || (0..27_i8).map(|code| [code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1]);
         let mut reach = 0.0_f64;

@@ -32,7 +32,6 @@ const UNREACHABLE: u16 = u16::MAX;
 impl Roads {
     /// `clearance` is the distance from a point (world ENU, m) to the nearest obstacle, m; a move must keep `least_m`
     /// of it.
-    #[must_use]
     pub fn new(lattice: Lattice, clearance: impl Fn(&Vector3<f64>) -> f64, least_m: f64) -> Self {
         let is_clear = |from: State, to: State| {
             let movement = Move { from, to };
@@ -68,19 +67,15 @@ impl Roads {
     }
 
     /// Where the cells are.
-    #[must_use]
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
 
-    /// How many states there are.
-    #[must_use]
     pub fn state_count(&self) -> usize {
         self.axis_counts().iter().product()
     }
 
     /// Whether a vehicle can be in this state without touching anything.
-    #[must_use]
     pub fn is_open(&self, state: &State) -> bool {
         self.exits_of(state) != 0
     }
@@ -96,7 +91,6 @@ impl Roads {
     }
 
     /// Steps from every state to rest at `goal`: a breadth-first search, once for each goal.
-    #[must_use]
     pub fn distances(&self, goal: State) -> Distances {
         let mut steps = vec![UNREACHABLE; self.state_count()];
         let mut queue = VecDeque::new();
@@ -119,7 +113,6 @@ impl Roads {
 
     /// The way from `state` to the goal of `distances`, as the cells it passes through in order. Where several are as
     /// short, the one that moves least.
-    #[must_use]
     pub fn route(&self, state: State, distances: &Distances) -> Vec<[i16; 3]> {
         let mut state = state;
         let mut route = Vec::new();
@@ -139,7 +132,6 @@ impl Roads {
     }
 
     /// Whether a vehicle can rest in a cell.
-    #[must_use]
     pub fn is_cell_open(&self, cell: [i16; 3]) -> bool {
         self.is_open(&State::at_rest(cell))
     }
@@ -149,7 +141,6 @@ impl Roads {
     }
 
     /// The index of a state on the lattice; `None` outside of it.
-    #[must_use]
     pub(super) fn index(&self, state: &State) -> Option<usize> {
         let mut index = 0;
         for axis in (0..3).rev() {
@@ -169,8 +160,6 @@ impl Roads {
         Some(index)
     }
 
-    /// The state with that index.
-    #[must_use]
     pub(super) fn state(&self, mut index: usize) -> State {
         let mut state = State { place: [0; 3], speed: [0; 3] };
         for (axis, count) in self.axis_counts().into_iter().enumerate() {
@@ -184,14 +173,11 @@ impl Roads {
 }
 
 impl Distances {
-    /// The goal, at rest.
-    #[must_use]
     pub fn goal(&self) -> State {
         self.goal
     }
 
     /// Steps from a state to the goal; `None` if it cannot be reached.
-    #[must_use]
     pub fn steps_from(&self, roads: &Roads, state: &State) -> Option<u16> {
         roads.index(state).and_then(|index| self.at_index(index))
     }

@@ -25,12 +25,11 @@ const MEETING_COST: u32 = 3000;
 const DISTURBANCE_COST: u32 = 60;
 const TARRYING_COST: u32 = 120;
 
-/// What one vehicle wants to know.
+/// The question of one vehicle.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
     /// Where one can fly.
     pub roads: &'a Roads,
-    /// Distances to its goal.
     pub distances: &'a Distances,
     /// The step at which its way begins.
     pub step: u32,
@@ -46,7 +45,7 @@ pub struct Request<'a> {
     pub resting: &'a [State],
 }
 
-/// What a search has found.
+/// The result of a search.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
     /// The way, from the request's step on.
@@ -78,7 +77,6 @@ struct Node {
 const NO_PARENT: u32 = u32::MAX;
 
 /// Finds a way; `budget` is the greatest number of expansions.
-#[must_use]
 pub fn plan(request: &Request<'_>, budget: usize, scratch: &mut Scratch) -> Found {
     let traffic = Traffic::new(request);
     let mut expanded = 0;
@@ -124,7 +122,7 @@ impl Request<'_> {
     }
 }
 
-/// What the others do, step by step.
+/// The moves of the others, step by step.
 struct Traffic<'a> {
     request: &'a Request<'a>,
     /// The moves of those that go before.

@@ -1,4 +1,4 @@
-//! Who goes before whom.
+//! The order of vehicles: which plans around which.
 //!
 //! A vehicle that has been at its goal goes behind all that have not. Among the others the one with the longest way
 //! goes first, so that the last to arrive arrives early; and whoever goes the same way through the same narrow places
@@ -21,10 +21,9 @@ pub struct Rank {
     pub number: u32,
 }
 
-/// What decides who plans around whom. The lesser goes first.
+/// The standing that decides who plans around whom. The lesser goes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Standing {
-    /// Whether it has been at its goal.
     pub arrived: bool,
     /// The rank of its convoy's leader.
     pub convoy: Rank,

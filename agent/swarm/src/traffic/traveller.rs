@@ -26,7 +26,7 @@ const PATIENCE: u32 = 30;
 /// Another standing is lent for so many steps.
 const LENT_FOR: u32 = 12;
 
-/// What a vehicle tells the others in its turn.
+/// The word of a vehicle to the others in its turn.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Word {
     /// Its number, which no other has.
@@ -39,7 +39,7 @@ pub struct Word {
     pub itinerary: Itinerary,
     /// It keeps to its plan until this step, and brakes then unless it says otherwise.
     pub committed: u32,
-    /// Who goes before whom.
+    /// The order of vehicles: which plans around which.
     pub standing: Standing,
     /// The narrow places on its way, from which cell into which.
     pub lanes: Vec<Lane>,
@@ -64,7 +64,7 @@ impl Word {
 /// A step from a cell into the next, in a place with room for one.
 pub type Lane = ([i16; 3], [i16; 3]);
 
-/// How a vehicle behaves in traffic.
+/// The settings of a vehicle in traffic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TravellerConfig {
     /// The distance kept from others.
@@ -76,27 +76,15 @@ pub struct TravellerConfig {
 /// Why a vehicle cannot take part.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum TravellerError {
-    /// Its start or goal is not where it can be.
     #[error(
         "vehicle {number}: its {what} ({x}, {y}, {z}) m is outside the bounds or too near an obstacle; move it"
     )]
-    Place {
-        number: u32,
-        /// `start` or `goal`.
-        what: &'static str,
-        /// East, m.
-        x: f64,
-        /// North, m.
-        y: f64,
-        /// Up, m.
-        z: f64,
-    },
-    /// There is no way between them.
+    Place { number: u32, what: &'static str, x: f64, y: f64, z: f64 },
     #[error("vehicle {number}: no way leads from its start to its goal; obstacles close every one")]
     NoWay { number: u32 },
 }
 
-/// What came of a turn.
+/// The result of a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turn {
     pub expanded: usize,
@@ -124,9 +112,6 @@ pub struct Traveller {
 
 impl Traveller {
     /// A vehicle at rest in the cell of `start`, on its way to that of `goal` (world ENU, m).
-    ///
-    /// # Errors
-    /// [`TravellerError`] names the vehicle and what is wrong.
     pub fn new(
         number: u32,
         roads: Arc<Roads>,
@@ -174,13 +159,10 @@ impl Traveller {
     }
 
     /// Where it can fly.
-    #[must_use]
     pub fn roads(&self) -> &Roads {
         &self.roads
     }
 
-    /// Its own word.
-    #[must_use]
     pub fn word(&self) -> &Word {
         &self.word
     }
@@ -193,14 +175,12 @@ impl Traveller {
         }
     }
 
-    /// What it does from `step` to the next, as far as it is committed.
-    #[must_use]
+    /// Its move from `step` to the next, as far as it is committed.
     pub fn movement(&self, step: u32) -> Option<Move> {
         self.word.itinerary.committed(step, self.word.committed)
     }
 
     /// Whether it rests at its goal at `step`.
-    #[must_use]
     pub fn is_home(&self, step: u32) -> bool {
         self.movement(step).is_some_and(|movement| movement.from == self.word.goal)
     }

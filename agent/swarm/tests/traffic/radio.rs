@@ -10,7 +10,7 @@ const RANGE_M: f64 = 3.0;
 /// How often each has its turn before a step.
 const ROUNDS: usize = 2;
 
-/// What came of a run.
+/// The result of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
     /// The step at which all were at their goals together; `None` if they never were.

@@ -1,7 +1,26 @@
 //! The rules by which a program selects.
 
+use serde::{Deserialize, Serialize};
+
 use crate::event_set::EventSet;
-use crate::strategy::Strategy;
+
+/// The rule by which a program chooses among requested and unblocked events.
+///
+/// Whatever the strategy, equal events merge, and what is left undecided is a tie, drawn from the run's seed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Strategy {
+    /// All of them are equal.
+    #[default]
+    Simple,
+    /// Each b-thread offers the first of its requests that is not blocked.
+    Ordered,
+    /// The greatest [`Bid::priority`](crate::Bid::priority) wins; a bid without one is lowest.
+    SyncPriority,
+    /// The greatest [`BThread::priority`](crate::BThread::priority) wins.
+    #[serde(rename = "bthread_priority")]
+    BThreadPriority,
+}
 
 /// An event that lost so many ties goes first, unless configured.
 pub const PASSED_OVER_LIMIT: u32 = 16;

@@ -208,10 +208,7 @@ impl Compiler<'_> {
 
 /// The datum of the last event that `value` stands for: `x` where it is the text `$x`.
 pub(super) fn reference(value: &Value) -> Option<&str> {
-    match value {
-        Value::Text(text) => text.strip_prefix('$'),
-        _ => None,
-    }
+    value.as_text()?.strip_prefix('$')
 }
 
 /// The event in which each `$key` is replaced by what the event `last` has under `key`, or left out where it has

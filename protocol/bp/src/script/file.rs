@@ -32,11 +32,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::event_set::EventSet;
-use crate::script::fault::{Fault, ScriptFileError};
 use crate::script::filler::Filler;
 use crate::script::op::Op;
 use crate::script::parameter::{Argument, Parameter};
-use crate::script::reading::{MAX_TEXT, from_json, from_toml, read, too_long};
+use crate::script::reading::{Fault, MAX_TEXT, ScriptFileError, from_json, from_toml, read, too_long};
 use crate::script::soundness::check;
 use crate::script::{Script, ScriptError};
 
@@ -88,9 +87,6 @@ pub struct BoundScript {
 impl ScriptFile {
     /// Reads a script; `file` is what errors call it, and ends in `.json` unless it is TOML. The body is tried with
     /// values that fit its parameters.
-    ///
-    /// # Errors
-    /// [`ScriptFileError`] at the first thing that is not as expected.
     pub fn parse(file: &str, text: &str) -> Result<Self, ScriptFileError> {
         let script: Self =
             if file.ends_with(".json") { from_json(file, text)? } else { from_toml(file, text)? };
@@ -191,10 +187,6 @@ impl Assignment {
         self.called.as_deref().unwrap_or(&self.script.name)
     }
 
-    /// The script for the node `me`.
-    ///
-    /// # Errors
-    /// As for [`ScriptFile::bind`].
     pub fn bind(&self, me: &str) -> Result<BoundScript, ScriptFileError> {
         self.script.bind(me, self.called.as_deref(), &self.with)
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
-use crate::script::fault::Fault;
+use crate::script::reading::Fault;
 
 /// The most ops that a script may have once each `each` is spelled out.
 pub const MAX_OPS: usize = 400;

@@ -22,7 +22,6 @@
 //! whole program should have.
 
 mod code;
-mod fault;
 mod file;
 mod filler;
 mod op;
@@ -43,12 +42,11 @@ use crate::bid::Bid;
 use crate::bthread::{BThread, Context};
 use crate::event::Event;
 use code::{Code, Step};
-pub use fault::ScriptFileError;
 pub use file::{Assignment, BoundScript, ScriptFile};
 pub use filler::MAX_OPS;
 pub use op::{Op, Reply, ScriptSource, Spawn, Times};
 pub use parameter::{Argument, Parameter, ParameterKind};
-pub use reading::MAX_TEXT;
+pub use reading::{MAX_TEXT, ScriptFileError};
 pub use trial::{Trial, TrialFault};
 
 /// The most ops that a script may run between two synchronisation points.
@@ -56,22 +54,11 @@ const OPS_BETWEEN_SYNCS: usize = 100_000;
 
 /// The reason for which a script was refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum ScriptError {
-    /// `spawn` names a template that is not in the library.
     #[error("`spawn` names the template `{template}`, which is not defined; defined are {defined:?}")]
-    UnknownTemplate {
-        /// The name given.
-        template: String,
-        /// The names there are.
-        defined: Vec<String>,
-    },
-    /// A loop without end never synchronises, so it could never be left.
+    UnknownTemplate { template: String, defined: Vec<String> },
     #[error("`repeat forever` holds neither `sync` nor `stop`; it would never end: {body}")]
-    EndlessLoop {
-        /// The loop's body as JSON.
-        body: String,
-    },
+    EndlessLoop { body: String },
 }
 
 /// Scripts that other scripts may spawn, by name.
@@ -80,9 +67,6 @@ pub struct Library(Arc<BTreeMap<String, Arc<Code>>>);
 
 impl Library {
     /// Checks and compiles templates, which may spawn one another.
-    ///
-    /// # Errors
-    /// [`ScriptError`] of the first template that is unsound.
     pub fn new(templates: impl IntoIterator<Item = ScriptSource>) -> Result<Self, ScriptError> {
         let templates: Vec<ScriptSource> = templates.into_iter().collect();
         let names: Vec<String> = templates.iter().map(|template| template.name.clone()).collect();
@@ -122,18 +106,12 @@ pub struct Script {
 
 impl Script {
     /// A script that spawns nothing but what it spells out.
-    ///
-    /// # Errors
-    /// [`ScriptError`] when the script is unsound.
     pub fn new(body: &[Op]) -> Result<Self, ScriptError> {
         Self::with_library(body, None, &Library::default())
     }
 
     /// A script that may spawn the templates of a library; `priority` is for
     /// [`Strategy::BThreadPriority`](crate::Strategy::BThreadPriority).
-    ///
-    /// # Errors
-    /// [`ScriptError`] when the script is unsound.
     pub fn with_library(body: &[Op], priority: Option<i32>, library: &Library) -> Result<Self, ScriptError> {
         Ok(Self::at_start(Code::compile(body, priority, &library.names())?, library.clone()))
     }

@@ -16,7 +16,6 @@ use crate::notation::Many;
 /// One op of a script; the [module](super) lists their JSON forms.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Op {
-    /// A synchronisation point.
     Sync(Bid),
     /// Runs the body again and again.
     Repeat {

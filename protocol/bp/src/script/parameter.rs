@@ -8,11 +8,9 @@ use serde_json::Value;
 /// The most points of a route.
 const MOST_POINTS: usize = 32;
 
-/// The kind of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ParameterKind {
-    /// A number.
     Number,
     /// A whole number.
     Integer,
@@ -42,9 +40,7 @@ impl fmt::Display for ParameterKind {
 pub enum Argument {
     /// A whole number.
     Integer(i64),
-    /// A number.
     Number(f64),
-    /// A name.
     Text(String),
     /// A point, metres ENU.
     Point([f64; 3]),

@@ -5,10 +5,42 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::configuration::{self, Malformed};
-use crate::script::fault::{Fault, ScriptFileError};
 
 /// The longest text of a script, in bytes.
 pub const MAX_TEXT: usize = 16 * 1024;
+
+/// The reason for which a script was refused: where, and what was expected there.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{file}{}: {}{problem}", .line.map(|line| format!(":{line}")).unwrap_or_default(), quoted(.field))]
+pub struct ScriptFileError {
+    /// The file, or the script's name once its file does not matter any more.
+    pub file: String,
+    /// The line, from 1, where it is known.
+    pub line: Option<usize>,
+    /// The field, such as `body[1].do[0].sync`; empty when it is about the whole.
+    pub field: String,
+    pub problem: String,
+}
+
+fn quoted(field: &str) -> String {
+    if field.is_empty() { String::new() } else { format!("`{field}` ") }
+}
+
+/// A fault at a field.
+pub(super) struct Fault {
+    pub(super) field: String,
+    pub(super) problem: String,
+}
+
+impl Fault {
+    pub(super) fn new(field: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self { field: field.into(), problem: problem.into() }
+    }
+
+    pub(super) fn within(self, file: &str) -> ScriptFileError {
+        ScriptFileError { file: file.to_owned(), line: None, field: self.field, problem: self.problem }
+    }
+}
 
 pub(super) fn too_long(length: usize) -> String {
     format!("the script is {length} bytes long: expected at most {MAX_TEXT}")

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use crate::bid::Bid;
-use crate::script::fault::Fault;
 use crate::script::op::{Op, Times};
+use crate::script::reading::Fault;
 
 /// Blocks that take less time would fire without end.
 const LEAST_WITHIN: Duration = Duration::from_millis(100);

@@ -25,23 +25,11 @@ pub struct Trial {
 
 /// A fault of a script, and the shortest way there.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum TrialFault {
-    /// It blocks something and cannot let go.
     #[error("it blocks `{event}` for ever{}; give it a `within_s`, or something to wait for that can happen", after(.trace))]
-    NeverLetsGo {
-        event: Event,
-        /// The events before.
-        trace: Vec<Event>,
-    },
-    /// It goes round on its own requests.
+    NeverLetsGo { event: Event, trace: Vec<Event> },
     #[error("it goes round without waiting for anything: {}{}", list(.cycle), after(.trace))]
-    Spins {
-        /// The events that it requests again and again.
-        cycle: Vec<Event>,
-        /// The events before.
-        trace: Vec<Event>,
-    },
+    Spins { cycle: Vec<Event>, trace: Vec<Event> },
 }
 
 fn list(events: &[Event]) -> String {

@@ -18,7 +18,6 @@ pub struct Coverage {
 /// The states and bids of one b-thread that were met.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BThreadCoverage {
-    /// The number of states it was in.
     pub states: usize,
     /// The bids that it stated, each once, in the order in which they were met.
     pub bids: Vec<Bid>,

@@ -8,9 +8,7 @@ use super::store::Store;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Unexplored {
     None,
-    /// Those from this number on.
     From(u32),
-    /// Any of them.
     Any,
 }
 

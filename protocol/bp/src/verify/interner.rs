@@ -39,7 +39,6 @@ impl<T: Clone + Eq + Hash> Interner<T> {
         self.values.len()
     }
 
-    /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }

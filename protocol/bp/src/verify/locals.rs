@@ -13,7 +13,7 @@ use crate::board::{Owner, rank};
 use crate::bthread::Context;
 use crate::event::Event;
 use crate::event_set::EventSet;
-use crate::strategy::Strategy;
+use crate::program::Strategy;
 
 /// Number of a local state. None is 0.
 pub(super) type LocalId = u32;
@@ -212,7 +212,6 @@ impl Locals {
         id
     }
 
-    /// The outcome of `cause` for a local state.
     pub(super) fn outcome(&mut self, id: LocalId, cause: Cause) -> Outcome {
         let Some(local) = self.get(id) else { return Outcome { next: ENDED, plain: true } };
         match local.outcomes.binary_search_by_key(&cause, |(known, _)| *known) {

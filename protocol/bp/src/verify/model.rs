@@ -49,7 +49,6 @@ pub trait Model {
         Vec::new()
     }
 
-    /// Whether `state` meets the goal of this number.
     fn meets(&self, goal: usize, state: &[u32]) -> bool {
         let _ = (goal, state);
         true
@@ -107,7 +106,6 @@ impl Moves {
         self.labels.len()
     }
 
-    /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.labels.is_empty()
     }

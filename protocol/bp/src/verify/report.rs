@@ -33,9 +33,7 @@ impl Inspection {
         [Self::Deadlock, Self::FailedAssertion, Self::HotTermination, Self::HotBThread];
 }
 
-/// The kind of a violation.
 #[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum ViolationKind {
     Deadlock,
     FailedAssertion {
@@ -49,7 +47,6 @@ pub enum ViolationKind {
     Unsettled,
     /// From a state on, whatever happens, a goal is out of reach.
     OutOfReach {
-        /// The goal's name.
         goal: String,
     },
     /// A state breaks an invariant.
@@ -83,7 +80,6 @@ pub struct Violation {
 
 /// Part of the behaviour that a verification has not looked at.
 #[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Omission {
     /// The search ended at a violation.
     StoppedAtViolation {
@@ -97,11 +93,7 @@ pub enum Omission {
         unexplored: usize,
     },
     /// Longer runs were not looked at.
-    DepthBound {
-        deepest: u32,
-        /// Moves beyond it.
-        moves: u64,
-    },
+    DepthBound { deepest: u32, moves: u64 },
     /// A model leaves out some behaviour of what it stands for.
     NotModelled { what: String },
 }
@@ -150,7 +142,6 @@ impl Violation {
         self.trace.get(..end).unwrap_or_default()
     }
 
-    /// The events of the cycle, if the violation is one.
     pub fn cycle(&self) -> Option<&[Event]> {
         self.trace.get(self.trace.len().checked_sub(self.cycle_length?)?..)
     }

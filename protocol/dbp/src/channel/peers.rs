@@ -45,7 +45,6 @@ impl Peers {
         Self(roster.into_iter().map(|name| (name, silent.clone())).collect())
     }
 
-    /// The peer of this name, if there is one.
     pub(crate) fn name(&self, name: &str) -> Option<&NodeName> {
         self.0.get_key_value(name).map(|(name, _)| name)
     }
@@ -114,7 +113,6 @@ impl Peers {
 
 impl Peer {
     /// The time since it was last heard.
-    #[must_use]
     pub fn age(&self, now: Duration) -> Option<Duration> {
         self.last_word.map(|at| now.saturating_sub(at))
     }

@@ -31,7 +31,7 @@ pub(crate) struct Block {
     pub(crate) is_awaited: bool,
 }
 
-/// How far the holder may rely on a block.
+/// The degree to which the holder may rely on a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Standing {
     Unsure,

@@ -20,7 +20,6 @@ pub struct Grant {
 pub struct Role {
     /// Its name, such as `vehicle` or `operator`.
     pub name: String,
-    /// The nodes that have it.
     pub nodes: Vec<Pattern>,
     pub grant: Grant,
 }
@@ -55,38 +54,31 @@ pub struct Authority {
 
 impl Authority {
     /// Only what these roles grant; `scripts` limits b-threads that are scripts further.
-    #[must_use]
     pub fn new(roles: Vec<Role>, scripts: Option<Grant>) -> Self {
         Self { roles, scripts }
     }
 
     /// Every member may request and block everything.
-    #[must_use]
     pub fn unrestricted() -> Self {
         let all = Grant { request: EventSet::All, block: EventSet::All };
         Self::new(vec![Role { name: "member".into(), nodes: vec!["**".into()], grant: all }], None)
     }
 
-    #[must_use]
     pub fn roles(&self) -> &[Role] {
         &self.roles
     }
 
     /// The most that scripts may do, if that is less than their node.
-    #[must_use]
     pub fn scripts(&self) -> Option<&Grant> {
         self.scripts.as_ref()
     }
 
-    /// Whether `bthread` of `node` may request `event`.
-    #[must_use]
     pub fn may_request(&self, node: &NodeName, bthread: &str, event: &Event) -> bool {
         self.grants(node).any(|grant| grant.request.contains(event))
             && self.limit(bthread).is_none_or(|limit| limit.request.contains(event))
     }
 
     /// Whether `bthread` of `node` may block all of `set`, judged so that doubt means no.
-    #[must_use]
     pub fn may_block(&self, node: &NodeName, bthread: &str, set: &EventSet) -> bool {
         let granted = EventSet::any_of(self.grants(node).map(|grant| &grant.block));
         set.is_within(&granted) && self.limit(bthread).is_none_or(|limit| set.is_within(&limit.block))

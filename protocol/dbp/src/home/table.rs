@@ -278,7 +278,6 @@ impl BidTable {
         self.bidders.values().flat_map(|bidder| bidder.bids.values()).any(|bid| !bid.block.is_none())
     }
 
-    /// The proxies that block `event`.
     pub(crate) fn blockers_of(&self, event: &Event) -> impl Iterator<Item = String> {
         self.bidders.iter().flat_map(move |(node, bidder)| {
             let blockers = bidder.bids.iter().filter(move |(_, bid)| bid.block.contains(event));

@@ -112,7 +112,6 @@ impl Joint {
         self.term.as_ref().map(|term| (term.number(), term.decisions.next_seq()))
     }
 
-    /// The coordinator has decided.
     pub(crate) fn decide(&mut self, decision: Occurrence) {
         if let Some(term) = &mut self.term {
             term.decisions.push(decision);

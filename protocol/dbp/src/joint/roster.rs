@@ -29,32 +29,24 @@ pub struct Roster {
 
 /// Why an order is no roster.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum RosterError {
-    /// It has no term, or one below 1.
     #[error("`term` must be a whole number from 1")]
     Term,
-    /// It names no coordinator, or no members.
     #[error("`{0}` must name the nodes")]
     Missing(&'static str),
-    /// A name is none.
     #[error(transparent)]
     Name(#[from] NodeNameError),
-    /// The coordinator is not a member.
     #[error("the coordinator {0} must be a member")]
     Coordinator(NodeName),
 }
 
 impl Roster {
-    /// The first term.
-    #[must_use]
     pub fn first(coordinator: NodeName, members: impl IntoIterator<Item = NodeName>) -> Self {
         let members = members.into_iter().chain([coordinator.clone()]).collect();
         Self { term: 1, coordinator, members }
     }
 
     /// The event by which an operator gives `node` this roster.
-    #[must_use]
     pub fn order(&self, node: &NodeName) -> Event {
         let members: Vec<&str> = self.members.iter().map(NodeName::as_str).collect();
         let (term, coordinator) = (self.term, self.coordinator.clone());
@@ -62,9 +54,6 @@ impl Roster {
     }
 
     /// The roster that such an order gives.
-    ///
-    /// # Errors
-    /// [`RosterError`] says what it lacks.
     pub fn ordered(order: &Event) -> Result<Self, RosterError> {
         let term = order.int("term").and_then(|term| u64::try_from(term).ok()).filter(|term| *term > 0);
         let coordinator =
@@ -77,7 +66,6 @@ impl Roster {
         Ok(Self { term: term.ok_or(RosterError::Term)?, coordinator, members })
     }
 
-    #[must_use]
     pub fn joint_events() -> EventSet {
         EventSet::prefix(SWARM)
     }

@@ -25,9 +25,9 @@ mod model;
 mod network;
 pub mod programs;
 pub(crate) mod row;
-#[cfg(test)]
-mod runs;
 mod step;
+#[cfg(test)]
+mod tests;
 mod wire;
 
 use std::collections::BTreeMap;

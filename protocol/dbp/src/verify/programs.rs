@@ -34,16 +34,13 @@ pub type Requirement = dyn Fn(&NetworkView<'_>) -> Result<(), String> + Send + S
 /// Why one of these networks could not be made: a mistake in this file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NetworkError {
-    /// A node has a name that is none.
     #[error(transparent)]
     Name(#[from] NodeNameError),
-    /// A script is unsound.
     #[error(transparent)]
     Script(#[from] ScriptError),
 }
 
 impl Network {
-    /// A verification of it with these faults.
     pub fn verifier(&self, faults: Faults) -> NetworkVerifier {
         let verifier = NetworkVerifier::new(self.members.clone(), faults);
         match self.requirement.clone() {
@@ -53,7 +50,6 @@ impl Network {
     }
 }
 
-/// All of them.
 pub fn all() -> Result<Vec<Network>, NetworkError> {
     Ok(vec![
         alternating_gate()?,

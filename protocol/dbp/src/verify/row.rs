@@ -98,7 +98,6 @@ impl<'a> Row<'a> {
         self.part(Part::Bid(bid.requests.clone(), bid.block.clone(), bid.priority));
     }
 
-    /// The refusal of a bid of `node`.
     pub(crate) fn refusal(&mut self, node: &NodeName, life: u64, refusal: &Refusal) {
         self.text(&refusal.bthread);
         self.number(Family::Sync(node.clone(), life, refusal.bthread.clone()), refusal.sync);

@@ -12,12 +12,12 @@ use crate::guarded::{self, Care, Guarded};
 use crate::naive::Naive;
 use crate::trip::Trip;
 
-/// How long each run takes.
+/// The length of each run.
 const RUN: Duration = Duration::from_secs(20);
 /// When one vehicle is cut off, where one is.
 const CUT: Range<Duration> = Duration::from_secs(8)..Duration::from_secs(12);
 
-/// How the gate is guarded.
+/// The rule by which the gate is guarded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
     /// Look, then enter.
@@ -26,7 +26,7 @@ pub enum Rule {
     Guarded(Care),
 }
 
-/// What became of many runs.
+/// The tally of many runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     pub entries: u32,

@@ -11,7 +11,7 @@ use skein_wire::{Fleet as FleetName, MemoryLink, MemoryStore, Network, NetworkCo
 pub const VEHICLES: [&str; 3] = ["uav/1", "uav/2", "uav/3"];
 pub const GROUND: &str = "ground/main";
 
-/// How often each node goes on.
+/// The period of each node's steps.
 const TICK: Duration = Duration::from_millis(20);
 
 /// Loses three messages of ten, repeats and reorders others, and delays all by up to 300 ms.

@@ -23,7 +23,7 @@ pub struct Story {
     pub lifted: u32,
 }
 
-/// How long each part is.
+/// The length of each part.
 const PART: Duration = Duration::from_secs(10);
 
 fn vehicle(me: &NodeName, program: &mut Program) {

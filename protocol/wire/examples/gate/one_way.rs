@@ -51,7 +51,7 @@ fn traffic(ways: &[&str]) -> Result<Script, Box<dyn Error>> {
     Ok(Script::new(&ways.iter().flat_map(turn).collect::<Vec<_>>())?)
 }
 
-/// How long each way is flown.
+/// The time for which each way is flown.
 const TURN: Duration = Duration::from_secs(30);
 
 /// The way in which each entry was flown, in order.

@@ -6,7 +6,7 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_wire::NodeName;
 
-/// How long a vehicle is inside.
+/// The time that a vehicle is inside.
 const PASSAGE: Duration = Duration::from_millis(1500);
 
 /// Approaches the gate, waits until the vehicle enters, leaves it on the other side, and rests before the next trip.

@@ -47,7 +47,6 @@ impl Default for Catalogue {
 
 impl Catalogue {
     /// Skein's own events.
-    #[must_use]
     pub fn standard() -> Self {
         Self(STANDARD.to_vec())
     }
@@ -86,7 +85,6 @@ impl Catalogue {
 }
 
 /// The set of these events at `node`, whatever their data.
-#[must_use]
 pub fn any_of(node: &str, events: impl IntoIterator<Item = &'static Declaration>) -> EventSet {
     EventSet::any_of(events.into_iter().map(|event| EventSet::named(format!("{node}/{}", event.name))))
 }

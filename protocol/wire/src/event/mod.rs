@@ -35,19 +35,16 @@ pub use self::{limit::*, mission::*, motion::*, order::*, script::*, sense::*, s
 pub type Text = Arc<str>;
 
 /// The events of one or several declared types at `node`, whatever their data: `of::<(Failed, Landed)>(vehicle)`.
-#[must_use]
 pub fn of<E: Events>(node: impl std::fmt::Display) -> EventSet {
     E::any_at(node)
 }
 
 /// The events of one or several declared types at all vehicles, whatever their data.
-#[must_use]
 pub fn of_every_vehicle<E: Events>() -> EventSet {
     E::any_of("uav/*")
 }
 
 /// The reason that an event gives, whichever it is: the field `why` means the same in all.
-#[must_use]
 pub fn why(event: &Event) -> Option<&str> {
     event.text("why")
 }

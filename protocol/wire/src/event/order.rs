@@ -37,72 +37,60 @@ impl What {
     }
 
     /// Whether it is for every vehicle, and cannot be for some.
-    #[must_use]
     pub fn is_for_all(self) -> bool {
         matches!(self, Self::Launch | Self::LaunchTogether | Self::Abort)
     }
 
     /// Whether it needs more than whom it is for: a place, or a script.
-    #[must_use]
     pub fn needs_more(self) -> bool {
         matches!(self, Self::GoTo | Self::Load | Self::Unload)
     }
 
-    #[must_use]
     pub fn is_launch(self) -> bool {
         matches!(self, Self::Launch | Self::LaunchTogether)
     }
 
     /// Whether it is about a script.
-    #[must_use]
     pub fn is_about_script(self) -> bool {
         matches!(self, Self::Load | Self::Unload)
     }
 
     /// Whether a vehicle takes it in at its gateway, as [`OrderTaken`]. The ground station carries out the others.
-    #[must_use]
     pub fn reaches_vehicle(self) -> bool {
         matches!(self, Self::Resume | Self::Land | Self::Return | Self::GoTo | Self::HandBack)
     }
 
     /// Whether a script may give it to its own vehicle.
-    #[must_use]
     pub fn is_open_to_scripts(self) -> bool {
         matches!(self, Self::Hold | Self::Resume | Self::Land | Self::Return | Self::GoTo)
     }
 
     /// Whether it sets a vehicle going. Such an order is not brought any more after a while.
-    #[must_use]
     pub fn sets_going(self) -> bool {
         matches!(self, Self::Resume | Self::GoTo | Self::HandBack)
     }
 
     /// Whether it frees a vehicle whose agent has started in the air.
-    #[must_use]
     pub fn releases(self) -> bool {
         matches!(self, Self::Resume | Self::Return)
     }
 
     /// Whether it ends a hold: whoever is ordered elsewhere, home or down must be free to move, like who is to go on.
-    #[must_use]
     pub fn ends_hold(self) -> bool {
         matches!(self, Self::Resume | Self::Land | Self::Return | Self::GoTo)
     }
 
     /// Whether it brings a vehicle to the ground.
-    #[must_use]
     pub fn brings_down(self) -> bool {
         matches!(self, Self::Land | Self::Return)
     }
 
     /// Whether it calls a launch off, if it is for all: who orders the swarm down does not want the rest of it up.
-    #[must_use]
     pub fn calls_launch_off(self) -> bool {
         self.brings_down() || self == Self::Abort
     }
 
     /// Whether it says nothing against what other orders have set going.
-    #[must_use]
     pub fn is_beside_flight(self) -> bool {
         self.is_launch() || self.is_about_script()
     }
@@ -137,19 +125,16 @@ skein_bp::events! {
 
 impl OrderTaken {
     /// An order that needs no more than its word.
-    #[must_use]
     pub fn plain(what: What) -> Self {
         Self { what, x: None, y: None, z: None, by: None }
     }
 
     /// The order to go there, metres ENU.
-    #[must_use]
     pub fn go_to([x, y, z]: [f64; 3]) -> Self {
         Self { x: Some(x), y: Some(y), z: Some(z), ..Self::plain(What::GoTo) }
     }
 
     /// Where to go, metres ENU.
-    #[must_use]
     pub fn place(&self) -> Option<[f64; 3]> {
         Some([self.x?, self.y?, self.z?])
     }

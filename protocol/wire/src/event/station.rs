@@ -63,7 +63,6 @@ impl OrderGiven {
     pub const ALL: &str = "all";
 
     /// An order that needs no more than whom it is for.
-    #[must_use]
     pub fn plain(what: What, who: &str) -> Self {
         Self { what, who: who.into(), name: None, script: None, x: None, y: None, z: None }
     }
@@ -75,7 +74,6 @@ impl OrderGiven {
     }
 
     /// Whether it is for `vehicle`.
-    #[must_use]
     pub fn is_for(&self, vehicle: &NodeName) -> bool {
         *self.who == *Self::ALL || *self.who == *vehicle.as_str()
     }

@@ -98,15 +98,11 @@ messages! {
 
 impl Payload {
     /// The payload as bytes; equal payloads give equal bytes.
-    #[must_use]
     pub fn encode(&self) -> Vec<u8> {
         proto::Packet { version: VERSION, body: Some(self.body()) }.encode_to_vec()
     }
 
     /// Reads a payload. Fields that this version does not know are passed over.
-    ///
-    /// # Errors
-    /// [`DecodeError`] names the field at fault.
     pub fn decode(bytes: &[u8]) -> Result<Self> {
         if bytes.len() > MAX_PAYLOAD {
             return Err(DecodeError::TooLong { bytes: bytes.len() });

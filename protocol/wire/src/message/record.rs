@@ -34,12 +34,10 @@ pub enum Addressee {
 }
 
 impl Kind {
-    #[must_use]
     pub const fn may_be_for_all(&self) -> bool {
         !matches!(self.addressee, Addressee::One)
     }
 
-    #[must_use]
     pub const fn may_be_for_one(&self) -> bool {
         !matches!(self.addressee, Addressee::All)
     }

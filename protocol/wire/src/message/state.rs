@@ -19,7 +19,6 @@ pub struct State {
     pub incarnation: u64,
     /// When the position was measured, on the vehicle's clock.
     pub time: Duration,
-    /// Position, metres.
     pub position: Vector3<f64>,
     /// Velocity, metres per second.
     pub velocity: Vector3<f64>,
@@ -76,7 +75,6 @@ impl State {
     pub const MAX_SCRIPTS: usize = 8;
 
     /// A vehicle that stands disarmed at the origin with a full battery: a start to fill in.
-    #[must_use]
     pub fn new(node: NodeName) -> Self {
         Self {
             node,

@@ -6,8 +6,8 @@ use nalgebra::{Vector2, Vector3};
 use skein_mav::messages::MavCmd;
 use skein_mav::{Datum, MissionItem};
 
+use super::Situation;
 use super::position_control::{Demand, Horizontal, Vertical};
-use super::situation::Situation;
 
 /// From this far off a place is flown to nose first, m.
 const NOSE_FIRST_M: f64 = 2.0;

@@ -12,24 +12,22 @@ mod mixer;
 mod modes;
 mod parameters;
 mod position_control;
-mod situation;
 
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_mav::{Datum, Endpoint, EndpointConfig, ParameterTable, Request, VehicleState};
+use skein_mav::{Datum, Endpoint, EndpointConfig, MissionItem, ParameterTable, Request, VehicleState};
 
 use crate::quadrotor::MotorCommands;
 use crate::sensors::SensorReadings;
 use crate::vehicle::VehicleModel;
 use attitude_control::AttitudeControl;
-use estimator::Estimator;
+use estimator::{Estimate, Estimator};
 use mixer::Mixer;
 use modes::{Drive, Modes, Sticks};
 use parameters::Settings;
 pub use parameters::default_parameters;
 use position_control::PositionControl;
-use situation::Situation;
 
 /// Share of full thrust of rotors that idle on the ground.
 const IDLE_SHARE: f64 = 0.05;
@@ -41,7 +39,6 @@ pub struct AutopilotConfig {
     pub system_id: u8,
     /// The vehicle it flies: its gains and limits follow from that.
     pub vehicle: VehicleModel,
-    /// Datum of the world.
     pub datum: Datum,
     /// Its parameters; see [`default_parameters`].
     pub parameters: ParameterTable,
@@ -52,6 +49,19 @@ impl AutopilotConfig {
     pub fn new(system_id: u8, vehicle: VehicleModel, datum: Datum) -> Self {
         Self { system_id, parameters: default_parameters(&vehicle), vehicle, datum }
     }
+}
+
+/// The situation of the vehicle, from which modes and missions decide.
+struct Situation<'a> {
+    now: Duration,
+    estimate: &'a Estimate,
+    /// The error is the reason why the estimate cannot be flown by.
+    readiness: Result<(), &'static str>,
+    readings: &'a SensorReadings,
+    settings: &'a Settings,
+    datum: &'a Datum,
+    mission: &'a [MissionItem],
+    home: Vector3<f64>,
 }
 
 /// The built-in autopilot of one vehicle.

@@ -10,10 +10,10 @@ use std::time::Duration;
 use nalgebra::{Vector2, Vector3};
 use skein_mav::{FlightMode, Landed, SetPoint, Severity, Stamped};
 
+use super::Situation;
 use super::mission::MissionFlight;
 use super::parameters::FailsafeAction;
 use super::position_control::Demand;
-use super::situation::Situation;
 
 /// Within this of its height a climb is over, m.
 const HEIGHT_REACHED_M: f64 = 0.25;

@@ -241,7 +241,6 @@ impl PositionControl {
     }
 }
 
-/// Share of an error, m, that the position integral takes in.
 fn integral_share(learns: PositionIntegral, error_m: f64) -> f64 {
     match learns {
         PositionIntegral::None => 0.0,

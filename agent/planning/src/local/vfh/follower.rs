@@ -16,19 +16,19 @@ const AT_REST_M_S: f64 = 0.3;
 const PREVIEW_M: f64 = 8.0;
 /// Between two places on the path that are looked at, metres.
 const PREVIEW_STEP_M: f64 = 0.5;
-/// What a velocity leads to is looked at so far, metres.
+/// The straight way ahead of a velocity is looked at so far, metres.
 const STRAIGHT_M: f64 = 3.0;
 /// Between two bearings of a turn that are looked along, radians.
 const SWEEP_STEP: f64 = 0.15;
 
-/// What to fly now.
+/// The velocity to fly now, and the place on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     /// Velocity wanted (ENU, m/s).
     pub velocity: Vector3<f64>,
     /// The point of the path that it leads to (ENU, metres).
     pub carrot: Vector3<f64>,
-    /// How far along the path the vehicle is, metres.
+    /// The vehicle's place along the path, metres.
     pub station_m: f64,
 }
 
@@ -46,7 +46,6 @@ pub struct Follower {
 
 impl Follower {
     /// A follower at rest that has seen nothing.
-    #[must_use]
     pub fn new(vfh: VfhConfig, speed: SpeedConfig) -> Follower {
         let aim = ApfConfig { look_ahead_m: 3.0, ..ApfConfig::default() };
         Follower { vfh: Vfh::new(vfh), speed, aim, obstacles: Vec::new(), set_point: Vector3::zeros() }
@@ -125,7 +124,6 @@ impl Follower {
 
     /// The set-point after `step_s`, on its way to `wanted`: never a step, but for what keeps a distance, for which see
     /// [`Follower::flew`].
-    #[must_use]
     pub fn ease(&self, wanted: &Vector3<f64>, step_s: f64) -> Vector3<f64> {
         speed::step(&self.set_point, wanted, step_s, self.speed.gentle_m_s2)
     }

@@ -1,6 +1,6 @@
 //! The events that may be selected in a state.
 
-use crate::strategy::Strategy;
+use crate::program::Strategy;
 use crate::verify::bits::{has, union};
 use crate::verify::locals::{Kind, Local};
 use crate::verify::product::{Product, Scratch};

@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 use skein_mav::{AutopilotCommand, CommandResult, FlightMode, Severity};
 
 use super::{HEIGHT_REACHED_M, Modes, Task};
+use crate::autopilot::Situation;
 use crate::autopilot::mission::MissionFlight;
-use crate::autopilot::situation::Situation;
 
 /// Set-points must come at least this often for offboard to be entered (PX4: more than 2 Hz).
 const OFFBOARD_ENTRY_INTERVAL: Duration = Duration::from_millis(500);

@@ -5,8 +5,8 @@ use std::time::Duration;
 use skein_mav::Severity;
 
 use super::{Charge, Failsafe, Modes, Task};
+use crate::autopilot::Situation;
 use crate::autopilot::parameters::FailsafeAction;
-use crate::autopilot::situation::Situation;
 
 /// After set-points are lost the vehicle holds this long before it does what is configured.
 const HOLD_BEFORE_ACTION: Duration = Duration::from_secs(1);

@@ -5,8 +5,8 @@ use std::time::Duration;
 use skein_mav::{Severity, Stamped};
 
 use super::{Modes, Task};
+use crate::autopilot::Situation;
 use crate::autopilot::position_control::Demand;
-use crate::autopilot::situation::Situation;
 
 /// Legs on the ground this long on the way down: landed.
 const TOUCHDOWN_TIME: Duration = Duration::from_millis(250);

@@ -6,9 +6,9 @@ use nalgebra::{Vector2, Vector3};
 use skein_mav::{SetPoint, Severity};
 
 use super::{HEIGHT_REACHED_M, Modes, ReturnLeg, Task};
+use crate::autopilot::Situation;
 use crate::autopilot::mission::{MissionFlight, MissionStep, straight_up, towards};
 use crate::autopilot::position_control::{Demand, Horizontal, Vertical, stopping_way};
-use crate::autopilot::situation::Situation;
 
 /// Within this of home a return lands straight away, m.
 const AT_HOME_M: f64 = 1.0;

@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use serde::Deserialize;
+use skein_bp::Event;
+use skein_bp::verify::{Inspection, Report, Search, Verifier, Violation, ViolationKind};
 
 use super::{Case, expect, template_name};
-use crate::event::Event;
-use crate::verify::{Inspection, Report, Search, Verifier, Violation, ViolationKind};
 
 /// States after which a case counts as too large.
 const MOST_STATES: usize = 5_000_000;
@@ -156,11 +156,7 @@ impl Verification {
             Some(ViolationKind::HotBThread) => Verdict::HotBThread,
             Some(ViolationKind::HotSystem) if asked(Verdict::HotSystem) => Verdict::HotSystem,
             Some(ViolationKind::HotRun | ViolationKind::HotSystem) => Verdict::HotRun,
-            Some(
-                ViolationKind::Invariant { .. } | ViolationKind::Unsettled | ViolationKind::OutOfReach { .. },
-            ) => {
-                return None;
-            }
+            Some(_) => return None,
         })
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! A *run* expectation lists all legal traces: every run must be one of them, and over many seeds each must be seen. A
 //! *selectable_at_start* expectation gives the events that may be selected first. A *verify* expectation gives what the
-//! [verifier](crate::verify) must find. Programs are [scripts](crate::script); events and sets are written as in
-//! [`crate::notation`].
+//! [verifier](skein_bp::verify) must find. Programs are [scripts](skein_bp::script); events and sets are written as in
+//! [`skein_bp::notation`].
 
 mod verification;
 
@@ -12,11 +12,8 @@ use std::fmt;
 use std::time::Duration;
 
 use serde::Deserialize;
-
-use crate::event::Event;
-use crate::program::{Program, ProgramConfig};
-use crate::script::{Library, Op, Script, ScriptError, ScriptSource};
-use crate::strategy::Strategy;
+use skein_bp::script::{Library, Op, Script, ScriptError, ScriptSource};
+use skein_bp::{Event, Program, ProgramConfig, Strategy};
 use verification::Verification;
 
 /// The one format that is understood.
@@ -31,12 +28,9 @@ const MAX_SELECTIONS: usize = 10_000;
 
 /// Why a file of cases was refused.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum SuiteError {
-    /// The file is not JSON or not a suite; the cause names line and column.
     #[error("not a file of conformance cases: {0}")]
     Syntax(#[from] serde_json::Error),
-    /// The file is in a format that is not understood.
     #[error("`format` is `{found}`, expected `{FORMAT}`")]
     Format { found: String },
 }

@@ -3,9 +3,11 @@
 //! Prints a line for each expectation that fails, then the counts. Exits with 1 when something failed, with 2 when the file
 //! or one of its cases cannot be understood.
 
+mod suite;
+
 use std::process::ExitCode;
 
-use skein_bp::conformance::Suite;
+use suite::Suite;
 
 fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);

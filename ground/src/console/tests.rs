@@ -28,7 +28,7 @@ impl TypeVisitor for Declarations {
 }
 
 #[test]
-fn the_console_has_the_types_of_the_messages() {
+fn the_console_has_the_messages_in_typescript() {
     let config = Config::new().with_large_int("number");
     let mut declarations = Declarations { config, found: BTreeMap::new() };
     declarations.visit::<feed::Message<'static>>();
