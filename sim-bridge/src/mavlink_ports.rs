@@ -31,6 +31,9 @@ pub struct MavlinkPorts {
 
 impl MavlinkPorts {
     /// Opens two ports for each vehicle, all `offset` further up than by convention.
+    ///
+    /// # Errors
+    /// The port that is taken.
     pub fn open(vehicles: usize, offset: u16) -> anyhow::Result<Self> {
         let open = |vehicle| {
             let index = u16::try_from(vehicle)? + offset;
