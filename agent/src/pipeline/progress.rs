@@ -15,8 +15,6 @@ use crate::{neighbours::Neighbour, positioning::Motion, report::Report};
 const ARRIVAL_M: f64 = 0.35;
 /// Other waypoints are reached within this distance, m.
 const PASSING_M: f64 = 0.7;
-/// A vehicle that is faster does not land yet, m/s: it would drift from the place while it slows down.
-const LANDING_SPEED_M_S: f64 = 0.5;
 /// Waypoints are reached within this difference of height, m.
 const ARRIVAL_HEIGHT_M: f64 = 0.5;
 /// A passage lies behind once the vehicle is this far past it, m.
@@ -90,8 +88,7 @@ impl Progress {
             // A place in the air that another vehicle has is passed at a distance, not fought over.
             (false, true) => 2.0 * self.separation_m,
         };
-        let is_slow = !waypoint.lands || motion.velocity.xy().norm() < LANDING_SPEED_M_S;
-        let arrives = offset.xy().norm() < within_m && offset.z.abs() < ARRIVAL_HEIGHT_M && is_slow;
+        let arrives = offset.xy().norm() < within_m && offset.z.abs() < ARRIVAL_HEIGHT_M;
         (arrives && !std::mem::replace(&mut course.has_arrived, true))
             .then_some(Report::Arrived { leg: waypoint.leg })
     }
