@@ -20,7 +20,8 @@
 //! map.integrate(eye, &[RayEnd { point: Vector3::new(4.1, 0.1, 3.1), hit: true }]);
 //!
 //! let (goal, config) = (Vector3::new(8.1, 0.1, 3.1), astar::AstarConfig::default());
-//! let request = astar::Request { start: eye, goal, potential: &Potential::default(), discs: &[], within: Region::EVERYWHERE };
+//! let (potential, within) = (Potential::default(), Region::EVERYWHERE);
+//! let request = astar::Request { start: eye, goal, potential: &potential, discs: &[], within };
 //! let plan = astar::plan(&mut map, &request, &config, &mut astar::Astar::default())?;
 //! let path = simplify(&map, &plan.path, config.clearance_m);
 //! assert!(path.length_m() > 8.0 && path.points().len() <= 5);

@@ -142,7 +142,8 @@ proptest! {
         let config = AstarConfig { comfort_m: 2.0, comfort_weight: 1.5, ..shortest() };
         let obstacle = PotentialObstacle { centre: Vector3::new(x, y, 0.5), influence_m: 3.0 };
         let potential = Potential::gated(&centre(from), &Vector3::new(1.0, 1.0, 0.0), &[obstacle], 4.0);
-        let request = Request { start: centre(from), goal: centre(to), potential: &potential, discs: &[], within: Region::EVERYWHERE };
+        let (start, goal, within) = (centre(from), centre(to), Region::EVERYWHERE);
+        let request = Request { start, goal, potential: &potential, discs: &[], within };
         let found = plan(&mut grid(FLAT, &blocked), &request, &config, &mut Astar::default());
         let clearance = |cell: [usize; 3]| blocked.iter()
             .map(|other| (centre(*other) - centre(cell)).norm() - 0.5).fold(5.0, f64::min);

@@ -117,7 +117,8 @@ proptest! {
             let goal = goals[number * goals.len() / turns.len()];
             let discs: Vec<Disc> = turn.discs.iter().map(|&centre| Disc { centre, radius_m: 1.6 }).collect();
             let potential = Potential::default();
-            let request = Request { start: turn.start, goal, potential: &potential, discs: &discs, within: Region::EVERYWHERE };
+            let (start, within) = (turn.start, Region::EVERYWHERE);
+            let request = Request { start, goal, potential: &potential, discs: &discs, within };
             let found = plan(&mut search, &mut map, &request, turn.clearance_m, slice);
             match (found, searched(&map, &request, turn.clearance_m)) {
                 (Ok(plan), Some(least)) => {

@@ -55,9 +55,9 @@ impl Planning {
         self.routes.is_under_way()
     }
 
-    /// Begins to plan a path to the waypoint, `within` a region. Where the vehicle is stuck, neighbours that stand around are obstacles
-    /// too. One that has fallen silent always is, as large as its ghost will be. The answer comes at once if this
-    /// tick's allowance is enough for it, else from [`Planning::go_on`].
+    /// Begins to plan a path to the waypoint, `within` a region. Where the vehicle is stuck, neighbours that stand
+    /// around are obstacles too. One that has fallen silent always is, as large as its ghost will be. The answer
+    /// comes at once if this tick's allowance is enough for it, else from [`Planning::go_on`].
     pub fn begin(
         &mut self,
         is_stuck: bool,

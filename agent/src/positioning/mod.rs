@@ -1,7 +1,7 @@
 //! Positioning: where the vehicle is, how it lies and moves, and how sure that is.
 //!
-//! Whoever needs a position asks a [`Positioning`] and nobody else. Another source is a file here, a line in [`source`],
-//! and a name in [`PositionSource`].
+//! Whoever needs a position asks a [`Positioning`] and nobody else. Another source is a file here, a line in
+//! [`source`], and a name in [`PositionSource`].
 
 mod autopilot;
 mod estimate;

@@ -1,5 +1,5 @@
-//! Real autopilots in the simulated world: software-in-the-loop builds of PX4 and ArduPilot, each vehicle's in a process
-//! and a folder of its own. World, physics and instruments are Skein's; time is the world's, in lockstep.
+//! Real autopilots in the simulated world: software-in-the-loop builds of PX4 and ArduPilot, each vehicle's in a
+//! process and a folder of its own. World, physics and instruments are Skein's; time is the world's, in lockstep.
 
 mod ardupilot;
 mod instance;

@@ -11,7 +11,8 @@ use crate::sensors::SensorReadings;
 /// In every step of the world all pilots first [`sense`](Self::sense) and then [command](Self::commands), so that those
 /// in processes of their own work at the same time.
 pub trait Pilot: Send {
-    /// Takes in the newest readings at `now`. `body` is the truth, for simulators of instruments that the readings lack.
+    /// Takes in the newest readings at `now`. `body` is the truth, for simulators of instruments that the readings
+    /// lack.
     fn sense(&mut self, now: Duration, readings: &SensorReadings, body: &Quadrotor);
 
     /// The commands for the step that begins now.

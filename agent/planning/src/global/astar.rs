@@ -376,8 +376,9 @@ impl Rooms<'_> {
         there_room >= self.required || (here_room < self.required && better)
     }
 
-    /// Distance to what is closed or beyond the request's box, metres; negative inside of that. Where height changes along the path, that at the worse of
-    /// the heights at its ends: what is closed with its margin is taller than the ends are apart.
+    /// Distance to what is closed or beyond the request's box, metres; negative inside of that. Where height changes
+    /// along the path, that at the worse of the heights at its ends: what is closed with its margin is taller than
+    /// the ends are apart.
     fn open_m(&self, voxel: VoxelIndex) -> f64 {
         let within = self.room_within_m(voxel);
         let Some(keep_out) = self.map.keep_out() else { return within };

@@ -34,8 +34,9 @@ const MOST_CHANGES: usize = 2500;
 /// and change its height, and others come to stand in the way.
 ///
 /// A step costs its length, and by [`StepCosts::FLYING`] more where a voxel next to it is not open. Open is a voxel
-/// with the clearance that is not closed ([`ClearanceMap::keep_out`]), nor in a disc, nor beyond the request's box. A potential counts for nothing.
-/// A vehicle that does not stand in the open, and a way that leads over something, are for [`astar`](super::astar).
+/// with the clearance that is not closed ([`ClearanceMap::keep_out`]), nor in a disc, nor beyond the request's box. A
+/// potential counts for nothing. A vehicle that does not stand in the open, and a way that leads over something, are
+/// for [`astar`](super::astar).
 ///
 /// ```
 /// use nalgebra::Vector3;

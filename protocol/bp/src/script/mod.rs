@@ -15,8 +15,8 @@
 //! | `{"on_interrupt_enqueue": ["$event", ..]}` | from here on, enqueues these when interrupted; `$event` is what interrupts |
 //! | `{"stop": true}` | ends |
 //!
-//! Events and sets are written as in [`crate::notation`]. A datum `"$x"` of a requested or stated event stands for the datum `x`
-//! of the event that ended the last sync; `timeout` is the event by which time ends a block.
+//! Events and sets are written as in [`crate::notation`]. A datum `"$x"` of a requested or stated event stands for
+//! the datum `x` of the event that ended the last sync; `timeout` is the event by which time ends a block.
 //!
 //! A [`ScriptFile`] is a script for people: with a name, a purpose and parameters, and without the ops that only a
 //! whole program should have.

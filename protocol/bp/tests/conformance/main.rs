@@ -1,7 +1,7 @@
 //! Runs conformance cases: `cargo run --release -p skein-bp --example conformance -- FILE`.
 //!
-//! Prints a line for each expectation that fails, then the counts. Exits with 1 when something failed, with 2 when the file
-//! or one of its cases cannot be understood.
+//! Prints a line for each expectation that fails, then the counts. Exits with 1 when something failed, with 2 when
+//! the file or one of its cases cannot be understood.
 
 mod suite;
 

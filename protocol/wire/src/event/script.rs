@@ -42,7 +42,8 @@ skein_bp::events! {
 }
 
 skein_bp::events! {
-    /// What is told only while a script, or a behaviour that names it, listens. Places are told in the air, when they have changed by a metre.
+    /// What is told only while a script, or a behaviour that names it, listens. Places are told in the air, when they
+    /// have changed by a metre.
     pub const SCRIPT_FACTS;
 
     /// Where the vehicle is.
