@@ -181,7 +181,7 @@ impl Control {
         self.guidance.look_ahead(now, &motion, map, around)
     }
 
-    /// What whoever listens may be told, once the vehicle's place is known.
+    /// The facts that whoever listens may be told, once the vehicle's place is known.
     #[must_use]
     pub fn circumstances(&self) -> Option<Circumstances<'_>> {
         Some(Circumstances {

@@ -12,7 +12,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 pub use px4::{Px4Commands, Px4Link};
 
-/// What the instruments of a vehicle tell at one time. World ENU, body FLU.
+/// The readings of a vehicle's instruments at one time. World ENU, body FLU.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instruments {
     /// Gyroscope, body, rad/s.

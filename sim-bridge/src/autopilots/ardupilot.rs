@@ -103,10 +103,10 @@ impl ArduPilot {
 
     /// Takes in one packet and answers it: the vehicle is `share` of a step further than one step ago.
     fn exchange(&mut self, share: f64) -> bool {
-        let patience = match (self.has_sent, self.is_late) {
-            (false, _) => TIME_TO_CONNECT,
-            (true, false) => PACKET,
-            (true, true) => LATE_PACKET,
+        let patience = match (self.is_late, self.has_sent) {
+            (true, _) => LATE_PACKET,
+            (false, true) => PACKET,
+            (false, false) => TIME_TO_CONNECT,
         };
         let _ = self.servos.set_read_timeout(Some(patience));
         let mut datagram = [0; 256];
@@ -127,6 +127,13 @@ impl ArduPilot {
             let _ = self.servos.send_to(text.as_bytes(), from);
         }
         true
+    }
+
+    /// It is gone, and its rotors stand.
+    fn lose(&mut self) {
+        tracing::warn!("{} has gone", self.name);
+        self.mavlink = None;
+        self.throttle = [0.0; 4];
     }
 }
 
@@ -158,11 +165,9 @@ impl Pilot for ArduPilot {
 
     fn receive(&mut self, bytes: &[u8]) {
         if let Some(stream) = &mut self.mavlink
-            && let Err(error) = stream.write_all(bytes)
-            && error.kind() != ErrorKind::WouldBlock
+            && stream.write_all(bytes).is_err_and(|error| error.kind() != ErrorKind::WouldBlock)
         {
-            tracing::warn!("{} has gone: {error}", self.name);
-            self.mavlink = None;
+            self.lose();
         }
     }
 
@@ -170,10 +175,10 @@ impl Pilot for ArduPilot {
         let (mut output, mut buffer) = (Vec::new(), [0; 4096]);
         while let Some(stream) = &mut self.mavlink {
             match stream.read(&mut buffer) {
-                Ok(0) => self.mavlink = None,
+                Ok(0) => self.lose(),
                 Ok(length) => output.extend_from_slice(&buffer[..length]),
                 Err(error) if error.kind() == ErrorKind::WouldBlock => break,
-                Err(_) => self.mavlink = None,
+                Err(_) => self.lose(),
             }
         }
         output
@@ -241,7 +246,7 @@ fn find_defaults(program: &Path) -> anyhow::Result<PathBuf> {
         })
 }
 
-/// What makes it the copter that the world has, and lands it when its companion dies.
+/// The parameters of the copter that the world has, which lands when its companion dies.
 fn parameters_of(index: usize, model: &VehicleModel) -> String {
     let nominal_v = (model.battery.full_v + model.battery.empty_v) / 2.0;
     let capacity_mah = model.battery.capacity_wh / nominal_v * 1000.0;
@@ -250,4 +255,41 @@ fn parameters_of(index: usize, model: &VehicleModel) -> String {
         "FRAME_CLASS 1\nFRAME_TYPE 1\nBATT_MONITOR 4\nBATT_CAPACITY {capacity_mah:.0}\n\
          GUID_TIMEOUT 0.5\nFS_GCS_ENABLE 5\nSYSID_MYGCS {companion}\nMAV_GCS_SYSID {companion}\n"
     )
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)] // A test fails by panicking.
+mod tests {
+    use std::net::TcpListener;
+
+    use super::*;
+
+    /// So far up that no real one is there.
+    const INDEX: usize = 70;
+
+    #[test]
+    fn the_rotors_of_one_that_has_gone_stand() {
+        let model = VehicleModel::built_in("x500").unwrap();
+        let datum = Datum::from_degrees(47.4, 8.5, 488.0);
+        let port = |base: u16| base + PORTS_APART * INDEX as u16;
+        let mavlink = TcpListener::bind((Ipv4Addr::LOCALHOST, port(MAVLINK_PORT))).unwrap();
+        let mut copter = ArduPilot::start(INDEX, datum, &model, None, None, Path::new("")).unwrap();
+        let (link, _) = mavlink.accept().unwrap();
+        let servos = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+        let mut packet = [0; 40];
+        packet[..2].copy_from_slice(&18_458_u16.to_le_bytes());
+        (0..4).for_each(|motor| packet[8 + 2 * motor..][..2].copy_from_slice(&1500_u16.to_le_bytes()));
+        for _ in 0..ANSWERS {
+            servos.send_to(&packet, (Ipv4Addr::LOCALHOST, port(SERVO_PORT))).unwrap();
+        }
+        let half = 0.5 * (1.0 - QUADRATIC) + 0.25 * QUADRATIC;
+        assert_eq!(copter.commands(), MotorCommands([half; 4]));
+        drop(link);
+        let began = Instant::now();
+        while copter.mavlink.is_some() {
+            assert!(began.elapsed() < TIME_TO_CONNECT, "its end is not noticed");
+            copter.take_output();
+        }
+        assert_eq!(copter.commands(), MotorCommands([0.0; 4]));
+    }
 }

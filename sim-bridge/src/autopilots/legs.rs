@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 /// Most that the accelerometer feels in one step, m/s².
 const MOST_M_S2: f64 = 60.0;
 
-/// What has still to be felt of a blow.
+/// The rest of a blow, still to be felt.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Legs(Vector3<f64>);
 

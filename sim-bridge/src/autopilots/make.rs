@@ -4,7 +4,7 @@ use clap::ValueEnum;
 use serde::Deserialize;
 use skein_agent::Envelope;
 
-/// Who flies a vehicle.
+/// A make of autopilot.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Make {
@@ -23,7 +23,7 @@ const STOCK_BRAKE_M_S2: f64 = 2.5;
 const STOCK_LATENCY_S: f64 = 0.5;
 
 impl Make {
-    /// What is left of an envelope once this autopilot flies it.
+    /// An envelope as far as this autopilot can fly it.
     #[must_use]
     pub fn handles(self, envelope: Envelope) -> Envelope {
         match self {

@@ -67,8 +67,9 @@ pub fn fly(
     let ports = MavlinkPorts::open(served, args.port_offset);
     match &ports {
         Ok(ports) => {
-            let audience = ports.audience().map(|audience| audience.to_string()).unwrap_or_default();
-            table.note(&format!("MAVLink: from all vehicles to udp {audience}, for QGroundControl"))?;
+            if let Some(audience) = ports.audience() {
+                table.note(&format!("MAVLink: from all vehicles to udp {audience}, for QGroundControl"))?;
+            }
         }
         // Two swarms on one computer fly all the same.
         Err(error) => table.note(&format!("no MAVLink for other programs: {error:#}"))?,

@@ -114,12 +114,12 @@ pub struct VehiclePlan {
     /// Its speed as a share of the scenario's cruise speed: above 0, at most 1.
     pub pace: f64,
     pub model: VehicleModel,
-    /// Who flies it; none for whoever the command line names.
+    /// Its autopilot; none for the one that the command line names.
     pub autopilot: Option<Make>,
 }
 
 impl VehiclePlan {
-    /// Who flies it.
+    /// Its autopilot.
     pub fn make(&self) -> Make {
         self.autopilot.unwrap_or_default()
     }

@@ -25,7 +25,7 @@ impl Program {
         self.board.get(self.board.bthread(name)?).map(|entry| &entry.bid)
     }
 
-    /// What b-threads that run here [state](Bid::state) at present, by their names; proxies state nothing.
+    /// The statements that b-threads which run here [make](Bid::state) at present, by their names; proxies state nothing.
     pub fn stated(&self) -> impl Iterator<Item = (&str, &Event)> {
         self.bids().flat_map(|(name, bid, _)| bid.stated().iter().map(move |event| (name, event)))
     }

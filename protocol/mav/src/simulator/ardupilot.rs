@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::Motion;
 use crate::axes;
 
-/// How every packet of sixteen servos begins.
+/// The beginning of every packet of sixteen servos.
 const MAGIC: u16 = 18_458;
 /// Pulses of a motor that stands and of one at full thrust, µs.
 const PULSES_US: [f64; 2] = [1000.0, 2000.0];

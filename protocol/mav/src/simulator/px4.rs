@@ -19,7 +19,7 @@ const SEA_LEVEL_HPA: f64 = 1013.25;
 const LAPSE_PER_M: f64 = 2.255_77e-5;
 const LAPSE_EXPONENT: f64 = 5.255_88;
 const TEMPERATURE_C: f32 = 15.0;
-/// What a good receiver says of its fixes.
+/// The quality of a good receiver's fixes.
 const FIX_3D: u8 = 3;
 const SATELLITES: u8 = 14;
 /// Dilution of precision, in hundredths.
@@ -31,12 +31,12 @@ pub struct Px4Link {
     datum: Datum,
     reader: FrameReader,
     writer: FrameWriter,
-    /// What is kept of instruments that have nothing new.
+    /// The last readings of instruments that have nothing new.
     magnetic_field: Vector3<f64>,
     pressure_height_m: f64,
 }
 
-/// What PX4 answers to one step's readings.
+/// PX4's answer to one step's readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Px4Commands {
     /// The time of the readings that it answers, since the run began.
