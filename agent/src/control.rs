@@ -110,7 +110,9 @@ impl Control {
             return;
         }
         let others: Vec<_> = self.neighbours.at(now).map(|neighbour| neighbour.position()).collect();
-        self.perception.take_in(scan, &Pose { position, attitude }, &others);
+        if !self.perception.take_in(scan, &Pose { position, attitude }, &others) {
+            return;
+        }
         let (returns, rays) = (self.perception.returns(), scan.ranges_m.len());
         self.guidance.steering.look(scan.stamp, &position, returns, rays, self.perception.map());
     }
@@ -252,6 +254,7 @@ impl Control {
             let descent = Descent {
                 name: &self.name,
                 position: motion.position,
+                speed_m_s: motion.velocity.xy().norm(),
                 stop: self.guidance.stop(&motion),
                 ground_m: self.config.home[2],
                 envelope: &self.config.envelope,
@@ -259,7 +262,9 @@ impl Control {
                 map: self.perception.map(),
                 neighbours: self.neighbours.around(),
             };
-            descent.detour(self.guidance.steering.settles_at)
+            let spot = self.guidance.course.landing_place();
+            let spot = spot.map(|place| place.xy().push(motion.position.z));
+            descent.detour(self.guidance.steering.settles_at.or(spot))
         });
         self.guidance.steering.settles_at = place;
         if place.is_none() {
@@ -282,6 +287,7 @@ impl Control {
                 let armed = around.iter().filter(|neighbour| neighbour.armed);
                 let surroundings = Surroundings {
                     map: self.perception.map(),
+                    sees: self.config.lidar,
                     obstacles: self.perception.obstacles(),
                     neighbours: &armed.map(|neighbour| neighbour.track).collect::<Vec<_>>(),
                     rank: self.rank(around),

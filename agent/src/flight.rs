@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_mav::{Command, CommandResult, Companion, FlightMode, Landed, MavEvent};
+use skein_mav::{Command, CommandResult, Companion, Dialect, FlightMode, Landed, MavEvent};
 
 use crate::instruction::Instruction;
 use crate::report::Report;
@@ -12,6 +12,12 @@ use crate::report::Report;
 const REPEAT_LAND: Duration = Duration::from_secs(2);
 /// A vehicle that is to land goes to a better place for it for so long at most.
 const SETTLES_FOR: Duration = Duration::from_secs(15);
+/// A command that brings the vehicle off the ground is given again after this long if it is rejected for now.
+const LAUNCH_AGAIN: Duration = Duration::from_secs(1);
+/// It is rejected for good once it has been rejected for so long.
+const REJECTED_FOR: Duration = Duration::from_secs(10);
+/// An autopilot whose take-off ends in *hold* may end it so far below the height asked for, m.
+const TAKEOFF_ENDS_BELOW_M: f64 = 1.0;
 /// Take-off is over this far below the height asked for.
 const TAKEOFF_TOLERANCE_M: f64 = 0.3;
 
@@ -20,7 +26,7 @@ const TAKEOFF_TOLERANCE_M: f64 = 0.3;
 pub enum FlightPhase {
     /// On the ground, or not heard of yet.
     Grounded,
-    /// The arm command is under way.
+    /// The commands before the climb are under way.
     Arming,
     /// The autopilot climbs to the take-off height.
     Climbing,
@@ -54,6 +60,12 @@ pub struct Flight {
     heard_of: bool,
     /// Whether the autopilot has shown, since the last command, that it is off the ground.
     left_ground: bool,
+    /// Whether it is so high that the autopilot's take-off may be over.
+    is_nearly_up: bool,
+    /// The launch command that was rejected for now, and since when it has been.
+    rejected: Option<(Command, Duration)>,
+    /// When it is given again.
+    launch_again: Duration,
     /// When the command to land is repeated, if the autopilot does not land.
     land_again: Duration,
 }
@@ -67,6 +79,9 @@ impl Flight {
             phase: FlightPhase::Grounded,
             heard_of: false,
             left_ground: false,
+            is_nearly_up: false,
+            rejected: None,
+            launch_again: Duration::ZERO,
             land_again: Duration::ZERO,
         }
     }
@@ -115,6 +130,7 @@ impl Flight {
             (Instruction::TakeOff, FlightPhase::Grounded) => {
                 self.phase = FlightPhase::Arming;
                 self.left_ground = false;
+                self.rejected = None;
                 self.launch(now, None, companion);
             }
             // Where, is seen before the tick is over: see `touch_down`.
@@ -180,16 +196,22 @@ impl Flight {
     pub fn hear(&mut self, now: Duration, event: &MavEvent, companion: &mut Companion) -> Option<Report> {
         match event {
             MavEvent::CommandAcked { command, result: CommandResult::Accepted } => {
+                self.rejected = None;
                 if self.phase == FlightPhase::Arming {
                     self.launch(now, Some(*command), companion);
                 }
                 None
             }
             MavEvent::CommandAcked { command, result } => {
-                self.command_failed(now, *command, &result.to_string())
+                if self.may_be_given_again(now, *command, *result) {
+                    return None;
+                }
+                self.command_failed(now, *command, &result.to_string(), companion)
             }
-            MavEvent::CommandTimedOut { command } => self.command_failed(now, *command, "no answer"),
-            MavEvent::ModeChanged { to, .. } if self.is_foreign(*to) => {
+            MavEvent::CommandTimedOut { command } => {
+                self.command_failed(now, *command, "no answer", companion)
+            }
+            MavEvent::ModeChanged { from, to } if self.is_foreign(*from, *to, companion.dialect()) => {
                 // Control ends with the mode change itself; the b-threads hear of it afterwards.
                 self.phase = FlightPhase::Taken;
                 Some(Report::Pilot(*to))
@@ -198,26 +220,54 @@ impl Flight {
         }
     }
 
-    /// Whether a change to `mode` is none that this agent asked for.
-    fn is_foreign(&self, mode: FlightMode) -> bool {
+    /// Whether this agent did not ask for a change of mode.
+    fn is_foreign(&self, from: FlightMode, to: FlightMode, dialect: &dyn Dialect) -> bool {
         match self.phase {
-            FlightPhase::Flying | FlightPhase::Settling { .. } => mode != FlightMode::Offboard,
-            FlightPhase::Engaging { .. } | FlightPhase::Climbing => {
-                !matches!(mode, FlightMode::Offboard | FlightMode::Takeoff | FlightMode::Hold)
-            }
+            FlightPhase::Flying | FlightPhase::Settling { .. } => to != FlightMode::Offboard,
+            FlightPhase::Engaging { .. } => match to {
+                FlightMode::Hold => from == FlightMode::Offboard,
+                _ => !matches!(to, FlightMode::Offboard | FlightMode::Takeoff),
+            },
+            FlightPhase::Climbing => match to {
+                FlightMode::Hold => !(self.is_nearly_up && dialect.takes_off_into_hold()),
+                _ => !matches!(to, FlightMode::Offboard | FlightMode::Takeoff),
+            },
+            // Until it lands it may hold, for want of set-points.
             FlightPhase::Landing => {
-                !matches!(mode, FlightMode::Land | FlightMode::Offboard | FlightMode::Hold)
+                from == FlightMode::Land
+                    || !matches!(to, FlightMode::Land | FlightMode::Offboard | FlightMode::Hold)
             }
-            FlightPhase::Adopted => mode != FlightMode::Hold,
+            FlightPhase::Adopted => to != FlightMode::Hold,
             FlightPhase::Grounded | FlightPhase::Arming | FlightPhase::Taken => false,
         }
     }
 
-    /// On the ground a refused command ends the flight; in the air it is tried again.
-    fn command_failed(&mut self, now: Duration, command: Command, why: &str) -> Option<Report> {
+    /// Whether a command on the ground was rejected as one may be that is accepted soon.
+    fn may_be_given_again(&mut self, now: Duration, command: Command, result: CommandResult) -> bool {
+        let is_for_now = matches!(result, CommandResult::TemporarilyRejected | CommandResult::Failed);
+        if !(self.is_taking_off() && !self.left_ground && is_for_now) {
+            return false;
+        }
+        let (_, since) = *self.rejected.get_or_insert((command, now));
+        self.launch_again = now + LAUNCH_AGAIN;
+        now < since + REJECTED_FOR
+    }
+
+    /// On the ground a refused command ends the flight, and the motors stop; in the air it is tried again.
+    fn command_failed(
+        &mut self,
+        now: Duration,
+        command: Command,
+        why: &str,
+        companion: &mut Companion,
+    ) -> Option<Report> {
         match self.phase {
             FlightPhase::Arming | FlightPhase::Climbing if !self.left_ground => {
                 self.phase = FlightPhase::Grounded;
+                self.rejected = None;
+                if companion.telemetry().armed {
+                    companion.command(now, Command::Disarm);
+                }
                 Some(Report::CommandFailed(format!("{command:?}: {why}")))
             }
             FlightPhase::Engaging { .. } if command == Command::Offboard => {
@@ -254,6 +304,10 @@ impl Flight {
         let telemetry = companion.telemetry();
         let (landed, armed, mode) = (telemetry.landed, telemetry.armed, telemetry.mode);
         let height_m = position.zip(telemetry.home).map_or(0.0, |(position, home)| position.z - home.z);
+        // Whether it is in the air may be told before the first heartbeat, which tells who flies it.
+        if !telemetry.connected {
+            return None;
+        }
         if self.phase == FlightPhase::Grounded && !matches!(landed, Landed::OnGround | Landed::Unknown) {
             // In the air before its agent, or by a pilot's hand.
             let found = !std::mem::replace(&mut self.heard_of, true);
@@ -261,7 +315,15 @@ impl Flight {
         }
         self.heard_of |= landed != Landed::Unknown;
         self.left_ground |= !matches!(landed, Landed::OnGround | Landed::Unknown);
+        self.is_nearly_up = height_m >= self.takeoff_height_m - TAKEOFF_ENDS_BELOW_M;
         match self.phase {
+            FlightPhase::Arming | FlightPhase::Climbing
+                if let Some((command, _)) = self.rejected
+                    && now >= self.launch_again =>
+            {
+                self.launch_again = now + LAUNCH_AGAIN;
+                companion.command(now, command);
+            }
             FlightPhase::Climbing if height_m >= self.takeoff_height_m - TAKEOFF_TOLERANCE_M => {
                 self.engage(now)
             }
@@ -292,5 +354,198 @@ impl Flight {
             _ => {}
         }
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use skein_mav::messages::{
+        COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA, MavAutopilot, MavCmd,
+        MavLandedState, MavMessage, MavModeFlag, MavResult,
+    };
+    use skein_mav::{Address, CompanionConfig, Datum, FrameReader, FrameWriter};
+
+    use super::*;
+
+    const TAKEOFF: u32 = 4 << 16 | 2 << 24;
+    const HOLD: u32 = 4 << 16 | 3 << 24;
+    const LAND: u32 = 4 << 16 | 6 << 24;
+    const OFFBOARD: u32 = 6 << 16;
+
+    /// A flight on a PX4 that does what a test says.
+    struct Stand {
+        flight: Flight,
+        companion: Companion,
+        autopilot: FrameWriter,
+        reader: FrameReader,
+        now: Duration,
+        height_m: f64,
+        reports: Vec<Report>,
+    }
+
+    impl Stand {
+        fn new() -> Self {
+            let datum = Datum::from_degrees(47.4, 8.5, 0.0);
+            let mut stand = Self {
+                flight: Flight::new(3.0),
+                companion: Companion::new(CompanionConfig::new(1, datum)),
+                autopilot: FrameWriter::new(Address::autopilot(1)),
+                reader: FrameReader::default(),
+                now: Duration::ZERO,
+                height_m: 0.0,
+                reports: Vec::new(),
+            };
+            let place = datum.place();
+            stand.autopilot.write(&HOME_POSITION_DATA {
+                latitude: place.latitude_e7(),
+                longitude: place.longitude_e7(),
+                ..Default::default()
+            });
+            stand.is(MavLandedState::MAV_LANDED_STATE_ON_GROUND);
+            stand.beats(HOLD, false);
+            stand
+        }
+
+        fn is(&mut self, landed_state: MavLandedState) {
+            self.autopilot.write(&EXTENDED_SYS_STATE_DATA { landed_state, ..Default::default() });
+        }
+
+        fn beats(&mut self, custom_mode: u32, armed: bool) {
+            let armed = if armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
+            let autopilot = MavAutopilot::MAV_AUTOPILOT_PX4;
+            self.autopilot.write(&HEARTBEAT_DATA {
+                custom_mode,
+                autopilot,
+                base_mode: armed,
+                ..Default::default()
+            });
+            self.goes_on(0);
+        }
+
+        fn acks(&mut self, command: MavCmd, result: MavResult) -> Vec<(MavCmd, f32)> {
+            let (target_system, target_component) = (1, 191);
+            self.autopilot.write(&COMMAND_ACK_DATA {
+                command,
+                result,
+                target_system,
+                target_component,
+                ..Default::default()
+            });
+            self.goes_on(0)
+        }
+
+        /// Some time passes in which the autopilot says nothing new; returns the commands given meanwhile.
+        fn goes_on(&mut self, ms: u64) -> Vec<(MavCmd, f32)> {
+            self.now += Duration::from_millis(ms);
+            self.companion.receive(self.now, &self.autopilot.take());
+            while let Some(event) = self.companion.poll_event() {
+                self.reports.extend(self.flight.hear(self.now, &event, &mut self.companion));
+            }
+            let position = Some(Vector3::z() * self.height_m);
+            self.reports.extend(self.flight.follow(self.now, position, &mut self.companion));
+            self.reader.push(&self.companion.take_output());
+            std::iter::from_fn(|| self.reader.next_frame())
+                .filter_map(|frame| match frame.message {
+                    MavMessage::COMMAND_LONG(command) => Some((command.command, command.param1)),
+                    _ => None,
+                })
+                .collect()
+        }
+
+        fn takes_off(&mut self) {
+            self.flight.carry_out(self.now, Instruction::TakeOff, &mut self.companion);
+            self.acks(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, MavResult::MAV_RESULT_ACCEPTED);
+            self.beats(TAKEOFF, true);
+            self.is(MavLandedState::MAV_LANDED_STATE_TAKEOFF);
+        }
+
+        fn lands(&mut self) {
+            self.height_m = 3.0;
+            self.is(MavLandedState::MAV_LANDED_STATE_IN_AIR);
+            self.beats(OFFBOARD, true);
+            self.flight.touch_down(self.now, &mut self.companion);
+        }
+    }
+
+    #[test]
+    fn an_arm_command_that_is_rejected_for_now_is_given_again_for_ten_seconds() {
+        let mut stand = Stand::new();
+        let arm = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
+        stand.flight.carry_out(stand.now, Instruction::TakeOff, &mut stand.companion);
+        for second in 0..10 {
+            stand.acks(arm, MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
+            assert_eq!(stand.goes_on(1000), [(arm, 1.0)], "at {second} s");
+            assert_eq!(stand.reports, []);
+        }
+        stand.acks(arm, MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
+        assert!(
+            matches!(&stand.reports[..], [Report::CommandFailed(why)] if why.starts_with("Arm: rejected"))
+        );
+        assert_eq!(stand.goes_on(5000), []);
+        // Once accepted, it climbs.
+        stand.flight.carry_out(stand.now, Instruction::TakeOff, &mut stand.companion);
+        stand.acks(arm, MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
+        stand.goes_on(1000);
+        stand.acks(arm, MavResult::MAV_RESULT_ACCEPTED);
+        assert_eq!(stand.flight.phase(), FlightPhase::Climbing);
+        assert_eq!(stand.goes_on(3000), []);
+    }
+
+    #[test]
+    fn a_vehicle_whose_take_off_is_denied_is_disarmed() {
+        let mut stand = Stand::new();
+        stand.flight.carry_out(stand.now, Instruction::TakeOff, &mut stand.companion);
+        stand.acks(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, MavResult::MAV_RESULT_ACCEPTED);
+        stand.beats(HOLD, true);
+        let disarm = (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0.0);
+        assert_eq!(stand.acks(MavCmd::MAV_CMD_NAV_TAKEOFF, MavResult::MAV_RESULT_DENIED), [disarm]);
+        assert!(matches!(&stand.reports[..], [Report::CommandFailed(_)]));
+        assert_eq!(stand.flight.phase(), FlightPhase::Grounded);
+    }
+
+    #[test]
+    fn a_pilots_hold_wins_in_the_climb_and_in_the_landing() {
+        let mut stand = Stand::new();
+        stand.takes_off();
+        stand.height_m = 1.0;
+        stand.beats(HOLD, true);
+        assert_eq!(stand.reports, [Report::Pilot(FlightMode::Hold)]);
+        assert_eq!(stand.flight.phase(), FlightPhase::Taken);
+
+        let mut stand = Stand::new();
+        stand.takes_off();
+        stand.lands();
+        stand.beats(LAND, true);
+        assert_eq!(stand.reports, []);
+        stand.beats(HOLD, true);
+        assert_eq!(stand.reports, [Report::Pilot(FlightMode::Hold)]);
+        assert_eq!(stand.goes_on(3000), [], "landing does not take it back");
+    }
+
+    #[test]
+    fn the_hold_that_ends_a_take_off_and_the_one_before_a_landing_are_no_pilots() {
+        let mut stand = Stand::new();
+        stand.takes_off();
+        stand.height_m = 2.2;
+        stand.goes_on(20);
+        stand.beats(HOLD, true);
+        assert_eq!(stand.flight.phase(), FlightPhase::Climbing);
+        stand.lands();
+        stand.beats(HOLD, true);
+        assert_eq!(stand.flight.phase(), FlightPhase::Landing);
+        assert_eq!(stand.goes_on(2000), [(MavCmd::MAV_CMD_DO_SET_MODE, 1.0)], "and it is told again");
+        assert_eq!(stand.reports, []);
+    }
+
+    #[test]
+    fn whoever_is_in_the_air_before_its_first_heartbeat_is_left_until_it_says_who_flies_it() {
+        let mut stand = Stand::new();
+        stand.companion = Companion::new(CompanionConfig::new(1, Datum::from_degrees(47.4, 8.5, 0.0)));
+        stand.flight = Flight::new(3.0);
+        stand.is(MavLandedState::MAV_LANDED_STATE_IN_AIR);
+        stand.goes_on(0);
+        assert_eq!(stand.reports, []);
+        stand.beats(OFFBOARD, true);
+        assert_eq!(stand.reports, [Report::FoundAirborne]);
     }
 }

@@ -76,8 +76,13 @@ impl Flight {
 
     fn tick(&mut self) -> SetPoint {
         self.now += Duration::from_millis(20);
-        let surroundings =
-            Surroundings { map: self.perception.map(), obstacles: &[], neighbours: &self.others, rank: 0 };
+        let surroundings = Surroundings {
+            map: self.perception.map(),
+            sees: true,
+            obstacles: &[],
+            neighbours: &self.others,
+            rank: 0,
+        };
         let set_point = self.guidance.steer(self.now, &self.motion, &surroundings);
         let (velocity, height_m) = match set_point {
             SetPoint::Planar { vx, vy, z, .. } => (Vector3::new(vx, vy, 0.0), Some(z)),

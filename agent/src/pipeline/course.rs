@@ -40,6 +40,11 @@ impl Course {
         Self { waypoint: Some(waypoint), ..Self::default() }
     }
 
+    /// The waypoint, if the vehicle has arrived there to land.
+    pub fn landing_place(&self) -> Option<Vector3<f64>> {
+        self.waypoint.filter(|waypoint| waypoint.lands && self.has_arrived).map(|waypoint| waypoint.target)
+    }
+
     /// The path ahead, from the vehicle's place on it to its end; empty without one.
     pub fn path_ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
         self.following.iter().flat_map(|following| {

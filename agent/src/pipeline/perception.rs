@@ -176,8 +176,13 @@ impl Perception {
     }
 
     /// Takes in a scan that was taken at `pose`, while `neighbours` were at these positions. What none has seen
-    /// again for long is forgotten; without scans nothing is.
-    pub fn take_in(&mut self, scan: &Scan, pose: &Pose, neighbours: &[Vector3<f64>]) {
+    /// again for long is forgotten; without scans nothing is. A scan of which half is no measurement is none, and
+    /// returns `false`.
+    pub fn take_in(&mut self, scan: &Scan, pose: &Pose, neighbours: &[Vector3<f64>]) -> bool {
+        let measured = scan.ranges_m.iter().filter(|range| is_measured(**range)).count();
+        if 2 * measured <= scan.ranges_m.len() {
+            return false;
+        }
         self.last_scan = Some(scan.stamp);
         self.ends.clear();
         self.returns.clear();
@@ -185,11 +190,11 @@ impl Perception {
         let to_world = pose.attitude.to_rotation_matrix();
         self.far_ray = (self.far_ray + 1) % FAR_RAYS;
         for (ray, &range) in (0_u32..).zip(&scan.ranges_m) {
-            let range = f64::from(range);
-            let hit = range.is_finite() && range <= scan.max_range_m;
-            if hit && range < OWN_FRAME_M {
+            if !is_measured(range) {
                 continue;
             }
+            let range = f64::from(range);
+            let hit = range.is_finite() && range <= scan.max_range_m;
             // The voxels are wider than the rays are far apart.
             if (!hit || range > MAP_RANGE_M) && ray % FAR_RAYS != self.far_ray {
                 continue;
@@ -229,7 +234,14 @@ impl Perception {
         }
         self.map.fade(scan.stamp);
         self.map.integrate(pose.position, &self.ends);
+        true
     }
+}
+
+/// Whether a ray tells something, if only that nothing came back from beyond the greatest range (infinite): not a NaN,
+/// nor nearer than the vehicle's own frame.
+fn is_measured(range_m: f32) -> bool {
+    f64::from(range_m) >= OWN_FRAME_M
 }
 
 /// The least and the greatest height in the world at which a mission may fly, metres.
@@ -289,6 +301,30 @@ mod tests {
     fn what_is_far_away_is_not_among_the_returns() {
         assert!(seen(3.0, 0.0, 12.0).is_empty());
         assert!(seen(3.0, 0.0, 4.0).iter().all(|point| point.z > 2.0));
+    }
+
+    #[test]
+    fn a_ray_without_a_measurement_leaves_its_way_unknown_and_half_a_scan_of_them_is_none() {
+        let fence = Fence { min: [-30.0, -30.0, -1.0], max: [30.0, 30.0, 10.0] };
+        let pose = Pose { position: Vector3::new(0.0, 0.0, 3.0), attitude: UnitQuaternion::identity() };
+        let free_m = |invalid: f32, rays: std::ops::Range<usize>| {
+            let mut perception = Perception::new(&fence, Vector3::zeros(), [0.6, 5.0]).unwrap();
+            let mut scan = scan(&pose, 100.0);
+            scan.ranges_m[rays].fill(invalid);
+            // Of the far rays one in three is followed in each scan.
+            let taken = (0..3).map(|_| perception.take_in(&scan, &pose, &[])).all(|taken| taken);
+            let voxels = perception.map().voxels();
+            taken.then(|| {
+                [0.0, 1.0].map(|y| voxels.sensed_free_m(&pose.position, &Vector3::new(1.0 - y, y, 0.0), 9.0))
+            })
+        };
+        // The first rays point ahead, the 180th to the left.
+        let [ahead, left] = free_m(f32::NAN, 0..60).unwrap();
+        assert!(ahead < 1.0 && left == 9.0, "{ahead}, {left}");
+        assert_eq!(free_m(f32::INFINITY, 0..60), Some([9.0, 9.0]), "nothing came back: free");
+        assert_eq!(free_m(f32::NAN, 0..360), None);
+        assert_eq!(free_m(0.0, 100..700), None);
+        assert_eq!(free_m(-1.0, 0..0), Some([9.0, 9.0]));
     }
 
     #[test]

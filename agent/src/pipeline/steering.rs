@@ -107,7 +107,7 @@ impl Steering {
         let part_of = |wish| allowed.part_of(wish, &motion.position, &envelope);
         let wish = match (self.settles_at, lead) {
             (Some(place), _) => self.aside(place, motion),
-            (None, Some(lead)) => part_of(self.along_path(lead, motion, allowed, surroundings.map)),
+            (None, Some(lead)) => part_of(self.along_path(lead, motion, allowed, surroundings)),
             (None, None) => part_of(self.keep_station(motion, surroundings.map)),
         };
         let unheard = self.moving.moving(now, surroundings.map);
@@ -141,11 +141,21 @@ impl Steering {
         Wish { velocity, height_m: place.z }
     }
 
-    fn along_path(&mut self, lead: Lead<'_>, motion: &Motion, allowed: &Allowed, map: &ClearanceMap) -> Wish {
+    fn along_path(
+        &mut self,
+        lead: Lead<'_>,
+        motion: &Motion,
+        allowed: &Allowed,
+        surroundings: &Surroundings<'_>,
+    ) -> Wish {
+        let map = surroundings.map;
         let Lead { following: Following { path, station_m, .. }, attraction } = lead;
         self.hover_at = None;
         let ahead = path.direction_at(*station_m);
-        let sensed_free_m = map.voxels().sensed_free_m(&motion.position, &ahead, SENSED_AHEAD_M);
+        let sensed_free_m = match surroundings.sees {
+            true => map.voxels().sensed_free_m(&motion.position, &ahead, SENSED_AHEAD_M),
+            false => SENSED_AHEAD_M,
+        };
         let (cap_m_s, _) = braking::speed_cap(path, *station_m, sensed_free_m, self.follower.braking());
         let place = Place { path, station_m: *station_m, position: &motion.position };
         let step = self.follower.follow(&place, cap_m_s.min(allowed.speed_m_s), attraction, map);

@@ -7,6 +7,8 @@ use skein_planning::{map::ClearanceMap, separation};
 #[derive(Clone, Copy, Debug)]
 pub struct Surroundings<'a> {
     pub map: &'a ClearanceMap,
+    /// Whether the vehicle has a lidar: then it flies no faster than it sees the way free.
+    pub sees: bool,
     /// Obstacle points of the newest scan, metres ENU: more exact than the map.
     pub obstacles: &'a [Vector3<f64>],
     /// The other vehicles in the air.

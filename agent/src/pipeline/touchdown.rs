@@ -18,6 +18,8 @@ const REACH_M: f64 = 8.0;
 const LAYER_M: f64 = 0.2;
 /// Nearer than this a place is reached, m.
 const ARRIVAL_M: f64 = 0.15;
+/// A vehicle that is slower than this goes down where it is, m/s: autopilots land while they brake.
+const SLOW_M_S: f64 = 0.3;
 /// Places around a hull that are looked at.
 const AROUND: u32 = 8;
 
@@ -28,6 +30,8 @@ pub struct Descent<'a> {
     pub name: &'a NodeName,
     /// Where it is.
     pub position: Vector3<f64>,
+    /// m/s.
+    pub speed_m_s: f64,
     /// Where it would come to a stop: from there it would go down.
     pub stop: Vector3<f64>,
     /// Height of the ground.
@@ -42,12 +46,13 @@ pub struct Descent<'a> {
 }
 
 impl Descent<'_> {
-    /// Where to go first, at the vehicle's height: `None` if it can go down where it stops, or nowhere within reach.
-    /// `chosen` is kept as long as it will do.
+    /// Where to go first, at the vehicle's height: `None` if it is slow and can go down where it is, or nowhere within
+    /// reach. `chosen` is kept as long as it will do.
     pub fn detour(&self, chosen: Option<Vector3<f64>>) -> Option<Vector3<f64>> {
         let mut places = chosen.into_iter().chain(places_around(&self.stop, REACH_M));
         let place = places.find(|place| self.is_free_below(place) && self.can_be_reached(place))?;
-        ((place - self.stop).xy().norm() > ARRIVAL_M).then_some(place)
+        let is_there = self.speed_m_s < SLOW_M_S && (place - self.stop).xy().norm() <= ARRIVAL_M;
+        (!is_there).then_some(place)
     }
 
     /// Whether nobody and nothing known is straight below a place.
@@ -141,6 +146,7 @@ mod tests {
         let descent = Descent {
             name: &me,
             position: HERE,
+            speed_m_s: 0.0,
             stop: HERE,
             ground_m: 0.0,
             envelope: &envelope,
@@ -155,6 +161,31 @@ mod tests {
     fn over_free_ground_there_is_no_detour() {
         assert_eq!(detour(&map(), &[], None), None);
         assert_eq!(detour(&map(), &[other("uav/1", [1.0, 0.0, 0.1], false)], None), None, "it stands aside");
+    }
+
+    #[test]
+    fn a_fast_vehicle_first_comes_to_where_it_stops() {
+        let (me, envelope, map) = (name("uav/5"), Envelope::default(), map());
+        let flies = |speed_m_s, chosen| {
+            let stop = HERE + Vector3::x();
+            let (name, envelope, fence, map) = (&me, &envelope, &FENCE, &map);
+            let at = Descent {
+                name,
+                position: HERE,
+                speed_m_s,
+                stop,
+                ground_m: 0.0,
+                envelope,
+                fence,
+                map,
+                neighbours: &[],
+            };
+            at.detour(chosen)
+        };
+        assert_eq!(flies(2.0, None), Some(HERE + Vector3::x()));
+        assert_eq!(flies(2.0, Some(HERE)), Some(HERE), "or goes back to where it was to land");
+        assert_eq!(flies(0.1, None), None);
+        assert_eq!(flies(0.1, Some(HERE)), Some(HERE));
     }
 
     #[test]

@@ -9,10 +9,10 @@ mod subscriptions;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use mavlink::Message;
 use mavlink::dialects::common::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavState, MavType,
 };
+use mavlink::{MavlinkVersion, Message};
 
 use crate::command::{Command, CommandResult};
 use crate::dialect::Dialect;
@@ -31,6 +31,8 @@ use subscriptions::Subscriptions;
 
 /// Interval of the companion's own heartbeat.
 const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
+/// An autopilot that goes on in MAVLink 1 for so long, while it is written to in 2, is answered in 1.
+const ONLY_MAVLINK_1: Duration = Duration::from_secs(3);
 /// MAVLink's component id for the first companion computer.
 const ONBOARD_COMPUTER: u8 = 191;
 
@@ -83,6 +85,8 @@ pub struct Companion {
     missions: Missions,
     events: VecDeque<MavEvent>,
     next_heartbeat: Duration,
+    /// Since when the autopilot's frames have been in MAVLink 1, without one in 2.
+    mavlink_1_since: Option<Duration>,
     /// See [`Dialect::set_point`].
     kept_yaw: Option<f64>,
 }
@@ -104,6 +108,7 @@ impl Companion {
             missions: Missions::default(),
             events: VecDeque::new(),
             next_heartbeat: Duration::ZERO,
+            mavlink_1_since: None,
             kept_yaw: None,
         }
     }
@@ -114,9 +119,19 @@ impl Companion {
         self.reader.push(bytes);
         while let Some(frame) = self.reader.next_frame() {
             if frame.sender == self.autopilot {
+                self.answer_in(now, frame.version);
                 self.handle(now, &frame);
             }
         }
+    }
+
+    /// Writes in MAVLink 2, unless the autopilot knows 1 only.
+    fn answer_in(&mut self, now: Duration, heard: MavlinkVersion) {
+        let since = (heard == MavlinkVersion::V1).then(|| self.mavlink_1_since.unwrap_or(now));
+        self.mavlink_1_since = since;
+        let knows_1_only = since.is_some_and(|since| now.saturating_sub(since) >= ONLY_MAVLINK_1);
+        self.reports.telemetry.knows_mavlink_1_only = knows_1_only;
+        self.writer.speak(if knows_1_only { MavlinkVersion::V1 } else { MavlinkVersion::V2 });
     }
 
     /// Does what is due: heartbeat, repetitions, requests, time-outs.
@@ -260,8 +275,8 @@ impl Companion {
         {
             return;
         }
-        if let Some(request) = self.subscriptions.next_request(now) {
-            self.send_command(now, Purpose::Subscription, request);
+        if let Some((message_id, request)) = self.subscriptions.next_request(now) {
+            self.send_command(now, Purpose::Subscription(message_id), request);
         }
     }
 
@@ -270,9 +285,14 @@ impl Companion {
         let for_me = self.writer.sender().is_addressed_by(&frame.message);
         match &frame.message {
             MavMessage::COMMAND_ACK(message) if for_me => {
-                let settled = self.commands.on_ack(now, message.command, message.result);
-                if let Some((Purpose::Flight(command), result)) = settled {
-                    self.events.push_back(MavEvent::CommandAcked { command, result });
+                match self.commands.on_ack(now, message.command, message.result) {
+                    Some((Purpose::Flight(command), result)) => {
+                        self.events.push_back(MavEvent::CommandAcked { command, result });
+                    }
+                    Some((Purpose::Subscription(message_id), result)) if !result.is_accepted() => {
+                        self.subscriptions.refused(message_id);
+                    }
+                    _ => {}
                 }
             }
             MavMessage::PARAM_VALUE(message) => {

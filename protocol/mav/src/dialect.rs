@@ -50,6 +50,11 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
         vec![Command::Arm, Command::Takeoff { height_m }]
     }
 
+    /// Whether the autopilot holds the vehicle after a take-off: else it stays in the mode it took off in.
+    fn takes_off_into_hold(&self) -> bool {
+        self.mode_numbers(FlightMode::Takeoff).is_some()
+    }
+
     /// The time for which set-points must arrive before [`Command::Offboard`] is given.
     fn set_points_before_offboard(&self) -> Duration {
         Duration::from_millis(300)

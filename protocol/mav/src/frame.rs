@@ -1,6 +1,7 @@
 //! Frames: MAVLink 1 and 2 packets to and from bytes, whatever carries the bytes.
 
 use mavlink::dialects::common::MavMessage;
+use mavlink::error::ParserError;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc, consts};
 
 /// A sender or receiver: a MAVLink system and one component of it.
@@ -37,6 +38,8 @@ pub struct Frame {
     pub sender: Address,
     /// The sender's packet counter, which wraps at 256.
     pub sequence: u8,
+    /// The version of MAVLink that it came in.
+    pub version: MavlinkVersion,
     pub message: MavMessage,
 }
 
@@ -105,13 +108,12 @@ impl FrameReader {
                 Candidate::Garbage => self.skip(1),
                 Candidate::Intact(layout) => {
                     let payload = bytes.get(layout.payload).unwrap_or_default();
-                    let parsed = MavMessage::parse(layout.version, layout.message_id, payload);
+                    let parsed = parse(layout.version, layout.message_id, payload);
                     self.start += layout.frame_len;
+                    let Layout { sender, sequence, version, .. } = layout;
                     match parsed {
-                        Ok(message) => {
-                            return Some(Frame { sender: layout.sender, sequence: layout.sequence, message });
-                        }
-                        Err(_) => self.unknown_messages += 1,
+                        Some(message) => return Some(Frame { sender, sequence, version, message }),
+                        None => self.unknown_messages += 1,
                     }
                 }
             }
@@ -123,8 +125,7 @@ impl FrameReader {
         self.bad_bytes
     }
 
-    /// Intact frames skipped so far because their content is not in the common dialect (an enumeration value
-    /// that is newer, for example).
+    /// Intact frames skipped so far because their content is not in the common dialect.
     pub fn unknown_messages(&self) -> u64 {
         self.unknown_messages
     }
@@ -189,42 +190,102 @@ fn examine(bytes: &[u8]) -> Candidate {
     })
 }
 
-/// Turns messages into MAVLink 2 frames of one sender, and collects the bytes.
+/// Reads a payload. A number that is newer than its enumeration becomes 0, "unknown" in what a sender reports of
+/// itself; said to somebody, 0 could be another order or answer, so that such a message is none.
+fn parse(version: MavlinkVersion, message_id: u32, payload: &[u8]) -> Option<MavMessage> {
+    let mut payload = payload.to_vec();
+    let mut is_whole = true;
+    loop {
+        match MavMessage::parse(version, message_id, &payload) {
+            Ok(message) => return Some(message).filter(|it| is_whole || it.target_system_id().is_none()),
+            Err(ParserError::InvalidEnum { enum_type, value }) => {
+                is_whole = false;
+                payload = without(version, message_id, &payload, (enum_type, value))?;
+            }
+            Err(_) => return None,
+        }
+    }
+}
+
+/// The payload with 0 in place of this value of an enumeration: wherever the value stands, it is the field if the
+/// parser then complains no more, or of something else. None if no place does.
+fn without(
+    version: MavlinkVersion,
+    message_id: u32,
+    payload: &[u8],
+    unknown: (&'static str, u64),
+) -> Option<Vec<u8>> {
+    let value = unknown.1.to_le_bytes();
+    let width = value.iter().rposition(|byte| *byte != 0)? + 1;
+    let places = payload.windows(width).enumerate().filter(|(_, window)| value.starts_with(window));
+    places.map(|(at, _)| at).find_map(|at| {
+        let mut changed = payload.to_vec();
+        changed.get_mut(at..at + width)?.fill(0);
+        match MavMessage::parse(version, message_id, &changed) {
+            Err(ParserError::InvalidEnum { enum_type, value }) if (enum_type, value) == unknown => None,
+            Err(ParserError::InvalidEnum { value: 0, .. }) => None,
+            _ => Some(changed),
+        }
+    })
+}
+
+/// Turns messages into frames of one sender, and collects the bytes.
 #[derive(Debug, Clone)]
 pub struct FrameWriter {
     sender: Address,
+    version: MavlinkVersion,
     sequence: u8,
     buffer: Vec<u8>,
 }
 
 impl FrameWriter {
-    /// A writer for frames from `sender`.
+    /// A writer for MAVLink 2 frames from `sender`.
     pub fn new(sender: Address) -> Self {
-        Self { sender, sequence: 0, buffer: Vec::new() }
+        Self { sender, version: MavlinkVersion::V2, sequence: 0, buffer: Vec::new() }
     }
 
     pub fn sender(&self) -> Address {
         self.sender
     }
 
-    /// Appends one message.
+    /// Writes in this version of MAVLink from now on.
+    pub fn speak(&mut self, version: MavlinkVersion) {
+        self.version = version;
+    }
+
+    /// Appends one message. MAVLink 1 has no frame for a message whose number is above 255: then nothing is written.
     pub fn write<D: MessageData>(&mut self, message: &D) {
         let mut payload = [0; consts::MAX_PAYLOAD_LEN];
-        let payload_len = message.ser(MavlinkVersion::V2, &mut payload);
+        let payload_len = message.ser(self.version, &mut payload);
         let [id0, id1, id2, _] = D::ID.to_le_bytes();
+        let Address { system_id, component_id } = self.sender;
+        let (len, sequence) = (payload_len as u8, self.sequence);
         let frame_start = self.buffer.len();
-        self.buffer.extend_from_slice(&[
-            mavlink::MAV_STX_V2,
-            payload_len as u8,
-            0,
-            0,
-            self.sequence,
-            self.sender.system_id,
-            self.sender.component_id,
-            id0,
-            id1,
-            id2,
-        ]);
+        match (self.version, id1, id2) {
+            (MavlinkVersion::V2, ..) => self.buffer.extend_from_slice(&[
+                mavlink::MAV_STX_V2,
+                len,
+                0,
+                0,
+                sequence,
+                system_id,
+                component_id,
+                id0,
+                id1,
+                id2,
+            ]),
+            (MavlinkVersion::V1, 0, 0) => {
+                self.buffer.extend_from_slice(&[
+                    mavlink::MAV_STX,
+                    len,
+                    sequence,
+                    system_id,
+                    component_id,
+                    id0,
+                ]);
+            }
+            (MavlinkVersion::V1, ..) => return,
+        }
         self.buffer.extend(payload.iter().take(payload_len));
         let covered = self.buffer.get(frame_start + 1..).unwrap_or_default();
         let crc = calculate_crc(covered, D::EXTRA_CRC);

@@ -127,6 +127,8 @@ pub struct Telemetry {
     /// Origin of the autopilot's local frame. Without it there is no position and positions cannot be asked
     /// for.
     pub local_origin: Option<Geodetic>,
+    /// Whether it writes MAVLink 1 although it is written to in 2: it is then answered in 1.
+    pub knows_mavlink_1_only: bool,
     /// Whether every sensor the autopilot uses is healthy.
     pub sensors_ok: bool,
     /// Whether the autopilot's own checks would let it arm now.

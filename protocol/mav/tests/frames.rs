@@ -1,7 +1,11 @@
 //! Frames survive the wire, and nothing on the wire survives as a frame that is not one.
 
+use mavlink::{MavlinkVersion, MessageData};
 use proptest::prelude::*;
-use skein_mav::messages::{HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavMessage};
+use skein_mav::messages::{
+    COMMAND_ACK_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot, MavCmd, MavMessage, MavModeFlag,
+    MavResult, MavType,
+};
 use skein_mav::{Address, FrameReader, FrameWriter};
 
 const SENDER: Address = Address { system_id: 7, component_id: 191 };
@@ -150,4 +154,61 @@ proptest! {
         // A marker may claim up to 280 bytes that are not its own, which is 14 of these frames.
         prop_assert!(read_all(&mut reader).len() >= 26);
     }
+}
+
+/// The frame with this payload byte changed, and its checksum made right again.
+fn with_byte<D: MessageData>(message: &D, at: usize, byte: u8) -> Vec<u8> {
+    let mut writer = FrameWriter::new(SENDER);
+    writer.write(message);
+    let mut bytes = writer.take();
+    bytes[10 + at] = byte;
+    let end = bytes.len() - 2;
+    let crc = mavlink::calculate_crc(&bytes[1..end], D::EXTRA_CRC);
+    bytes[end..].copy_from_slice(&crc.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn a_number_newer_than_its_enumeration_costs_the_field_and_not_the_frame() {
+    let heartbeat = HEARTBEAT_DATA {
+        custom_mode: 250 << 8,
+        mavtype: MavType::MAV_TYPE_QUADROTOR,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_PX4,
+        mavlink_version: 3,
+        ..Default::default()
+    };
+    let mut reader = FrameReader::default();
+    // The type lies behind four bytes of custom mode, one of which has the same value.
+    reader.push(&with_byte(&heartbeat, 4, 250));
+    let expected = HEARTBEAT_DATA { mavtype: MavType::MAV_TYPE_GENERIC, ..heartbeat };
+    assert_eq!(read_all(&mut reader), [MavMessage::HEARTBEAT(expected)]);
+    assert_eq!(reader.unknown_messages(), 0);
+}
+
+#[test]
+fn an_answer_that_is_newer_than_the_dialect_is_none() {
+    let ack = COMMAND_ACK_DATA {
+        command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+        result: MavResult::MAV_RESULT_FAILED,
+        target_system: 1,
+        ..Default::default()
+    };
+    let mut reader = FrameReader::default();
+    reader.push(&with_byte(&ack, 2, 200));
+    assert_eq!(read_all(&mut reader), [], "0 would be `accepted`");
+    assert_eq!(reader.unknown_messages(), 1);
+}
+
+#[test]
+fn a_writer_can_speak_mavlink_1() {
+    let mut writer = FrameWriter::new(Address { system_id: 255, component_id: 190 });
+    writer.speak(MavlinkVersion::V1);
+    writer.write(&HEARTBEAT_DATA {
+        mavtype: MavType::MAV_TYPE_GCS,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+        base_mode: MavModeFlag::empty(),
+        mavlink_version: 3,
+        ..Default::default()
+    });
+    assert_eq!(writer.take(), heartbeat_v1());
 }

@@ -6,6 +6,7 @@ mod ardupilot;
 mod dialects;
 mod frames;
 mod geodesy;
+mod habits;
 mod lossy_link;
 mod protocols;
 mod simulator;

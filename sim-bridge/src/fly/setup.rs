@@ -89,7 +89,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             return_altitude_m: (RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64)
                 .min(bounds.max.z - 1.0),
             position: PositionSource::default(),
-            lidar: true,
+            lidar: plan.model.lidar.is_some(),
             fence,
             airspace: scenario.airspace.clone(),
             envelope: plan.make().handles(Envelope {

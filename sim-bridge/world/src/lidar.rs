@@ -90,6 +90,11 @@ impl Lidar {
         Self { model, rays, ranges_m: Vec::new(), noise: Noise::new(seed, stream) }
     }
 
+    /// Turns a second.
+    pub fn rate_hz(&self) -> f64 {
+        self.model.rate_hz
+    }
+
     /// Scans from a body at `pose` (body FLU to world ENU), `stamp` after the run began.
     pub fn scan(&mut self, stamp: Duration, pose: &Isometry3<f64>, surroundings: &Surroundings<'_>) -> Scan {
         self.trace(pose, surroundings);

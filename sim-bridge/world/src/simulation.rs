@@ -73,7 +73,7 @@ struct Vehicle {
     sensors: Sensors,
     readings: SensorReadings,
     pilot: Box<dyn Pilot>,
-    lidar: Lidar,
+    lidar: Option<Lidar>,
     /// Shifts the instruments in time, in steps.
     phase: u64,
     scan: Option<Scan>,
@@ -221,7 +221,7 @@ impl Vehicle {
         let phase = 3 * index;
         let model = quadrotor.model();
         let mut sensors = Sensors::new(model, Noise::new(seed, 2 * index), phase);
-        let lidar = Lidar::new(model.lidar, seed, 2 * index + 1);
+        let lidar = model.lidar.map(|model| Lidar::new(model, seed, 2 * index + 1));
         let autopilot =
             Autopilot::new(AutopilotConfig::new(setup.system_id, model.clone(), *surroundings.scene.datum()));
         Self {
@@ -257,9 +257,10 @@ impl Vehicle {
 
     fn sense(&mut self, tick: u64, now: Duration, surroundings: &Surroundings<'_>) {
         self.readings = self.sensors.read(tick, &self.quadrotor, surroundings);
-        if is_due(tick + self.phase, self.quadrotor.model().lidar.rate_hz) {
+        let Some(lidar) = &mut self.lidar else { return };
+        if is_due(tick + self.phase, lidar.rate_hz()) {
             let pose = self.quadrotor.state().pose();
-            self.scan = Some(self.lidar.scan(now, &pose, surroundings));
+            self.scan = Some(lidar.scan(now, &pose, surroundings));
         }
     }
 

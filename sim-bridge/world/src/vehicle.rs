@@ -56,8 +56,8 @@ pub struct VehicleModel {
     #[serde(default)]
     pub control: ControlModel,
     pub battery: BatteryModel,
-    /// Planar laser scanner with its range finders up and down.
-    pub lidar: LidarModel,
+    /// Planar laser scanner with its range finders up and down, if it has one.
+    pub lidar: Option<LidarModel>,
     pub gps: GpsModel,
     /// Accelerometer and gyroscope.
     pub imu: ImuModel,
@@ -272,15 +272,12 @@ impl VehicleModel {
             ("battery.capacity_wh", self.battery.capacity_wh),
             ("battery.hover_power_w", self.battery.hover_power_w),
             ("battery.empty_v", self.battery.empty_v),
-            ("lidar.range_m", self.lidar.range_m),
-            ("lidar.vertical_range_m", self.lidar.vertical_range_m),
             ("rangefinder.range_m", self.rangefinder.range_m),
         ];
         let not_negative = [
             ("linear_drag", self.linear_drag),
             ("quadratic_drag", self.quadratic_drag),
             ("battery.idle_power_w", self.battery.idle_power_w),
-            ("lidar.sigma_m", self.lidar.sigma_m),
             ("gps.sigma_horizontal_m", self.gps.sigma_horizontal_m),
             ("gps.sigma_vertical_m", self.gps.sigma_vertical_m),
             ("gps.sigma_velocity_m_s", self.gps.sigma_velocity_m_s),
@@ -294,7 +291,6 @@ impl VehicleModel {
             ("rangefinder.sigma_m", self.rangefinder.sigma_m),
         ];
         let rates = [
-            ("lidar.rate_hz", self.lidar.rate_hz),
             ("gps.rate_hz", self.gps.rate_hz),
             ("baro.rate_hz", self.baro.rate_hz),
             ("compass.rate_hz", self.compass.rate_hz),
@@ -306,6 +302,12 @@ impl VehicleModel {
             }
             Err(VehicleError::Range { source_name: source_name.to_owned(), field, found, expected })
         };
+        let of_lidar =
+            |field, of: fn(&LidarModel) -> f64| self.lidar.iter().map(move |lidar| (field, of(lidar)));
+        let positive = positive.into_iter().chain(of_lidar("lidar.range_m", |lidar| lidar.range_m));
+        let positive = positive.chain(of_lidar("lidar.vertical_range_m", |lidar| lidar.vertical_range_m));
+        let not_negative = not_negative.into_iter().chain(of_lidar("lidar.sigma_m", |lidar| lidar.sigma_m));
+        let rates = rates.into_iter().chain(of_lidar("lidar.rate_hz", |lidar| lidar.rate_hz));
         for (field, found) in positive {
             range(field, found, found > 0.0, "a number above 0")?;
         }
@@ -316,10 +318,10 @@ impl VehicleModel {
             let divides = found > 0.0 && (250.0 / found).fract() == 0.0;
             range(field, found, divides, "a rate that divides 250, such as 10")?;
         }
-        let rays = self.lidar.rays;
-        range("lidar.rays", f64::from(rays), (4..=10_000).contains(&rays), "4 to 10000")?;
-        let cone = self.lidar.vertical_cone_rad;
-        range("lidar.vertical_cone_rad", cone, (0.0..=3.0).contains(&cone), "an angle of 0 to 3 rad")?;
+        if let Some(LidarModel { rays, vertical_cone_rad: cone, .. }) = self.lidar {
+            range("lidar.rays", f64::from(rays), (4..=10_000).contains(&rays), "4 to 10000")?;
+            range("lidar.vertical_cone_rad", cone, (0.0..=3.0).contains(&cone), "an angle of 0 to 3 rad")?;
+        }
         range(
             "battery.full_v",
             self.battery.full_v,

@@ -38,7 +38,7 @@ fn quickest(batch: u32, mut run: impl FnMut()) -> Duration {
 #[ignore = "measures time; run alone in a release build"]
 fn a_scan_of_720_rays_among_120_trunks_takes_under_60_microseconds() {
     let scene = forest();
-    let mut lidar = Lidar::new(x500().lidar, 1, 1);
+    let mut lidar = Lidar::new(x500().lidar.unwrap(), 1, 1);
     let hulls: Vec<Hull> =
         (0..8).map(|i| Hull { centre: Vector3::new(f64::from(i) * 2.0, 1.5, 3.0), radius_m: 0.25 }).collect();
     let surroundings = Surroundings { scene: &scene, hulls: &hulls, own: 0 };

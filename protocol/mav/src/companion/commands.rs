@@ -17,8 +17,8 @@ const PROGRESS: Duration = Duration::from_secs(5);
 pub(super) enum Purpose {
     /// The agent asked for it and learns the result.
     Flight(Command),
-    /// To have a message sent; repeated by the subscriptions themselves.
-    Subscription,
+    /// To have the message with this id sent; repeated by the subscriptions themselves.
+    Subscription(u32),
 }
 
 /// The commands that wait for their acknowledgement: at most one per number, because the number is all that

@@ -18,6 +18,8 @@ const ASK_AGAIN: Duration = Duration::from_secs(1);
 enum Wish {
     /// As a stream with this interval.
     Every(Duration),
+    /// One at a time, at this interval: the autopilot refuses to send it as a stream.
+    Singly(Duration),
     /// Once; the autopilot repeats it by itself when it changes.
     Once,
 }
@@ -64,47 +66,62 @@ impl Subscriptions {
         }
     }
 
-    /// Everything is to be asked for anew.
-    pub(super) fn forget(&mut self) {
-        for known in &mut self.list {
-            known.seen_at = None;
-            known.asked_at = None;
-        }
+    /// The autopilot refused what was asked about this message: the other way is tried.
+    pub(super) fn refused(&mut self, message_id: u32) {
+        let Some(known) = self.list.iter_mut().find(|known| known.message_id == message_id) else { return };
+        known.wish = match known.wish {
+            Wish::Every(interval) => Wish::Singly(interval),
+            Wish::Singly(interval) => Wish::Every(interval),
+            Wish::Once => Wish::Once,
+        };
     }
 
-    /// The command that asks for an overdue message: of several, the one not asked for the longest, so that
+    /// Everything is to be asked for anew.
+    pub(super) fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// The message that is overdue, and the command that asks for it: of several, the one not asked for the longest, so that
     /// each gets its turn even if an autopilot never answers about one of them. Streams are all asked for
     /// once, because the autopilot may already send them at another rate.
-    pub(super) fn next_request(&mut self, now: Duration) -> Option<COMMAND_LONG_DATA> {
+    pub(super) fn next_request(&mut self, now: Duration) -> Option<(u32, COMMAND_LONG_DATA)> {
         let overdue =
             self.list.iter_mut().filter(|known| known.is_overdue(now)).min_by_key(|known| known.asked_at)?;
         overdue.asked_at = Some(now);
         // Message ids are below 2^24 and intervals below 2^24 us, so both are exact as floats.
         let param1 = overdue.message_id as f32;
-        Some(match overdue.wish {
+        let request = match overdue.wish {
             Wish::Every(interval) => COMMAND_LONG_DATA {
                 command: MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL,
                 param1,
                 param2: interval.as_micros() as f32,
                 ..Default::default()
             },
-            Wish::Once => {
+            Wish::Singly(_) | Wish::Once => {
                 COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_REQUEST_MESSAGE, param1, ..Default::default() }
             }
-        })
+        };
+        Some((overdue.message_id, request))
     }
 }
 
 impl Subscription {
     fn is_overdue(&self, now: Duration) -> bool {
         let since = |at: Option<Duration>| at.map(|at| now.saturating_sub(at));
+        if let Wish::Singly(interval) = self.wish {
+            return [self.asked_at, self.seen_at]
+                .into_iter()
+                .all(|at| since(at).is_none_or(|age| age >= interval));
+        }
         if since(self.asked_at).is_some_and(|age| age < ASK_AGAIN) {
             return false;
         }
         match (self.wish, since(self.seen_at)) {
             (_, None) => true,
             (Wish::Once, Some(_)) => false,
-            (Wish::Every(interval), Some(age)) => self.asked_at.is_none() || age > ASK_AGAIN + 3 * interval,
+            (Wish::Every(interval) | Wish::Singly(interval), Some(age)) => {
+                self.asked_at.is_none() || age > ASK_AGAIN + 3 * interval
+            }
         }
     }
 }

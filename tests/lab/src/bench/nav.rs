@@ -119,7 +119,7 @@ fn measure(ticks: usize, seed: u64) -> anyhow::Result<Times> {
     let config = agent_configs(&scenario).into_iter().next().context("nobody flies")?;
     let plan = scenario.vehicles.first().context("nobody flies")?;
     let mut flight = Flight::new(&scenario.scene, &config, seed)?;
-    let mut lidar = Lidar::new(plan.model.lidar, seed, 1);
+    let mut lidar = Lidar::new(plan.model.lidar.context("it has no lidar")?, seed, 1);
     let ends = [plan.goal(), plan.start];
     let mut times = Times::default();
     for tick in 0..ticks {
@@ -198,6 +198,7 @@ impl<'a> Flight<'a> {
         let reports = self.guidance.look_ahead(now, &self.motion, self.perception.map(), &[]);
         let looked = cpu_time::this_thread()?;
         let surroundings = Surroundings {
+            sees: true,
             map: self.perception.map(),
             obstacles: self.perception.obstacles(),
             neighbours: &neighbours,
