@@ -12,7 +12,7 @@ use skein_planning::airspace::Airspace;
 use skein_wire::event::Catalogue;
 
 use crate::bthreads::LinkLossPolicy;
-use crate::field::positive;
+use crate::field::{optional_positive, positive};
 
 /// An axis-aligned box, metres ENU.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,6 +38,9 @@ pub struct Envelope {
     /// Time from a set-point to the velocity it asks for, s.
     #[serde(deserialize_with = "positive")]
     pub latency_s: f64,
+    /// The most by which its acceleration changes, m/s³; none if it changes at once.
+    #[serde(deserialize_with = "optional_positive", skip_serializing_if = "Option::is_none")]
+    pub jerk_m_s3: Option<f64>,
     /// Radius of the sphere around the vehicle, m.
     #[serde(deserialize_with = "positive")]
     pub hull_m: f64,
@@ -56,6 +59,7 @@ impl Default for Envelope {
             climb_m_s: 1.5,
             brake_m_s2: 2.5,
             latency_s: 0.3,
+            jerk_m_s3: None,
             hull_m: 0.25,
             margin_m: 0.25,
             separation_m: 1.4,

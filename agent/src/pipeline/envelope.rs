@@ -22,6 +22,7 @@ impl Envelope {
             max_speed_m_s: self.cruise_m_s,
             decel_m_s2: self.brake_m_s2,
             latency_s: self.latency_s,
+            jerk_m_s3: self.jerk_m_s3,
             hull_radius_m: self.hull_m,
             ..FilterConfig::default()
         }

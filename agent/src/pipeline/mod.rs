@@ -4,6 +4,7 @@
 //! (velocity by the [`local`] planner, repulsion, [`safety_filter`]) -> [`set_point`] rule -> set-point. [`guidance`]
 //! holds these together, and [`progress`] watches the vehicle on its [`course`].
 
+pub mod acceleration;
 pub mod allowed;
 pub mod course;
 mod envelope;

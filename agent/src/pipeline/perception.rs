@@ -25,7 +25,7 @@ const TALLEST_WINDOW_M: f64 = 40.0;
 const VERTICAL_EXTENT_M: f64 = 0.4;
 /// Returns from lower than this above the take-off place are the ground.
 const GROUND_M: f64 = 0.4;
-/// Obstacle points this near are told to the safety filter, m.
+/// Obstacle points this near are told to the safety filter at least, m.
 const NEAR_M: f64 = 6.0;
 /// Returns this near a neighbour are the neighbour, m.
 const NEIGHBOUR_M: f64 = 0.8;
@@ -64,6 +64,8 @@ pub struct Perception {
     last_scan: Option<Duration>,
     ends: Vec<RayEnd>,
     near: Vec<Vector3<f64>>,
+    /// Obstacle points this near are told to the safety filter, m.
+    near_m: f64,
     returns: Vec<Vector3<f64>>,
     ground_m: f64,
     rolls: bool,
@@ -74,7 +76,8 @@ pub struct Perception {
 impl Perception {
     /// An empty map of where the mission of this configuration may fly.
     pub fn of_mission(config: &AgentConfig) -> Result<Self, MapError> {
-        let perception = Self::new(&config.fence, Vector3::from(config.home), heights(config))?;
+        let mut perception = Self::new(&config.fence, Vector3::from(config.home), heights(config))?;
+        perception.near_m = NEAR_M.max(config.envelope.filter().obstacle_reach_m()).min(MAP_RANGE_M);
         if config.airspace == Airspace::default() {
             return Ok(perception);
         }
@@ -111,6 +114,7 @@ impl Perception {
             last_scan: None,
             ends: Vec::new(),
             near: Vec::new(),
+            near_m: NEAR_M,
             returns: Vec::new(),
             ground_m: config.ground_m,
             rolls,
@@ -212,7 +216,7 @@ impl Perception {
             }
             if hit && range < MAP_RANGE_M && point.z > self.ground_m {
                 self.returns.push(point);
-                if range < NEAR_M {
+                if range < self.near_m {
                     near.add(point);
                 }
             }

@@ -15,6 +15,7 @@ use skein_planning::{
 };
 
 use super::{
+    acceleration::Acceleration,
     allowed::{Allowed, Wish},
     course::Following,
     local::{PathFollower, Place},
@@ -38,6 +39,7 @@ const SETTLING_M_S: f64 = 1.0;
 #[derive(Debug)]
 pub struct Steering {
     envelope: Envelope,
+    acceleration: Acceleration,
     follower: Box<dyn PathFollower>,
     /// Moving things that tell nobody where they are.
     moving: Tracker,
@@ -65,11 +67,21 @@ impl Steering {
         filter: Box<dyn VelocityFilter>,
     ) -> Self {
         let moving = Tracker::new(MovingConfig::default());
-        Self { envelope, follower, moving, repulsion, filter, hover_at: None, settles_at: None }
+        Self {
+            envelope,
+            acceleration: Acceleration::default(),
+            follower,
+            moving,
+            repulsion,
+            filter,
+            hover_at: None,
+            settles_at: None,
+        }
     }
 
     /// Somebody else moves the vehicle, or nobody: whatever place it hovered at is not its place any more.
     pub fn rest(&mut self) {
+        self.acceleration.forget();
         self.hover_at = None;
         self.settles_at = None;
         self.follower.rest();
@@ -120,6 +132,7 @@ impl Steering {
         let request = separation::Motion {
             position: motion.position,
             velocity: motion.velocity,
+            acceleration: self.acceleration.follow(now, motion.velocity),
             sigma_m: motion.position_sigma_m(),
             desired: self.follower.ease(desired),
             planar: is_level,

@@ -17,22 +17,28 @@ pub enum Make {
     Ardupilot,
 }
 
-/// The deceleration and the delay with which stock PX4 and ArduCopter surely stop: from 3 m/s in 3.3 m, where 2.1 and
-/// 3.1 m were measured.
+/// The deceleration with which stock PX4 and ArduCopter surely stop: ArduCopter's WPNAV_ACCEL.
 const STOCK_BRAKE_M_S2: f64 = 2.5;
-const STOCK_LATENCY_S: f64 = 0.5;
+/// PX4 follows a velocity like a first-order lag of this time: it stops from 3 m/s in 2.1 m.
+const PX4_LATENCY_S: f64 = 0.7;
+/// ArduCopter needs half a second to build that deceleration up, and longer while it accelerates: PSC_JERK_XY.
+const ARDUPILOT_LATENCY_S: f64 = 0.5;
+const ARDUPILOT_JERK_M_S3: f64 = 5.0;
 
 impl Make {
     /// An envelope as far as this autopilot can fly it.
     #[must_use]
     pub fn handles(self, envelope: Envelope) -> Envelope {
-        match self {
-            Self::BuiltIn => envelope,
-            Self::Px4 | Self::Ardupilot => Envelope {
-                brake_m_s2: envelope.brake_m_s2.min(STOCK_BRAKE_M_S2),
-                latency_s: envelope.latency_s.max(STOCK_LATENCY_S),
-                ..envelope
-            },
+        let (latency_s, jerk_m_s3) = match self {
+            Self::BuiltIn => return envelope,
+            Self::Px4 => (PX4_LATENCY_S, None),
+            Self::Ardupilot => (ARDUPILOT_LATENCY_S, Some(ARDUPILOT_JERK_M_S3)),
+        };
+        Envelope {
+            brake_m_s2: envelope.brake_m_s2.min(STOCK_BRAKE_M_S2),
+            latency_s: envelope.latency_s.max(latency_s),
+            jerk_m_s3: jerk_m_s3.or(envelope.jerk_m_s3),
+            ..envelope
         }
     }
 }

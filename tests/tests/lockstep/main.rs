@@ -9,6 +9,7 @@ mod faults;
 mod gazebo_worlds;
 mod landing;
 mod limits;
+mod no_lidar;
 mod scenarios;
 mod scripts;
 mod tasks;

@@ -28,6 +28,8 @@ pub struct FilterConfig {
     /// `t`: time from a state to the vehicle braking because of it, seconds: age of the state, tick, lag of
     /// the autopilot.
     pub latency_s: f64,
+    /// `j`: the most by which the acceleration changes, m/s3; none if it changes at once.
+    pub jerk_m_s3: Option<f64>,
     /// Hull radius that `separation_m` is meant for, metres; larger neighbours are kept further away by the
     /// difference.
     pub hull_radius_m: f64,
@@ -53,6 +55,7 @@ impl Default for FilterConfig {
             max_speed_m_s: 3.0,
             decel_m_s2: 2.0,
             latency_s: 0.5,
+            jerk_m_s3: None,
             hull_radius_m: 0.25,
             sigmas: 1.0,
             fresh_s: 0.4,
@@ -65,9 +68,21 @@ impl Default for FilterConfig {
 
 impl FilterConfig {
     /// Two vehicles that know of one another's place and keep their distance both do not limit one another beyond
-    /// this, centre to centre, metres: `separation + 2 v (t + v / 2a)` at the greatest speed `v`.
+    /// this, centre to centre, metres: `separation + 2 v (t + v / 2a)` at the greatest speed `v`, and what it takes to
+    /// cease to accelerate.
     pub fn reach_m(&self) -> f64 {
-        self.separation_m + 2.0 * self.max_speed_m_s * stop_s(self.max_speed_m_s, self)
+        self.separation_m + 2.0 * self.longest_stop_m()
+    }
+
+    /// Obstacles do not limit the vehicle beyond this distance from its centre, metres.
+    pub fn obstacle_reach_m(&self) -> f64 {
+        self.obstacle_clearance_m + self.longest_stop_m()
+    }
+
+    /// The way to a stop of a vehicle that flies and accelerates as fast as it may, metres.
+    fn longest_stop_m(&self) -> f64 {
+        let (fastest, stop) = (self.max_speed_m_s, stop_s(self.max_speed_m_s, self));
+        fastest * stop + nearer_m(fastest, self.decel_m_s2, stop, self)
     }
 }
 
@@ -78,6 +93,8 @@ pub struct Motion {
     pub position: Vector3<f64>,
     /// Velocity now (ENU, m/s).
     pub velocity: Vector3<f64>,
+    /// Acceleration now (ENU, m/s2).
+    pub acceleration: Vector3<f64>,
     /// Standard deviation of the position, metres.
     pub sigma_m: f64,
     /// Velocity that the planners want (ENU, m/s).
@@ -148,6 +165,10 @@ struct Limit {
 /// For `g < 0` the bound is `g / t` (half that when shared): the vehicle must leave. `D` is widened by what is not
 /// known of the neighbour, see [`distance_kept_m`]. Distances between vehicles are stretched vertically.
 ///
+/// A vehicle that accelerates towards it at `n . w` and changes that by no more than the jerk `j` goes on doing so for `T
+/// = n . w / j`: what it comes nearer by then, and needs longer to stop, is taken from a gap that is left, `n . v T +
+/// n . w T (T / 3 + (t + |v| / 2a) / 2)`.
+///
 /// **Guarantee.** As long as `S_i + S_j <= g` for each two vehicles, all of them can brake at once and none comes
 /// nearer to another than `D`: `d` shrinks by no more than both stops, and `a` is needed in one direction only, so all
 /// limits are kept by the same braking. The reaches of two add up to the gap at most, so vehicles that follow the
@@ -167,6 +188,7 @@ struct Limit {
 /// let motion = Motion {
 ///     position: Vector3::new(0.0, 0.0, 3.0),
 ///     velocity: Vector3::zeros(),
+///     acceleration: Vector3::zeros(),
 ///     sigma_m: 0.0,
 ///     desired: Vector3::new(2.0, 0.0, 0.0),
 ///     planar: true,
@@ -205,6 +227,20 @@ impl Motion {
         let fastest = (self.velocity.norm() + config.decel_m_s2 * config.latency_s).min(config.max_speed_m_s);
         stop_s(fastest, config)
     }
+
+    /// How much of a gap in a unit direction is left once the vehicle has ceased to accelerate there, metres; see
+    /// [`filter`]. `stop` is [`Motion::stop_s`].
+    fn left_m(&self, gap_m: f64, normal: &Vector3<f64>, stop: f64, config: &FilterConfig) -> f64 {
+        let (speed, accel) = (normal.dot(&self.velocity), normal.dot(&self.acceleration));
+        let nearer_m = nearer_m(speed, accel.max(0.0), stop, config).max(0.0);
+        if gap_m > 0.0 { (gap_m - nearer_m).max(0.0) } else { gap_m }
+    }
+}
+
+/// How much further a vehicle that accelerates comes before it stands than one that does not, metres; see [`filter`].
+fn nearer_m(speed_m_s: f64, accel_m_s2: f64, stop: f64, config: &FilterConfig) -> f64 {
+    let lasts_s = config.jerk_m_s3.map_or(0.0, |jerk| accel_m_s2 / jerk);
+    lasts_s * (speed_m_s + accel_m_s2 * (lasts_s / 3.0 + stop / 2.0))
 }
 
 /// How far a vehicle of this speed comes, until it stands, for each m/s of its velocity in a direction: `t + |v| / 2a`, seconds.
@@ -260,6 +296,7 @@ fn neighbour_limit(motion: &Motion, neighbour: &Neighbour, stop: f64, config: &F
     let steepness = gradient.norm();
     let normal = gradient / steepness;
     let gap = distance - distance_kept_m(motion.sigma_m, neighbour, config);
+    let gap = motion.left_m(gap, &normal, stop, config);
 
     let leads_away = gradient.dot(&neighbour.velocity);
     let bound = if neighbour.cooperative {
@@ -297,15 +334,15 @@ fn obstacle_limit(
     let mut offset = point - motion.position;
     let above = offset.z.abs() - config.obstacle_half_height_m;
     offset.z = if above > 0.0 { above.copysign(offset.z) } else { 0.0 };
-    let fastest = config.max_speed_m_s;
-    let reach = config.obstacle_clearance_m + fastest * stop_s(fastest, config);
+    let reach = config.obstacle_reach_m();
     let squared = offset.norm_squared();
     if squared.is_nan() || squared > reach * reach {
         return None;
     }
     let distance = squared.sqrt();
     let normal = offset.try_normalize(1e-6)?;
-    let bound = approach(distance - config.obstacle_clearance_m, stop, config);
+    let gap = motion.left_m(distance - config.obstacle_clearance_m, &normal, stop, config);
+    let bound = approach(gap, stop, config);
     Some(Limit { space: HalfSpace { normal, bound }, cause: Cause::Obstacle(at) })
 }
 

@@ -9,6 +9,7 @@ fn hovering(desired: Vector3<f64>) -> Motion {
     Motion {
         position: Vector3::new(0.0, 0.0, 3.0),
         velocity: Vector3::zeros(),
+        acceleration: Vector3::zeros(),
         sigma_m: 0.0,
         desired,
         planar: true,
@@ -150,7 +151,7 @@ proptest! {
                 others.remove(at);
                 let desired = limited((Vector3::from(goals[at]) - places[at]) * 9.0, config.max_speed_m_s);
                 let (position, velocity) = (places[at], velocities[at]);
-                let motion = Motion { position, velocity, sigma_m: 0.0, desired, planar: false };
+                let motion = Motion { position, velocity, acceleration: Vector3::zeros(), sigma_m: 0.0, desired, planar: false };
                 let change = filter(&motion, &others, &[], &config).velocity - velocity;
                 velocity + limited(change, config.decel_m_s2 * tick_s)
             }).collect();
@@ -165,5 +166,35 @@ proptest! {
                 *place += velocity * tick_s;
             }
         }
+    }
+}
+
+/// How near a vehicle comes to a wall that it sees first at this distance, m, while it flies there at 1.9 m/s and
+/// accelerates at 1.7 m/s2, which changes by 5 m/s3 at the most towards what a stiff velocity loop asks for.
+fn least_distance_m(wall_m: f64, jerk_m_s3: Option<f64>) -> f64 {
+    const STEP_S: f64 = 0.02;
+    let config = FilterConfig { jerk_m_s3, decel_m_s2: 2.5, latency_s: 0.5, ..FilterConfig::default() };
+    let wall = [Vector3::new(wall_m, 0.0, 3.0)];
+    let mut motion = hovering(Vector3::new(3.0, 0.0, 0.0));
+    (motion.velocity.x, motion.acceleration.x) = (1.9, 1.7);
+    let mut least_m = wall_m;
+    for _ in 0..200 {
+        let command = filter(&motion, &[], &wall, &config).velocity.x;
+        let wanted = ((command - motion.velocity.x) / 0.35).clamp(-2.5, 2.5);
+        motion.acceleration.x += (wanted - motion.acceleration.x).clamp(-5.0 * STEP_S, 5.0 * STEP_S);
+        motion.velocity += motion.acceleration * STEP_S;
+        motion.position += motion.velocity * STEP_S;
+        least_m = least_m.min(wall_m - motion.position.x);
+    }
+    least_m
+}
+
+#[test]
+fn a_vehicle_that_cannot_cease_to_accelerate_at_once_begins_to_brake_sooner() {
+    let clearance_m = FilterConfig::default().obstacle_clearance_m;
+    for room_m in [2.6, 3.0, 3.4, 4.0, 6.0] {
+        let left_m = |jerk_m_s3| least_distance_m(clearance_m + room_m, jerk_m_s3) - clearance_m;
+        assert!(left_m(Some(5.0)) >= 0.0, "{} m left of {room_m} m", left_m(Some(5.0)));
+        assert!(room_m != 3.4 || left_m(None) < -0.05, "it makes no difference");
     }
 }

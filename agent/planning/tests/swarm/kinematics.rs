@@ -181,6 +181,7 @@ impl Swarm {
         let motion = Motion {
             position,
             velocity: self.vehicles[at].velocity,
+            acceleration: Vector3::zeros(),
             sigma_m: SIGMA_M,
             desired,
             planar: self.planar,

@@ -209,6 +209,7 @@ impl<'a> Flight<'a> {
         let request = separation::Motion {
             position: self.motion.position,
             velocity: self.motion.velocity,
+            acceleration: Vector3::zeros(),
             sigma_m: self.motion.position_sigma_m(),
             desired: velocity(&set_point),
             planar: true,

@@ -115,6 +115,7 @@ impl Avoidance for Ours {
             let motion = Motion {
                 position: vehicle.position,
                 velocity: vehicle.velocity,
+                acceleration: Vector3::zeros(),
                 sigma_m: 0.0,
                 desired: limited(wanted + push, SPEED_M_S),
                 planar: false,
