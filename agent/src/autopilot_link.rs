@@ -1,4 +1,4 @@
-//! The bytes between the agent and its autopilot: UDP, TCP or a serial line. Nothing here ever waits.
+//! The bytes between the agent and its autopilot, or a station that shares its line: UDP, TCP or a serial line. Nothing here ever waits.
 
 use std::fmt;
 use std::io::{self, Read, Write};
@@ -73,6 +73,11 @@ impl From<Address> for String {
 }
 
 impl Address {
+    /// Whether each piece that comes is some whole frames.
+    pub fn brings_whole_frames(&self) -> bool {
+        matches!(self, Self::UdpIn(_) | Self::UdpOut(_))
+    }
+
     /// Refuses what other computers could speak to, unless the cable is private.
     pub fn check(&self, cable_is_private: bool) -> anyhow::Result<()> {
         let ip: IpAddr = match self {
@@ -205,7 +210,7 @@ impl AutopilotLink {
         self.tried = Some(Instant::now());
         match open(&self.address) {
             Ok(open) => {
-                tracing::info!("autopilot link {} is open", self.address);
+                tracing::info!("MAVLink on {}", self.address);
                 self.open = Some(open);
                 self.complained = false;
             }
@@ -216,7 +221,7 @@ impl AutopilotLink {
     fn broken(&mut self, error: &anyhow::Error) {
         self.open = None;
         if !std::mem::replace(&mut self.complained, true) {
-            tracing::error!("autopilot link {}: {error:#}; it is tried again every second", self.address);
+            tracing::error!("MAVLink on {}: {error:#}; it is tried again every second", self.address);
         }
     }
 }

@@ -64,6 +64,9 @@ pub struct Autopilot {
     pub system_id: u8,
     #[serde(default, skip_serializing)]
     pub cable_is_private: bool,
+    /// Other stations that share its line.
+    #[serde(default, skip_serializing)]
+    stations: Vec<Address>,
 }
 
 /// Where the lidar's scans come from.
@@ -140,6 +143,8 @@ pub struct Config {
     pub agent: AgentConfig,
     pub name: NodeName,
     pub autopilot: Address,
+    /// Other stations that the autopilot's line is shared with.
+    pub stations: Vec<Address>,
     /// The node that reads the lidar, and the way of its scans if they have one of their own.
     pub lidar: Option<(NodeName, Option<NetworkSettings>)>,
     pub network: NetworkSettings,
@@ -181,7 +186,12 @@ impl AgentFile {
             // TOML has no greater number.
             seed: agent.seed.min(i64::MAX.unsigned_abs()),
             position: agent.position,
-            autopilot: Autopilot { link, system_id: agent.system_id, cable_is_private: false },
+            autopilot: Autopilot {
+                link,
+                system_id: agent.system_id,
+                cable_is_private: false,
+                stations: Vec::new(),
+            },
             lidar: agent.lidar.then(|| Lidar { sensor: sensor.to_owned(), network: None }),
             datum: agent.datum.into(),
             mission: Mission {
@@ -208,6 +218,13 @@ impl AgentFile {
         ensure!(self.roster.contains(&self.ground), "`roster` lacks the ground station, {}", self.ground);
         ensure!(self.autopilot.system_id > 0, "`autopilot.system_id` is 0: expected 1 to 255");
         self.autopilot.link.check(self.autopilot.cable_is_private).context("`autopilot.link`")?;
+        for station in &self.autopilot.stations {
+            station.check(self.autopilot.cable_is_private).context("`autopilot.stations`")?;
+            ensure!(
+                station.brings_whole_frames(),
+                "`autopilot.stations`: `{station}` brings frames in pieces, expected `udp:` or `udpout:`"
+            );
+        }
         let lidar = self.lidar.map(|lidar| lidar.check(folder)).transpose()?;
         self.mission.check(&self.fence)?;
         let airspace = self.airspace.check()?;
@@ -243,6 +260,7 @@ impl AgentFile {
             agent,
             name,
             autopilot: self.autopilot.link,
+            stations: self.autopilot.stations,
             lidar,
             network,
             state: folder.join(self.state),

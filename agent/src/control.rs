@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_dbp::NodeName;
-use skein_mav::{Companion, CompanionConfig, Landed, SetPoint};
+use skein_mav::{Companion, CompanionConfig, Landed, MavEvent, SetPoint, Station, Telemetry, Text};
 use skein_planning::map::MapError;
 use skein_wire::{Limits, Scan, State};
 
@@ -48,6 +48,10 @@ pub struct Control {
     config: Arc<AgentConfig>,
     name: NodeName,
     companion: Companion,
+    /// Another station on the autopilot's line.
+    station: Station,
+    /// Lines that the autopilot wrote, until they are taken.
+    texts: Vec<Text>,
     failsafes: Failsafes,
     flight: Flight,
     positioning: Box<dyn Positioning>,
@@ -56,6 +60,8 @@ pub struct Control {
     watches: Watches,
     guidance: Guidance,
     set_points: SetPointRecord,
+    /// The newest set-point, and when it was made.
+    last_set_point: Option<(Duration, SetPoint)>,
 }
 
 impl Control {
@@ -75,6 +81,8 @@ impl Control {
                 component_id: 191,
                 datum: config.datum,
             }),
+            station: Station::of(config.system_id),
+            texts: Vec::new(),
             failsafes: Failsafes::default(),
             flight: Flight::new(config.takeoff_height_m),
             positioning,
@@ -83,9 +91,16 @@ impl Control {
             watches: Watches::default(),
             guidance: Guidance::new(config.envelope, layers),
             set_points: SetPointRecord::default(),
+            last_set_point: None,
             name,
             config,
         })
+    }
+
+    /// From now on a pilot flies, and nothing leaves that the vehicle would obey.
+    pub fn shadow(&mut self) {
+        self.companion.only_listen();
+        self.flight.shadow();
     }
 
     /// Takes in bytes from the autopilot.
@@ -96,6 +111,17 @@ impl Control {
     /// Bytes for the autopilot.
     pub fn take_mavlink(&mut self) -> Vec<u8> {
         self.companion.take_output()
+    }
+
+    /// Takes in what a station says to the autopilot through this agent: an order of it takes the vehicle over.
+    pub fn overhear(&mut self, bytes: &[u8]) -> Option<Report> {
+        let order = self.station.hear(bytes)?;
+        self.flight.yield_to_station(&order, self.companion.telemetry().mode)
+    }
+
+    /// Takes the lines that the autopilot has written since the last call.
+    pub fn take_texts(&mut self) -> Vec<Text> {
+        std::mem::take(&mut self.texts)
     }
 
     /// Takes in a lidar scan.
@@ -148,6 +174,11 @@ impl Control {
         while let Some(event) = self.companion.poll_event() {
             self.failsafes.hear(&event, self.companion.dialect());
             reports.extend(self.flight.hear(now, &event, &mut self.companion));
+            if let MavEvent::Text(text) = event
+                && self.texts.len() < Telemetry::MAX_TEXTS
+            {
+                self.texts.push(text);
+            }
         }
         let position = self.motion().map(|motion| motion.position);
         reports.extend(self.flight.follow(now, position, &mut self.companion));
@@ -296,15 +327,28 @@ impl Control {
                 self.set_points.commands += 1;
                 let age = oldest_age(now, &inputs).unwrap_or_default();
                 self.set_points.oldest_input = self.set_points.oldest_input.max(age);
-                self.companion.set_point(now, set_point);
+                self.send(now, set_point);
             }
             KeepAlive::Stop => {
                 self.set_points.stops += 1;
                 self.guidance.steering.rest();
-                self.companion.set_point(now, SetPoint::Velocity { velocity: Vector3::zeros(), yaw: None });
+                self.send(now, SetPoint::Velocity { velocity: Vector3::zeros(), yaw: None });
             }
             KeepAlive::Silence => self.guidance.steering.rest(),
         }
+    }
+
+    fn send(&mut self, now: Duration, set_point: SetPoint) {
+        if self.companion.set_point(now, set_point) {
+            self.last_set_point = Some((now, set_point));
+        }
+    }
+
+    /// The newest set-point and when it was made, and the motion of the vehicle.
+    #[must_use]
+    pub fn last_set_point(&self) -> Option<(Duration, SetPoint, Motion)> {
+        let (at, set_point) = self.last_set_point?;
+        Some((at, set_point, self.motion()?))
     }
 
     /// How many of the neighbours have names that come before this vehicle's.

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_dbp::{Happened, NodeName};
+use skein_mav::{SetPoint, Text};
 use skein_wire::event::What;
 use skein_wire::{KeptScript, Link, NodeLink, Scan, Store};
 
@@ -19,6 +20,7 @@ use crate::{
     mission::{Mission, Outcome},
     parts::Parts,
     pipeline::set_point::SILENT_AFTER,
+    positioning::Motion,
     scripts::RunningScript,
 };
 
@@ -86,6 +88,20 @@ impl AgentCore {
         self
     }
 
+    /// The same agent as the shadow of a pilot: it plans and makes set-points while somebody else flies the vehicle, and
+    /// nothing leaves that the vehicle would obey.
+    #[must_use]
+    pub fn shadowing(mut self) -> Self {
+        self.control.shadow();
+        self
+    }
+
+    /// The newest set-point, when it was made, and the motion of the vehicle as it is now; none before the first.
+    #[must_use]
+    pub fn last_set_point(&self) -> Option<(Duration, SetPoint, Motion)> {
+        self.control.last_set_point()
+    }
+
     /// Takes in bytes from the autopilot.
     pub fn receive_mavlink(&mut self, now: Duration, bytes: &[u8]) {
         self.control.receive_mavlink(now, bytes);
@@ -94,6 +110,18 @@ impl AgentCore {
     /// Bytes for the autopilot.
     pub fn take_mavlink(&mut self) -> Vec<u8> {
         self.control.take_mavlink()
+    }
+
+    /// Takes in what another station says to the autopilot through this agent: an order of it takes the vehicle over.
+    pub fn overhear(&mut self, now: Duration, bytes: &[u8]) {
+        if let Some(report) = self.control.overhear(bytes) {
+            self.mission.hear(now, report);
+        }
+    }
+
+    /// Takes the lines that the autopilot has written since the last call.
+    pub fn take_texts(&mut self) -> Vec<Text> {
+        self.control.take_texts()
     }
 
     /// Takes in an order of whoever is at this vehicle's own computer.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_mav::{Command, CommandResult, Companion, Dialect, FlightMode, Landed, MavEvent};
+use skein_mav::{Command, CommandResult, Companion, Dialect, FlightMode, Landed, MavEvent, Telemetry};
 
 use crate::instruction::Instruction;
 use crate::report::Report;
@@ -18,6 +18,8 @@ const LAUNCH_AGAIN: Duration = Duration::from_secs(1);
 const REJECTED_FOR: Duration = Duration::from_secs(10);
 /// An autopilot whose take-off ends in *hold* may end it so far below the height asked for, m.
 const TAKEOFF_ENDS_BELOW_M: f64 = 1.0;
+/// A failsafe that the autopilot wrote about so long before a change of mode is its reason.
+const FAILSAFE_TOLD_WITHIN: Duration = Duration::from_secs(3);
 /// Take-off is over this far below the height asked for.
 const TAKEOFF_TOLERANCE_M: f64 = 0.3;
 
@@ -56,6 +58,8 @@ pub enum FlightPhase {
 #[derive(Debug)]
 pub struct Flight {
     takeoff_height_m: f64,
+    /// A pilot flies the vehicle, and the agent as if it did.
+    is_shadow: bool,
     phase: FlightPhase,
     heard_of: bool,
     /// Whether the autopilot has shown, since the last command, that it is off the ground.
@@ -76,6 +80,7 @@ impl Flight {
     pub fn new(takeoff_height_m: f64) -> Self {
         Self {
             takeoff_height_m,
+            is_shadow: false,
             phase: FlightPhase::Grounded,
             heard_of: false,
             left_ground: false,
@@ -84,6 +89,11 @@ impl Flight {
             launch_again: Duration::ZERO,
             land_again: Duration::ZERO,
         }
+    }
+
+    /// From now on a pilot flies, in whatever mode, and the agent as if it did: it follows the vehicle up and down.
+    pub fn shadow(&mut self) {
+        self.is_shadow = true;
     }
 
     /// Takes off to this height above home from now on, m.
@@ -214,7 +224,7 @@ impl Flight {
             MavEvent::ModeChanged { from, to } if self.is_foreign(*from, *to, companion.dialect()) => {
                 // Control ends with the mode change itself; the b-threads hear of it afterwards.
                 self.phase = FlightPhase::Taken;
-                Some(Report::Pilot(*to))
+                Some(Report::Taken { mode: *to, by: changed_by(now, companion.telemetry()) })
             }
             _ => None,
         }
@@ -223,6 +233,7 @@ impl Flight {
     /// Whether this agent did not ask for a change of mode.
     fn is_foreign(&self, from: FlightMode, to: FlightMode, dialect: &dyn Dialect) -> bool {
         match self.phase {
+            _ if self.is_shadow => false,
             FlightPhase::Flying | FlightPhase::Settling { .. } => to != FlightMode::Offboard,
             FlightPhase::Engaging { .. } => match to {
                 FlightMode::Hold => from == FlightMode::Offboard,
@@ -284,13 +295,18 @@ impl Flight {
             self.phase = FlightPhase::Adopted;
             Report::FoundAirborne
         } else {
-            self.leave_to_pilot(mode)
+            self.leave_to(mode, "pilot".to_owned())
         }
     }
 
-    fn leave_to_pilot(&mut self, mode: FlightMode) -> Report {
+    fn leave_to(&mut self, mode: FlightMode, by: String) -> Report {
         self.phase = FlightPhase::Taken;
-        Report::Pilot(mode)
+        Report::Taken { mode, by }
+    }
+
+    /// A station on the autopilot's line has given this order: the vehicle is its, if this agent flew it.
+    pub fn yield_to_station(&mut self, order: &str, mode: FlightMode) -> Option<Report> {
+        (self.is_committed() && !self.is_shadow).then(|| self.leave_to(mode, format!("station: {order}")))
     }
 
     /// Moves on to the next phase when the telemetry says so; returns what the b-threads should hear of it.
@@ -311,7 +327,11 @@ impl Flight {
         if self.phase == FlightPhase::Grounded && !matches!(landed, Landed::OnGround | Landed::Unknown) {
             // In the air before its agent, or by a pilot's hand.
             let found = !std::mem::replace(&mut self.heard_of, true);
-            return Some(if found { self.adopt(mode) } else { self.leave_to_pilot(mode) });
+            return Some(if found {
+                self.adopt(mode)
+            } else {
+                self.leave_to(mode, changed_by(now, telemetry))
+            });
         }
         self.heard_of |= landed != Landed::Unknown;
         self.left_ground |= !matches!(landed, Landed::OnGround | Landed::Unknown);
@@ -333,7 +353,7 @@ impl Flight {
                 companion.command(now, Command::Offboard);
                 self.phase = FlightPhase::Engaging { since, asked: true };
             }
-            FlightPhase::Engaging { asked: true, .. } if mode == FlightMode::Offboard => {
+            FlightPhase::Engaging { asked: true, .. } if self.is_shadow || mode == FlightMode::Offboard => {
                 self.phase = FlightPhase::Flying;
                 return Some(Report::Airborne);
             }
@@ -357,11 +377,20 @@ impl Flight {
     }
 }
 
+/// Who has changed the flight mode just now, if not this agent: the autopilot, as far as it tells of a failsafe.
+fn changed_by(now: Duration, telemetry: &Telemetry) -> String {
+    match telemetry.failsafe_text(now, FAILSAFE_TOLD_WITHIN) {
+        Some(text) => format!("autopilot: {text}"),
+        None if telemetry.failsafe => "autopilot: a failsafe".to_owned(),
+        None => "pilot".to_owned(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use skein_mav::messages::{
         COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA, MavAutopilot, MavCmd,
-        MavLandedState, MavMessage, MavModeFlag, MavResult,
+        MavLandedState, MavMessage, MavModeFlag, MavResult, STATUSTEXT_DATA,
     };
     use skein_mav::{Address, CompanionConfig, Datum, FrameReader, FrameWriter};
 
@@ -371,6 +400,10 @@ mod tests {
     const HOLD: u32 = 4 << 16 | 3 << 24;
     const LAND: u32 = 4 << 16 | 6 << 24;
     const OFFBOARD: u32 = 6 << 16;
+
+    fn taken(by: &str) -> Report {
+        Report::Taken { mode: FlightMode::Hold, by: by.to_owned() }
+    }
 
     /// A flight on a PX4 that does what a test says.
     struct Stand {
@@ -509,7 +542,7 @@ mod tests {
         stand.takes_off();
         stand.height_m = 1.0;
         stand.beats(HOLD, true);
-        assert_eq!(stand.reports, [Report::Pilot(FlightMode::Hold)]);
+        assert_eq!(stand.reports, [taken("pilot")]);
         assert_eq!(stand.flight.phase(), FlightPhase::Taken);
 
         let mut stand = Stand::new();
@@ -518,8 +551,48 @@ mod tests {
         stand.beats(LAND, true);
         assert_eq!(stand.reports, []);
         stand.beats(HOLD, true);
-        assert_eq!(stand.reports, [Report::Pilot(FlightMode::Hold)]);
+        assert_eq!(stand.reports, [taken("pilot")]);
         assert_eq!(stand.goes_on(3000), [], "landing does not take it back");
+    }
+
+    #[test]
+    fn a_failsafe_of_the_autopilot_is_no_pilot_and_a_stations_order_neither() {
+        let mut stand = Stand::new();
+        stand.takes_off();
+        let text = "Low battery, failsafe: hold".into();
+        stand.autopilot.write(&STATUSTEXT_DATA { text, ..Default::default() });
+        stand.beats(HOLD, true);
+        assert_eq!(stand.reports, [taken("autopilot: Low battery, failsafe: hold")]);
+
+        let mut stand = Stand::new();
+        stand.takes_off();
+        let order = stand.flight.yield_to_station("DO_REPOSITION", FlightMode::Hold);
+        assert_eq!(order, Some(taken("station: DO_REPOSITION")));
+        assert_eq!(stand.flight.yield_to_station("DO_REPOSITION", FlightMode::Hold), None, "it has it");
+    }
+
+    #[test]
+    fn a_shadow_follows_a_pilot_up_and_down_and_tells_the_autopilot_nothing() {
+        let mut stand = Stand::new();
+        stand.companion.only_listen();
+        stand.flight.shadow();
+        stand.flight.carry_out(stand.now, Instruction::TakeOff, &mut stand.companion);
+        assert_eq!(stand.goes_on(60_000), [], "until the pilot takes off");
+        assert_eq!(stand.flight.phase(), FlightPhase::Climbing);
+        const POSCTL: u32 = 3 << 16;
+        stand.beats(POSCTL, true);
+        stand.is(MavLandedState::MAV_LANDED_STATE_IN_AIR);
+        stand.height_m = 3.0;
+        assert_eq!([20, 500, 20].map(|ms| stand.goes_on(ms)).concat(), []);
+        assert_eq!(
+            (stand.flight.phase(), &stand.reports[..]),
+            (FlightPhase::Flying, &[Report::Airborne][..])
+        );
+        stand.flight.touch_down(stand.now, &mut stand.companion);
+        assert_eq!(stand.goes_on(5000), []);
+        stand.is(MavLandedState::MAV_LANDED_STATE_ON_GROUND);
+        stand.beats(POSCTL, false);
+        assert_eq!(stand.reports.last(), Some(&Report::Landed));
     }
 
     #[test]

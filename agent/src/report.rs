@@ -25,8 +25,11 @@ pub enum Report {
     Landed,
     /// The vehicle was in the air before its agent, and nobody flies it.
     FoundAirborne,
-    /// Somebody else has the vehicle, in this mode.
-    Pilot(FlightMode),
+    /// Somebody else has the vehicle, in this mode: see [`PilotTook`].
+    Taken {
+        mode: FlightMode,
+        by: String,
+    },
     /// The agent has not run for so long that it let go of the vehicle.
     Slept(Duration),
     /// The autopilot does not do what it was told on the ground.
@@ -73,7 +76,7 @@ impl Report {
             Self::Airborne => me.event(Airborne),
             Self::Landed => me.event(Landed),
             Self::FoundAirborne => me.event(FoundAirborne),
-            Self::Pilot(mode) => me.event(PilotTook { mode: mode.to_string().into() }),
+            Self::Taken { mode, by } => me.event(PilotTook { mode: mode.to_string().into(), by: by.into() }),
             Self::Slept(pause) => me.event(Slept { seconds: pause.as_secs_f64() }),
             Self::CommandFailed(why) => me.event(CommandFailed { why: why.into() }),
             Self::BatteryLow => me.event(BatteryLow),

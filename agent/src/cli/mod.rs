@@ -1,6 +1,7 @@
 //! The program of one vehicle: see `skein-agent --help`.
 
 mod run;
+mod shadow_log;
 mod verify;
 
 use std::path::PathBuf;
@@ -31,6 +32,10 @@ enum Command {
         /// Configuration of the agent; agent/agent.toml explains every field.
         #[arg(long, value_name = "FILE")]
         config: PathBuf,
+        /// Fly along with a pilot: plan, and write set-points to a file beside the state, but send the autopilot none, nor
+        /// any command.
+        #[arg(long)]
+        shadow: bool,
     },
     /// Model-check a vehicle's b-threads against an abstract world, or programs on a small network.
     Verify(verify::Verify),
@@ -51,9 +56,9 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
         )
         .init();
     let done = match Cli::parse().command {
-        Command::Run { config } => {
-            Config::read(&config, &known).and_then(run::run).map(|()| ExitCode::SUCCESS)
-        }
+        Command::Run { config, shadow } => Config::read(&config, &known)
+            .and_then(|config| run::run(config, shadow))
+            .map(|()| ExitCode::SUCCESS),
         Command::Verify(verify) => verify.run(&known),
     };
     match done {

@@ -6,11 +6,13 @@ use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::Context as _;
 use skein_disk::{PromiseStore, ScriptStore, next_incarnation};
+use skein_mav::{Severity, Text};
 use skein_wire::event::{Advance, Declared as _, Homeward, What};
 use skein_wire::{Fleet, Key, Link as _, Payload, Scan};
 use skein_zenoh::{Bell, Complaints, ZenohConfig, ZenohLink, ZenohSession};
 
 use crate::autopilot_link::AutopilotLink;
+use crate::cli::shadow_log::ShadowLog;
 use crate::config_file::Config;
 use crate::core::AgentCore;
 
@@ -22,9 +24,9 @@ const LOOK: Duration = Duration::from_millis(5);
 /// A scan from further in the future comes from a clock that is wrong.
 const CLOCK_TOLERANCE: Duration = Duration::from_millis(50);
 
-/// Flies until Ctrl-C, which lands the vehicle first.
-pub fn run(config: Config) -> anyhow::Result<()> {
-    let mut driver = Driver::open(config)?;
+/// Flies until Ctrl-C, which lands the vehicle first; as a shadow, while a pilot does.
+pub fn run(config: Config, is_shadow: bool) -> anyhow::Result<()> {
+    let mut driver = Driver::open(config, is_shadow)?;
     let interruptions = Arc::new(AtomicU32::new(0));
     ctrlc::set_handler({
         let (interruptions, bell) = (interruptions.clone(), driver.bell.clone());
@@ -36,10 +38,10 @@ pub fn run(config: Config) -> anyhow::Result<()> {
     .context("Ctrl-C cannot be caught")?;
     let mut landing = false;
     loop {
-        driver.go_on();
+        driver.go_on()?;
         match interruptions.load(Ordering::Relaxed) {
             0 => {}
-            1 if driver.core.is_committed() => {
+            1 if driver.core.is_committed() && !is_shadow => {
                 if !std::mem::replace(&mut landing, true) {
                     tracing::warn!("landing, then ending; Ctrl-C again ends at once");
                     driver.core.order(What::Land);
@@ -53,6 +55,9 @@ pub fn run(config: Config) -> anyhow::Result<()> {
 struct Driver {
     core: AgentCore,
     autopilot: AutopilotLink,
+    /// Others that the autopilot's line is shared with.
+    stations: Vec<AutopilotLink>,
+    shadow: Option<ShadowLog>,
     link: ZenohLink,
     scans: Option<ZenohLink>,
     bell: Bell,
@@ -66,7 +71,7 @@ struct Driver {
 }
 
 impl Driver {
-    fn open(mut config: Config) -> anyhow::Result<Self> {
+    fn open(mut config: Config, is_shadow: bool) -> anyhow::Result<Self> {
         config.agent.incarnation = next_incarnation(&config.state, &config.name)?;
         let (store, kept) = PromiseStore::open(&config.state, &config.name)?;
         config.agent.kept = kept;
@@ -91,10 +96,14 @@ impl Driver {
             session.locators(),
             config.autopilot
         );
+        let shadow = is_shadow.then(|| ShadowLog::create(&config.state, &config.name)).transpose()?;
+        let core = AgentCore::durable(config.agent, Box::new(store))?
+            .keeping_scripts(Box::new(script_store), &scripts);
         Ok(Self {
-            core: AgentCore::durable(config.agent, Box::new(store))?
-                .keeping_scripts(Box::new(script_store), &scripts),
+            core: if is_shadow { core.shadowing() } else { core },
             autopilot: AutopilotLink::new(config.autopilot),
+            stations: config.stations.into_iter().map(AutopilotLink::new).collect(),
+            shadow,
             bell: link.bell(),
             link,
             scans: scans.transpose()?,
@@ -108,13 +117,23 @@ impl Driver {
     }
 
     /// Waits for something to do, and does it.
-    fn go_on(&mut self) {
+    fn go_on(&mut self) -> anyhow::Result<()> {
         let to_tick = self.next_tick.saturating_sub(self.began.elapsed());
         self.bell.wait(to_tick.min(LOOK));
         let now = self.began.elapsed();
         let core = &mut self.core;
         let looked = std::mem::replace(&mut self.looked, now);
-        self.autopilot.receive(|bytes| core.receive_mavlink(looked, bytes));
+        let (stations, autopilot) = (&mut self.stations, &mut self.autopilot);
+        autopilot.receive(|bytes| {
+            core.receive_mavlink(looked, bytes);
+            stations.iter_mut().for_each(|station| station.send(bytes));
+        });
+        for station in stations {
+            station.receive(|bytes| {
+                core.overhear(now, bytes);
+                autopilot.send(bytes);
+            });
+        }
         self.take_in_scans(now);
         if now >= self.next_tick {
             // Ticks that were missed are not made up for.
@@ -124,11 +143,15 @@ impl Driver {
                 tracing::warn!("{line}");
             }
             self.tell_unsaved();
+            if let Some(shadow) = &mut self.shadow {
+                shadow.write(&self.core)?;
+            }
         } else if !self.link.is_empty() {
             self.core.respond(now, &mut self.link);
         }
         self.autopilot.send(&self.core.take_mavlink());
         self.tell();
+        Ok(())
     }
 
     fn take_in_scans(&mut self, now: Duration) {
@@ -171,8 +194,18 @@ impl Driver {
         self.told_unsaved = unsaved.is_some();
     }
 
-    /// Writes down what the vehicle itself has decided or met.
+    /// Writes down what the autopilot says, and what the vehicle itself has decided or met.
     fn tell(&mut self) {
+        for Text { severity, text } in self.core.take_texts() {
+            match severity {
+                Severity::Emergency | Severity::Alert | Severity::Critical | Severity::Error => {
+                    tracing::error!("autopilot: {text}");
+                }
+                Severity::Warning => tracing::warn!("autopilot: {text}"),
+                Severity::Notice | Severity::Info => tracing::info!("autopilot: {text}"),
+                Severity::Debug => tracing::debug!("autopilot: {text}"),
+            }
+        }
         for happened in self.core.take_selections() {
             let repeated = matches!(happened.event.kind(), Advance::NAME | Homeward::NAME);
             if happened.home == *self.core.name() && !repeated {

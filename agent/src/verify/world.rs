@@ -39,7 +39,7 @@ pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
     let not_flying =
         |name: &str| Place::new(name).rules_out(me.any::<OnTheWay>()).rules_out(me.any::<Ready>());
     let taken = |place: Place| match disturbed.pilot {
-        true => place.offers(me.event(PilotTook { mode: "posctl".into() }), "taken"),
+        true => place.offers(me.event(PilotTook { mode: "manual".into(), by: "pilot".into() }), "taken"),
         false => place,
     };
     let taken_or_asleep = |place: Place| match disturbed.pilot {

@@ -87,6 +87,8 @@ pub struct Companion {
     next_heartbeat: Duration,
     /// Since when the autopilot's frames have been in MAVLink 1, without one in 2.
     mavlink_1_since: Option<Duration>,
+    /// Whether it gives no commands and sends no set-points.
+    only_listens: bool,
     /// See [`Dialect::set_point`].
     kept_yaw: Option<f64>,
 }
@@ -109,8 +111,14 @@ impl Companion {
             events: VecDeque::new(),
             next_heartbeat: Duration::ZERO,
             mavlink_1_since: None,
+            only_listens: false,
             kept_yaw: None,
         }
+    }
+
+    /// From now on nothing leaves that the vehicle would obey: commands count as accepted, set-points as sent.
+    pub fn only_listen(&mut self) {
+        self.only_listens = true;
     }
 
     /// Takes in bytes from the autopilot, in whatever pieces they came. Garbage is skipped, and counted in
@@ -179,6 +187,7 @@ impl Companion {
             None => Err(CommandResult::NoAutopilot),
         };
         let ended = match encoded {
+            Ok(_) if self.only_listens => Some((command, CommandResult::Accepted)),
             Ok(message) => match self.send_command(now, Purpose::Flight(command), message) {
                 Some(Purpose::Flight(replaced)) => Some((replaced, CommandResult::Cancelled)),
                 _ => None,
@@ -197,7 +206,7 @@ impl Companion {
             let time_boot_ms = now.as_millis() as u32;
             set_point.encode(self.autopilot.system_id, self.reports.local_frame(), time_boot_ms)
         });
-        if let Some(message) = &message {
+        if let Some(message) = message.as_ref().filter(|_| !self.only_listens) {
             self.writer.write(message);
         }
         message.is_some()
@@ -252,7 +261,7 @@ impl Companion {
             let name = name.to_owned();
             self.events.push_back(MavEvent::ParameterMissing { name });
         } else {
-            self.parameters.request(name, write);
+            self.parameters.request(name, write.filter(|_| !self.only_listens));
         }
     }
 

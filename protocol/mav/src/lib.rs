@@ -4,6 +4,7 @@
 //! - [`Companion`] is the end of a vehicle's program. It flies PX4, ArduPilot and Skein's built-in autopilot.
 //!   What they do differently is a [`Dialect`], chosen by the heartbeat from the list [`DIALECTS`].
 //! - [`Endpoint`] is the end of an autopilot: what Skein's built-in one is reached through.
+//! - [`Station`] is somebody else on the same line, whose orders take the vehicle over.
 //! - [`FrameReader`] and [`FrameWriter`] are the packets under both.
 //! - [`Datum`] and the [`axes`] are the only place where north-east-down and forward-right-down exist. All
 //!   that enters and leaves this crate is ENU about one datum, with bodies FLU.
@@ -43,6 +44,7 @@ mod parameter;
 mod patience;
 mod set_point;
 pub mod simulator;
+mod station;
 mod telemetry;
 
 pub use command::{Command, CommandResult};
@@ -61,4 +63,5 @@ pub use mission::{MAX_ITEMS, MissionError, MissionItem};
 pub use mode::FlightMode;
 pub use parameter::{ParameterEncoding, ParameterValue};
 pub use set_point::SetPoint;
+pub use station::Station;
 pub use telemetry::{Battery, HEARTBEAT_TIMEOUT, Landed, Severity, Stamped, Telemetry, Text};

@@ -79,6 +79,13 @@ const SEVERITIES: [(Severity, MavSeverity); 8] = [
     (Severity::Debug, MavSeverity::MAV_SEVERITY_DEBUG),
 ];
 
+impl Severity {
+    /// By its number, from 0 for the most serious.
+    pub(crate) fn of_level(level: u8) -> Self {
+        SEVERITIES.get(usize::from(level)).map_or(Self::Debug, |(own, _)| *own)
+    }
+}
+
 impl From<MavSeverity> for Severity {
     fn from(severity: MavSeverity) -> Self {
         SEVERITIES.into_iter().find(|(_, known)| *known == severity).map_or(Self::Debug, |(own, _)| own)
@@ -127,6 +134,8 @@ pub struct Telemetry {
     /// Origin of the autopilot's local frame. Without it there is no position and positions cannot be asked
     /// for.
     pub local_origin: Option<Geodetic>,
+    /// Whether one of its own failsafes acts.
+    pub failsafe: bool,
     /// Whether it writes MAVLink 1 although it is written to in 2: it is then answered in 1.
     pub knows_mavlink_1_only: bool,
     /// Whether every sensor the autopilot uses is healthy.
@@ -139,6 +148,13 @@ pub struct Telemetry {
 
 impl Telemetry {
     pub const MAX_TEXTS: usize = 16;
+
+    /// The newest line about a failsafe, if it wrote one within `limit`.
+    pub fn failsafe_text(&self, now: Duration, limit: Duration) -> Option<&str> {
+        let newest = self.texts.iter().rev().take_while(|text| text.age(now) <= limit);
+        let mut lines = newest.map(|text| text.value.text.as_str());
+        lines.find(|line| line.to_ascii_lowercase().contains("failsafe"))
+    }
 
     /// Whether position, velocity and attitude are all younger than `limit`.
     pub fn is_fresh(&self, now: Duration, limit: Duration) -> bool {

@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use mavlink::dialects::common::{
-    ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA,
+    ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, EVENT_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA,
     LOCAL_POSITION_NED_DATA, MavLandedState, MavMessage, MavModeFlag, MavState, MavSysStatusSensor,
-    STATUSTEXT_DATA, SYS_STATUS_DATA,
+    SYS_STATUS_DATA,
 };
 use nalgebra::{Quaternion, UnitQuaternion};
 
@@ -62,7 +62,11 @@ impl Reports {
                 telemetry.battery =
                     battery(message).map(|value| Stamped { stamp: now, value }).or(telemetry.battery);
             }
-            MavMessage::STATUSTEXT(message) => self.on_text(now, message, events),
+            MavMessage::STATUSTEXT(message) => {
+                let text = message.text.to_str().unwrap_or_default().to_owned();
+                self.on_text(now, Text { severity: Severity::from(message.severity), text }, events);
+            }
+            MavMessage::EVENT(message) => self.on_text(now, event_text(message), events),
             _ => {}
         }
     }
@@ -91,6 +95,8 @@ impl Reports {
         if std::mem::replace(&mut telemetry.armed, armed) != armed {
             events.push_back(MavEvent::ArmedChanged { armed });
         }
+        telemetry.failsafe =
+            matches!(message.system_status, MavState::MAV_STATE_CRITICAL | MavState::MAV_STATE_EMERGENCY);
         if message.system_status == MavState::MAV_STATE_BOOT {
             telemetry.ready_to_arm = false;
         }
@@ -147,11 +153,7 @@ impl Reports {
             if used.contains(pre_arm) { healthy.contains(pre_arm) } else { self.telemetry.sensors_ok };
     }
 
-    fn on_text(&mut self, now: Duration, message: &STATUSTEXT_DATA, events: &mut VecDeque<MavEvent>) {
-        let text = Text {
-            severity: Severity::from(message.severity),
-            text: message.text.to_str().unwrap_or_default().to_owned(),
-        };
+    fn on_text(&mut self, now: Duration, text: Text, events: &mut VecDeque<MavEvent>) {
         let texts = &mut self.telemetry.texts;
         if texts.len() == Telemetry::MAX_TEXTS {
             texts.pop_front();
@@ -159,6 +161,15 @@ impl Reports {
         texts.push_back(Stamped { stamp: now, value: text.clone() });
         events.push_back(MavEvent::Text(text));
     }
+}
+
+/// A PX4 event as a line: the words that belong to its number are in the firmware's metadata.
+fn event_text(message: &EVENT_DATA) -> Text {
+    let severity = Severity::of_level(message.log_levels & 0x0f);
+    let arguments = message.arguments;
+    let len = arguments.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+    let hex: String = arguments.iter().take(len).map(|byte| format!(" {byte:02x}")).collect();
+    Text { severity, text: format!("event {}{}{hex}", message.id, if len > 0 { ", arguments" } else { "" }) }
 }
 
 /// The first battery, if its charge is known.

@@ -20,10 +20,12 @@ skein_bp::events! {
     Failed = "failed", Anyone {
         why: Text,
     }
-    /// Somebody else changed the flight mode.
+    /// Somebody else flies the vehicle.
     PilotTook = "pilot", Own {
-        /// The new mode.
+        /// The flight mode.
         mode: Text,
+        /// Who: `pilot`, `autopilot: ` and its words, or `station: ` and its order.
+        by: Text,
     }
     /// The agent did not run for too long for what it knew and what it had said to count.
     Slept = "slept", Own {
