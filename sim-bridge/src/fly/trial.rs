@@ -1,5 +1,6 @@
 //! A flight in lockstep, neither recorded nor shown, for whoever looks on.
 
+use std::path::Path;
 use std::time::Duration;
 
 use skein_agent::{AgentConfig, Parts};
@@ -7,6 +8,7 @@ use skein_dbp::Happened;
 
 use super::call_off::interruptions;
 use super::{Agents, Flight, Happenings, Host, Lockstep, Swarm, memory_links, memory_network};
+use crate::autopilots::Autopilots;
 use crate::cli::Controller;
 use crate::scenario::Scenario;
 use crate::summary::{Summary, Traffic};
@@ -18,6 +20,7 @@ type Watch<'a> = dyn FnMut(&Swarm, &[Happened]) + 'a;
 pub struct Trial<'a> {
     scenario: &'a Scenario,
     agents: Agents,
+    autopilots: Option<(&'a Autopilots, &'a Path)>,
     clock: Option<fn() -> Duration>,
 }
 
@@ -32,7 +35,7 @@ pub struct Flown {
 impl<'a> Trial<'a> {
     #[must_use]
     pub fn new(scenario: &'a Scenario, controller: Controller) -> Self {
-        Self { scenario, agents: Agents::of(scenario, controller), clock: None }
+        Self { scenario, agents: Agents::of(scenario, controller), autopilots: None, clock: None }
     }
 
     /// Changes every agent's configuration.
@@ -46,6 +49,13 @@ impl<'a> Trial<'a> {
     #[must_use]
     pub fn with_parts(mut self, parts: impl Fn(&AgentConfig) -> Parts + 'static) -> Self {
         self.agents.parts = Box::new(parts);
+        self
+    }
+
+    /// Lets these autopilots fly the vehicles that have them; their files go into `folder`.
+    #[must_use]
+    pub fn on(mut self, autopilots: &'a Autopilots, folder: &'a Path) -> Self {
+        self.autopilots = Some((autopilots, folder));
         self
     }
 
@@ -64,6 +74,9 @@ impl<'a> Trial<'a> {
         let network = memory_network(self.scenario);
         let links = memory_links(&network, self.scenario);
         let mut flight = Flight::new(self.scenario, self.agents, links, None, None)?;
+        if let Some((autopilots, folder)) = self.autopilots {
+            flight.seat(autopilots, folder)?;
+        }
         if let Some(clock) = self.clock {
             flight.swarm.time_agents(clock);
         }

@@ -1,6 +1,7 @@
 //! The published experiments, run again, each beside what it must reach.
 
 mod ablation;
+mod autopilots;
 mod circle;
 mod dstar_grid;
 mod feasibility;
@@ -21,6 +22,7 @@ pub const TASKS: &[Entry] = &[
     Entry::of::<Reported<vfh::Vfh>>(),
     Entry::of::<Reported<circle::Circle>>(),
     Entry::of::<Reported<ablation::Ablation>>(),
+    Entry::of::<Reported<autopilots::Autopilots>>(),
     Entry::of::<Reported<right_of_way::RightOfWay>>(),
     Entry::of::<Reported<sphere::Sphere>>(),
     Entry::of::<Reported<dstar_grid::DstarGrid>>(),
