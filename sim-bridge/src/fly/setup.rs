@@ -3,7 +3,6 @@
 use std::sync::LazyLock;
 use std::time::Duration;
 
-use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{AgentConfig, Envelope, Fence, Mind, Parts, PositionSource};
 use skein_bp::{Program, script::Assignment};
 use skein_dbp::{Kept, NodeName};
@@ -101,7 +100,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
                 ..Envelope::default()
             }),
             planners: scenario.planners,
-            link_loss: LinkLossPolicy::default(),
+            link_loss: scenario.without_ground,
             scripts: scripts_of(scenario, index + 1),
             behaviours: scenario.behaviours.clone(),
             lease: lease(scenario),
