@@ -426,12 +426,17 @@ mod battery {
     fn when_low_sends_the_vehicle_home() {
         let mut vehicle = Vehicle::on_its_way();
         assert_eq!(
-            vehicle.reports(BatteryLow::NAME),
-            ["battery_low", "return: battery low", "goto -1", "plan: waypoint"]
+            vehicle.hears(BatteryLow { why: "battery charge unknown".into() }.at(ME)),
+            [
+                "battery_low: battery charge unknown",
+                "return: battery charge unknown",
+                "goto -1",
+                "plan: waypoint"
+            ]
         );
         assert_eq!(vehicle.reports(Planned::NAME), ["planned", "advance"]);
-        assert_eq!(vehicle.arrives(-1), ["arrived -1", "land: battery low"]);
-        assert_eq!(vehicle.reports(Landed::NAME), ["landed", "failed: battery low"]);
+        assert_eq!(vehicle.arrives(-1), ["arrived -1", "land: battery charge unknown"]);
+        assert_eq!(vehicle.reports(Landed::NAME), ["landed", "failed: battery charge unknown"]);
     }
 
     #[test]

@@ -217,7 +217,7 @@ mod tests {
                 filled_in(AGENT_EXAMPLE, &setup.agent(1, &agents[1])).unwrap().parse().unwrap();
             assert_eq!(agent["mission"]["waypoints"].as_array().unwrap().len(), agents[1].waypoints.len());
             assert_eq!(agent["autopilot"]["link"].as_str(), Some("udp:127.0.0.1:14641"));
-            assert_eq!(agent["envelope"].as_table().unwrap().len(), 7);
+            assert_eq!(agent["envelope"].as_table().unwrap().len(), 10);
             assert_eq!(agent["mission"]["without_ground"].as_str(), Some("land"));
             assert_eq!(agent["planners"]["global"].as_str(), Some("astar"));
             assert_eq!(agent["planners"]["local"].as_str(), Some("apf"));

@@ -12,3 +12,4 @@ mod limits;
 mod scenarios;
 mod scripts;
 mod tasks;
+mod wind;
