@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use skein_bp::behaviour::{Chosen, Host};
 use skein_bp::script::Assignment;
 use skein_dbp::{Authority, Kept};
@@ -12,7 +12,7 @@ use skein_planning::airspace::Airspace;
 use skein_wire::event::Catalogue;
 
 use crate::bthreads::LinkLossPolicy;
-use crate::field::{optional_positive, positive};
+use crate::field::{number, optional_positive, positive, within};
 
 /// An axis-aligned box, metres ENU.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,6 +32,15 @@ pub struct Envelope {
     /// Greatest vertical speed, m/s.
     #[serde(deserialize_with = "positive")]
     pub climb_m_s: f64,
+    /// Greatest speed through the air, m/s: less the wind, it is what is left over the ground.
+    #[serde(deserialize_with = "positive")]
+    pub airspeed_m_s: f64,
+    /// How far the vehicle leans when it flies that fast, rad.
+    #[serde(deserialize_with = "lean_rad")]
+    pub tilt_rad: f64,
+    /// How long it hovers on a full battery, s; 0 if that is not known.
+    #[serde(deserialize_with = "not_negative")]
+    pub endurance_s: f64,
     /// Acceleration the vehicle can brake with, m/s².
     #[serde(deserialize_with = "positive")]
     pub brake_m_s2: f64,
@@ -52,19 +61,34 @@ pub struct Envelope {
     pub separation_m: f64,
 }
 
+impl Envelope {
+    pub const DEFAULT: Self = Self {
+        cruise_m_s: 3.0,
+        climb_m_s: 1.5,
+        airspeed_m_s: 12.0,
+        tilt_rad: 0.52,
+        endurance_s: 0.0,
+        brake_m_s2: 2.5,
+        latency_s: 0.3,
+        jerk_m_s3: None,
+        hull_m: 0.25,
+        margin_m: 0.25,
+        separation_m: 1.4,
+    };
+}
+
 impl Default for Envelope {
     fn default() -> Self {
-        Self {
-            cruise_m_s: 3.0,
-            climb_m_s: 1.5,
-            brake_m_s2: 2.5,
-            latency_s: 0.3,
-            jerk_m_s3: None,
-            hull_m: 0.25,
-            margin_m: 0.25,
-            separation_m: 1.4,
-        }
+        Self::DEFAULT
     }
+}
+
+fn lean_rad<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    within(deserializer, "a number from 0.01 to 1.5", 0.01..=1.5)
+}
+
+fn not_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    number(deserializer, "0 or more", |value| value >= 0.0)
 }
 
 /// The planner that finds a path through the map.

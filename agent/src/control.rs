@@ -12,6 +12,7 @@ use skein_wire::{Limits, Scan, State};
 
 use crate::{
     config::AgentConfig,
+    energy::{Energy, known_charge},
     failsafes::Failsafes,
     flight::{Flight, FlightPhase},
     instruction::Instruction,
@@ -58,6 +59,7 @@ pub struct Control {
     perception: Perception,
     neighbours: Neighbours,
     watches: Watches,
+    energy: Energy,
     guidance: Guidance,
     set_points: SetPointRecord,
     /// The newest set-point, and when it was made.
@@ -89,6 +91,7 @@ impl Control {
             perception: Perception::of_mission(&config)?,
             neighbours: Neighbours::new(name.clone(), config.incarnation),
             watches: Watches::default(),
+            energy: Energy::new(config.clone()),
             guidance: Guidance::new(config.envelope, layers),
             set_points: SetPointRecord::default(),
             last_set_point: None,
@@ -185,10 +188,14 @@ impl Control {
     }
 
     fn watch(&mut self, now: Duration, reports: &mut Vec<Report>) {
+        let charge = known_charge(now, self.companion.telemetry().battery);
+        self.watch_energy(now, charge, reports);
         let AgentConfig { envelope, fence, home, .. } = &*self.config;
         let (telemetry, estimate) = (self.companion.telemetry(), self.estimate());
         let (around, home) = (self.neighbours.around(), Vector3::from(*home));
         let checks = Checks {
+            charge,
+            is_affordable: self.energy.reason_to_stay().is_none(),
             is_located: estimate.is_fresh(now, LOCATED_WITHIN),
             has_sound_failsafes: self.failsafes.are_sound(),
             is_clear_overhead: !around.iter().any(|neighbour| neighbour.may_be_over(&home, envelope)),
@@ -198,13 +205,27 @@ impl Control {
         reports.extend(self.watches.preflight(telemetry, checks));
         if let (true, Some(motion)) = (self.is_airborne(), estimate.motion) {
             let position = motion.value.position;
-            if let Some(battery) = telemetry.battery {
-                let seconds_home = (position - home).norm() / envelope.cruise_m_s + 10.0;
-                reports.extend(self.watches.battery(now, battery.value, seconds_home));
-            }
             reports.extend(self.watches.fence(position, fence));
             reports.extend(self.watches.separation(position, around));
         }
+    }
+
+    fn watch_energy(&mut self, now: Duration, charge: Option<f64>, reports: &mut Vec<Report>) {
+        if !self.is_airborne() {
+            reports.extend(self.energy.rest(now, charge).map(Report::BatteryChanged));
+            return;
+        }
+        let Estimate { motion: Some(motion), attitude } = self.estimate() else { return };
+        let (map, clearance_m) = (self.perception.map(), self.config.envelope.obstacle_clearance_m());
+        // What the map does not reach to, or has forgotten, is not known to be clear.
+        let is_mapped = |place: &_| map.voxels().index_of(place).is_some();
+        let is_clear = |from: &_, to: &_| {
+            is_mapped(from) && map.is_segment_clear(from, to, clearance_m) && map.is_open(from, to)
+        };
+        let body_to_world = attitude.map(|attitude| attitude.value.body_to_world);
+        self.energy.fly(now, charge, &motion.value, body_to_world.as_ref(), is_clear);
+        let why_low = self.energy.reason_to_return(now, charge, motion.value.position);
+        reports.extend(self.watches.battery(charge, why_low));
     }
 
     /// Begins a navigation cycle: looks along the path.
@@ -398,10 +419,10 @@ impl Control {
         self.set_points
     }
 
-    /// What makes the autopilot's own failsafes unsafe, if something does.
+    /// What makes the autopilot's own failsafes unsafe, or the mission too long for the battery, if something does.
     #[must_use]
     pub fn complaint(&self) -> Option<&str> {
-        self.failsafes.complaint()
+        self.failsafes.complaint().or_else(|| self.energy.reason_to_stay())
     }
 
     /// Flight mode as the autopilot tells it.

@@ -17,6 +17,7 @@ mod config;
 pub mod config_file;
 mod control;
 mod core;
+mod energy;
 mod failsafes;
 pub mod field;
 mod flight;

@@ -7,10 +7,12 @@ use skein_bp::Event;
 use skein_dbp::NodeName;
 use skein_mav::FlightMode;
 use skein_wire::event::{
-    self, Airborne, Arrived, BatteryCritical, BatteryLow, Clear, CommandFailed, FenceBreached, FoundAirborne,
-    Landed, Leave, PathBlocked, PilotTook, Planned, Ready, Slept, Stuck, TooClose, Unplannable, Unready,
+    self, Airborne, Arrived, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed,
+    FenceBreached, FoundAirborne, Landed, Leave, PathBlocked, PilotTook, Planned, Ready, Slept, Stuck,
+    TooClose, Unplannable, Unready,
 };
 
+use crate::energy::Changed;
 use crate::me::Me;
 
 /// A change of the vehicle, of what is around it, or of its path.
@@ -34,8 +36,10 @@ pub enum Report {
     Slept(Duration),
     /// The autopilot does not do what it was told on the ground.
     CommandFailed(String),
-    /// The battery holds what the way home needs.
-    BatteryLow,
+    /// The battery holds what the way home needs, or nobody knows what it holds.
+    BatteryLow(String),
+    /// On the ground the battery was changed, or charged.
+    BatteryChanged(Changed),
     /// The battery is nearly empty.
     BatteryCritical,
     /// The vehicle is outside its fence.
@@ -79,7 +83,10 @@ impl Report {
             Self::Taken { mode, by } => me.event(PilotTook { mode: mode.to_string().into(), by: by.into() }),
             Self::Slept(pause) => me.event(Slept { seconds: pause.as_secs_f64() }),
             Self::CommandFailed(why) => me.event(CommandFailed { why: why.into() }),
-            Self::BatteryLow => me.event(BatteryLow),
+            Self::BatteryLow(why) => me.event(BatteryLow { why: why.into() }),
+            Self::BatteryChanged(Changed { from, to }) => {
+                me.event(BatteryChanged { from_percent: percent(from), to_percent: percent(to) })
+            }
             Self::BatteryCritical => me.event(BatteryCritical),
             Self::FenceBreached => me.event(FenceBreached),
             Self::TooClose(other) => me.event(TooClose { other: other.as_str().into() }),
@@ -93,4 +100,9 @@ impl Report {
             Self::PassageLeft => me.event(Leave),
         }
     }
+}
+
+/// A share of 0 to 1 in whole per cents.
+fn percent(share: f64) -> i64 {
+    (share * 100.0).round() as i64
 }

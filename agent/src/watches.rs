@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_mav::{Battery, Landed, Telemetry};
+use skein_mav::{Landed, Telemetry};
 
 use crate::config::Fence;
 use crate::neighbours::Neighbour;
@@ -13,10 +13,6 @@ use crate::report::Report;
 pub const LOCATED_WITHIN: Duration = Duration::from_millis(500);
 /// Least energy to take off with.
 const BATTERY_TO_START: f64 = 0.3;
-/// Energy kept in reserve over what the way home needs.
-const BATTERY_RESERVE: f64 = 0.15;
-/// Seconds of flight over which the drain is measured at the least.
-const DRAIN_MEASURED_S: f64 = 30.0;
 /// Energy at which only landing is left.
 const BATTERY_EMERGENCY: f64 = 0.08;
 /// Centre-to-centre distance at which a neighbour is too close, m; the safety filter keeps more.
@@ -49,6 +45,10 @@ impl Edge {
 pub struct Checks {
     /// The vehicle's position and attitude are known, within [`LOCATED_WITHIN`].
     pub is_located: bool,
+    /// Of the battery, 0 to 1, as long as it is known.
+    pub charge: Option<f64>,
+    /// The battery holds the mission.
+    pub is_affordable: bool,
     pub has_sound_failsafes: bool,
     /// Nobody flies where it would climb.
     pub is_clear_overhead: bool,
@@ -66,40 +66,33 @@ pub struct Watches {
     critical: Edge,
     outside: Edge,
     close: Edge,
-    /// When the flight began, and with how much energy.
-    flight_began: Option<(Duration, f64)>,
 }
 
 impl Watches {
     /// Preflight: the autopilot is heard, ready to arm and charged, and the other checks pass. A vehicle that
     /// somebody else has armed is not ready.
     pub fn preflight(&mut self, telemetry: &Telemetry, checks: Checks) -> Option<Report> {
-        let charged = telemetry.battery.is_some_and(|battery| battery.value.fraction >= BATTERY_TO_START);
+        let charged = checks.charge.is_some_and(|charge| charge >= BATTERY_TO_START);
         let ready = telemetry.connected
             && telemetry.ready_to_arm
             && telemetry.home.is_some()
             && (telemetry.landed == Landed::OnGround && !telemetry.armed && checks.is_clear_overhead
                 || self.ready.0 && telemetry.armed && checks.is_taking_off)
             && charged
+            && checks.is_affordable
             && checks.is_located
             && checks.has_somewhere_to_fly
             && checks.has_sound_failsafes;
         self.ready.turns(ready).map(|ready| if ready { Report::Ready } else { Report::Unready })
     }
 
-    /// Battery: low when what is left is what the way home needs, with reserve.
-    pub fn battery(&mut self, now: Duration, battery: Battery, seconds_home: f64) -> Vec<Report> {
-        // Charge is told in whole per cents, so the drain is measured over a long stretch.
-        let (since, full) = *self.flight_began.get_or_insert((now, battery.fraction));
-        let flown_s = now.saturating_sub(since).as_secs_f64();
-        let drain_per_s =
-            if flown_s >= DRAIN_MEASURED_S { (full - battery.fraction).max(0.0) / flown_s } else { 0.0 };
-        let needed = drain_per_s * seconds_home + BATTERY_RESERVE;
+    /// Battery: low when there is a reason to return; critical by its charge, if that is known.
+    pub fn battery(&mut self, charge: Option<f64>, why_low: Option<String>) -> Vec<Report> {
         let mut reports = Vec::new();
-        if self.low.rises(battery.fraction <= needed) {
-            reports.push(Report::BatteryLow);
+        if self.low.rises(why_low.is_some()) {
+            reports.extend(why_low.map(Report::BatteryLow));
         }
-        if self.critical.rises(battery.fraction <= BATTERY_EMERGENCY) {
+        if self.critical.rises(charge.is_some_and(|charge| charge <= BATTERY_EMERGENCY)) {
             reports.push(Report::BatteryCritical);
         }
         reports

@@ -426,12 +426,17 @@ mod battery {
     fn when_low_sends_the_vehicle_home() {
         let mut vehicle = Vehicle::on_its_way();
         assert_eq!(
-            vehicle.reports(BatteryLow::NAME),
-            ["battery_low", "return: battery low", "goto -1", "plan: waypoint"]
+            vehicle.hears(BatteryLow { why: "battery charge unknown".into() }.at(ME)),
+            [
+                "battery_low: battery charge unknown",
+                "return: battery charge unknown",
+                "goto -1",
+                "plan: waypoint"
+            ]
         );
         assert_eq!(vehicle.reports(Planned::NAME), ["planned", "advance"]);
-        assert_eq!(vehicle.arrives(-1), ["arrived -1", "land: battery low"]);
-        assert_eq!(vehicle.reports(Landed::NAME), ["landed", "failed: battery low"]);
+        assert_eq!(vehicle.arrives(-1), ["arrived -1", "land: battery charge unknown"]);
+        assert_eq!(vehicle.reports(Landed::NAME), ["landed", "failed: battery charge unknown"]);
     }
 
     #[test]
@@ -512,7 +517,17 @@ mod link_loss {
     use super::*;
 
     fn in_the_air(link_loss: LinkLossPolicy) -> Vehicle {
-        Vehicle::in_the_air(&AgentConfig { link_loss, ..config() })
+        let mut vehicle = Vehicle::in_the_air(&AgentConfig { link_loss, ..config() });
+        vehicle.learns(joined(GROUND));
+        vehicle
+    }
+
+    /// On the ground, with the ground station heard.
+    fn grounded(link_loss: LinkLossPolicy) -> Vehicle {
+        let mut vehicle = Vehicle::new(&AgentConfig { link_loss, ..config() });
+        vehicle.learns(joined(GROUND));
+        vehicle.reports(Ready::NAME);
+        vehicle
     }
 
     /// What happens within a minute without the ground, and after how many seconds it begins.
@@ -542,6 +557,52 @@ mod link_loss {
         assert_eq!(vehicle.learns(joined(GROUND)), ["peer_joined"]);
         assert_eq!(vehicle.after(60 * SECOND), NOTHING);
         assert_eq!(without_ground(&mut vehicle).unwrap().0, 5, "the patience begins anew");
+    }
+
+    #[test]
+    fn counts_in_the_climb() {
+        let mut vehicle = grounded(LinkLossPolicy::Return);
+        vehicle.reports(Takeoff::NAME);
+        vehicle.learns(lost(GROUND, ""));
+        vehicle.after(3 * SECOND);
+        assert_eq!(vehicle.reports(Airborne::NAME), ["airborne", "goto 0", "plan: waypoint"]);
+        assert_eq!(vehicle.after(SECOND), NOTHING);
+        assert_eq!(vehicle.after(SECOND), ["return: ground station lost", "goto -1", "plan: waypoint"]);
+    }
+
+    #[test]
+    fn counts_before_take_off_from_take_off_on() {
+        let mut vehicle = grounded(LinkLossPolicy::Land);
+        vehicle.learns(lost(GROUND, ""));
+        assert_eq!(vehicle.after(60 * SECOND), NOTHING, "on the ground");
+        vehicle.reports(Takeoff::NAME);
+        assert_eq!(vehicle.after(4 * SECOND), NOTHING);
+        assert_eq!(vehicle.after(SECOND), ["land: ground station lost"]);
+    }
+
+    #[test]
+    fn counts_for_a_ground_that_never_was_heard() {
+        let mut launched = Vehicle::in_the_air(&AgentConfig { link_loss: LinkLossPolicy::Land, ..config() });
+        assert_eq!(launched.after(4 * SECOND), NOTHING);
+        assert_eq!(launched.after(SECOND), ["land: ground station lost"]);
+
+        let mut found = Vehicle::new(&AgentConfig { link_loss: LinkLossPolicy::Land, ..config() });
+        found.reports(FoundAirborne::NAME);
+        assert_eq!(found.after(5 * SECOND), ["land: ground station lost"]);
+
+        let mut late = Vehicle::in_the_air(&AgentConfig { link_loss: LinkLossPolicy::Land, ..config() });
+        late.learns(joined(GROUND));
+        assert_eq!(late.after(60 * SECOND), NOTHING);
+    }
+
+    #[test]
+    fn begins_anew_with_each_flight() {
+        let mut vehicle = grounded(LinkLossPolicy::Land);
+        vehicle.reports(Takeoff::NAME);
+        vehicle.learns(lost(GROUND, ""));
+        let refused = CommandFailed { why: "Arm: denied".into() }.at(ME);
+        vehicle.hears(refused);
+        assert_eq!(vehicle.after(60 * SECOND), NOTHING, "it never left the ground");
     }
 
     #[test]

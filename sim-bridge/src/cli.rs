@@ -225,6 +225,7 @@ fn positive(text: &str) -> Result<f64, String> {
 mod tests {
     use clap::CommandFactory;
     use clap::error::ErrorKind;
+    use skein_agent::bthreads::LinkLossPolicy;
 
     use super::*;
 
@@ -240,7 +241,8 @@ mod tests {
     #[test]
     fn fly_takes_every_option_of_the_design() {
         let line = "skein-sim fly open --vehicles 4 --seed 7 --clock lockstep --speed 2.5 --controller none \
-                    --world w.sdf --mission a.plan --mission b.plan --out run --headless --json";
+                    --world w.sdf --mission a.plan --mission b.plan --out run --headless --json \
+                    --without-ground return";
         let cli = parse(line).expect("all options are known");
         assert!(cli.json);
         let Command::Fly(fly) = cli.command else { panic!("fly is fly") };
@@ -252,6 +254,7 @@ mod tests {
         assert_eq!((world.scenario.as_str(), world.overrides.vehicles, world.seed), ("open", Some(4), 7));
         assert_eq!(world.overrides.missions, [PathBuf::from("a.plan"), PathBuf::from("b.plan")]);
         assert_eq!(fly.out, Some(PathBuf::from("run")));
+        assert_eq!(world.overrides.without_ground, Some(LinkLossPolicy::Return));
     }
 
     #[test]
@@ -272,6 +275,7 @@ mod tests {
             "skein-sim fly open --speed nan",
             "skein-sim fly open --vehicles -1",
             "skein-sim fly open --clock sundial",
+            "skein-sim fly open --without-ground panic",
             "skein-sim fly open --seed x",
             "skein-sim dance",
             "skein-sim experiment sphere",

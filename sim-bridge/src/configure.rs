@@ -191,6 +191,8 @@ fn filled_in(example: &str, config: &impl Serialize) -> anyhow::Result<String> {
 
 #[cfg(test)]
 mod tests {
+    use skein_agent::bthreads::LinkLossPolicy;
+
     use super::*;
 
     #[test]
@@ -203,7 +205,9 @@ mod tests {
 
     #[test]
     fn every_field_that_is_filled_in_is_one_of_the_example() {
-        let scenario = Scenario::open("window", &crate::scenario::Overrides::default(), 3).unwrap();
+        let without_ground = Some(LinkLossPolicy::Land);
+        let overrides = crate::scenario::Overrides { without_ground, ..Default::default() };
+        let scenario = Scenario::open("window", &overrides, 3).unwrap();
         let agents = agent_configs(&scenario);
         let station = ground_config(&scenario, Fleet::new(FLEET).unwrap(), cli::Controller::Bp);
         let station = GroundConfig { muster: true, ..station };
@@ -213,7 +217,8 @@ mod tests {
                 filled_in(AGENT_EXAMPLE, &setup.agent(1, &agents[1])).unwrap().parse().unwrap();
             assert_eq!(agent["mission"]["waypoints"].as_array().unwrap().len(), agents[1].waypoints.len());
             assert_eq!(agent["autopilot"]["link"].as_str(), Some("udp:127.0.0.1:14641"));
-            assert_eq!(agent["envelope"].as_table().unwrap().len(), 7);
+            assert_eq!(agent["envelope"].as_table().unwrap().len(), 10);
+            assert_eq!(agent["mission"]["without_ground"].as_str(), Some("land"));
             assert_eq!(agent["planners"]["global"].as_str(), Some("astar"));
             assert_eq!(agent["planners"]["local"].as_str(), Some("apf"));
             let ground: toml::Table =

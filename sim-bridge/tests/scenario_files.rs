@@ -5,6 +5,7 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
+use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{GlobalPlanner, LocalPlanner};
 use skein_sim::scenario::{Order, Overrides, Scenario, ScenarioError, Who};
 use skein_wire::event::What;
@@ -16,6 +17,7 @@ cruise_speed_m_s = 1.5
 global = "dstar-lite"
 local = "vfh"
 takeoff_height_m = 2.0
+without_ground = "land"
 time_limit_s = 60
 
 [network]
@@ -80,6 +82,7 @@ fn a_scenario_file_sets_vehicles_obstacles_orders_and_conditions() -> Result<(),
     let yard = read(YARD)?;
     assert_eq!((yard.name.as_str(), yard.vehicles.len()), ("yard", 2));
     assert_eq!((yard.cruise_speed_m_s, yard.takeoff_height_m, yard.time_limit_s), (1.5, 2.0, 60.0));
+    assert_eq!(yard.without_ground, LinkLossPolicy::Land);
     assert_eq!((yard.planners.global, yard.planners.local), (GlobalPlanner::DstarLite, LocalPlanner::Vfh));
     assert_eq!((yard.network.latency_ms, yard.network.loss), (20.0, 0.1));
     assert_eq!((yard.wind.mean, yard.wind.gust_sigma_m_s), (Vector3::new(2.0, 0.0, 0.0), 0.5));

@@ -2,7 +2,9 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::event::{BatteryCritical, BatteryLow, Declared as _, Goto, HandBack, Land, Landed, Return};
+use skein_wire::event::{
+    self, BatteryCritical, BatteryLow, Declared as _, Goto, HandBack, Land, Landed, Return,
+};
 
 use crate::{me::Me, precedence};
 
@@ -16,7 +18,7 @@ pub struct Battery {
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 enum Phase {
     Good,
-    Low,
+    Low { why: String },
     GoingHome,
     Critical,
     GoingDown,
@@ -34,9 +36,11 @@ impl BThread for Battery {
         let critical = me.any::<(BatteryCritical, Landed)>();
         let low = Bid::new().priority(precedence::BATTERY_LOW);
         let emergency = Bid::new().priority(precedence::BATTERY_EMERGENCY).block(me.any::<(Return, Goto)>());
-        Some(match self.phase {
+        Some(match &self.phase {
             Phase::Good => low.wait_for(me.any::<BatteryLow>()).wait_for(critical),
-            Phase::Low => low.request(me.event(Return { why: "battery low".into() })).wait_for(critical),
+            Phase::Low { why } => {
+                low.request(me.event(Return { why: why.as_str().into() })).wait_for(critical)
+            }
             Phase::GoingHome => low.wait_for(critical),
             Phase::Critical => emergency
                 .request(me.event(Land { why: "battery nearly empty".into() }))
@@ -48,7 +52,9 @@ impl BThread for Battery {
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         self.phase = match self.me.verb(event) {
-            Some(BatteryLow::NAME) => Phase::Low,
+            Some(BatteryLow::NAME) => {
+                Phase::Low { why: event::why(event).unwrap_or("battery low").to_owned() }
+            }
             Some(Return::NAME) => Phase::GoingHome,
             Some(BatteryCritical::NAME | HandBack::NAME) => Phase::Critical,
             Some(Land::NAME) => Phase::GoingDown,

@@ -166,7 +166,11 @@ pub(super) fn checks(me: &Me) -> Part {
 /// The battery. What is low may recover and be low again, as the way home gets shorter and longer.
 pub(super) fn battery(me: &Me) -> Part {
     let place = Place::new("used");
-    Part::of_one(place.keeps_offering(me.event(BatteryLow)).keeps_offering(me.event(BatteryCritical)))
+    Part::of_one(
+        place
+            .keeps_offering(me.event(BatteryLow { why: "battery low".into() }))
+            .keeps_offering(me.event(BatteryCritical)),
+    )
 }
 
 /// The vehicle's place relative to its fence.

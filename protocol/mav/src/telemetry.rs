@@ -125,7 +125,8 @@ pub struct Telemetry {
     pub attitude: Option<Stamped<UnitQuaternion<f64>>>,
     /// Angular rate, body FLU, rad/s.
     pub angular_rate: Option<Stamped<Vector3<f64>>>,
-    /// Battery; `None` while the autopilot does not know it.
+    /// The battery with the least charge, and since when that is not told anew of each that ever told it; `None` before
+    /// the first.
     pub battery: Option<Stamped<Battery>>,
     /// Home, m: where *return* lands and above which take-off heights are measured.
     pub home: Option<Vector3<f64>>,

@@ -5,10 +5,12 @@ use std::time::Duration;
 use crate::lossy_link::{Pair, datum};
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use skein_mav::messages::{COMMAND_LONG_DATA, MavCmd, MavFrame, SET_POSITION_TARGET_LOCAL_NED_DATA};
+use skein_mav::messages::{
+    BATTERY_STATUS_DATA, COMMAND_LONG_DATA, MavCmd, MavFrame, SET_POSITION_TARGET_LOCAL_NED_DATA,
+};
 use skein_mav::{
-    Address, AutopilotCommand, Command, CommandResult, FlightMode, FrameWriter, Landed, MavEvent,
-    MissionError, MissionItem, ParameterValue, Request, SetPoint,
+    Address, AutopilotCommand, Command, CommandResult, Companion, CompanionConfig, FlightMode, FrameWriter,
+    Landed, MavEvent, MissionError, MissionItem, ParameterValue, Request, SetPoint,
 };
 
 fn second() -> Duration {
@@ -33,6 +35,43 @@ fn telemetry_arrives_in_the_world_frame() {
     assert!((battery.fraction - 0.83).abs() < 1e-9 && (battery.voltage_v - 16.2).abs() < 1e-3);
     assert_eq!((heard.landed, heard.mode), (Landed::OnGround, FlightMode::Hold));
     assert!(heard.sensors_ok && heard.ready_to_arm && heard.connected && !heard.armed);
+}
+
+/// A companion that hears an autopilot tell these batteries, each by its id with its charge in per cent, one a second.
+fn companion_told(batteries: &[(u8, i8)]) -> Companion {
+    let mut autopilot = FrameWriter::new(Address { system_id: 3, component_id: 1 });
+    let mut companion = Companion::new(CompanionConfig { system_id: 3, component_id: 191, datum: datum() });
+    for (second, (id, battery_remaining)) in (0..).zip(batteries) {
+        autopilot.write(&BATTERY_STATUS_DATA {
+            id: *id,
+            battery_remaining: *battery_remaining,
+            voltages: [4000, 4000, 4000, 4000, u16::MAX, u16::MAX, u16::MAX, u16::MAX, u16::MAX, u16::MAX],
+            ..Default::default()
+        });
+        companion.receive(Duration::from_secs(second), &autopilot.take());
+    }
+    companion
+}
+
+#[test]
+fn of_several_batteries_the_worst_counts_as_of_when_all_were_known() {
+    for (batteries, told) in [
+        (&[][..], None),
+        (&[(0, -1)], None),
+        (&[(0, 80)], Some((0.8, 0))),
+        (&[(0, 80), (1, 60)], Some((0.6, 0))),
+        (&[(0, 80), (1, 60), (0, 79)], Some((0.6, 1))),
+        (&[(0, 40), (1, 60), (1, 59), (0, 39)], Some((0.39, 2))),
+        // Not known any more, of one: its last charge gets older.
+        (&[(0, 80), (1, 60), (1, -1), (0, 79), (1, -1), (0, 78)], Some((0.6, 1))),
+        (&[(0, 80), (0, 120), (0, -7)], Some((0.8, 0))),
+        // One that never told its charge is no battery to wait for.
+        (&[(0, 80), (1, -1), (0, 79)], Some((0.79, 2))),
+    ] {
+        let battery = companion_told(batteries).telemetry().battery;
+        let heard = battery.map(|battery| (battery.value.fraction, battery.stamp.as_secs()));
+        assert_eq!(heard, told, "{batteries:?}");
+    }
 }
 
 #[test]

@@ -3,7 +3,6 @@
 use std::sync::LazyLock;
 use std::time::Duration;
 
-use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{AgentConfig, Envelope, Fence, Mind, Parts, PositionSource};
 use skein_bp::{Program, script::Assignment};
 use skein_dbp::{Kept, NodeName};
@@ -95,13 +94,16 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             envelope: plan.make().handles(Envelope {
                 cruise_m_s: plan.pace * scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
                 climb_m_s: plan.model.max_climb_m_s.min(1.5),
+                airspeed_m_s: plan.model.top_airspeed_m_s(),
+                tilt_rad: plan.model.top_tilt_rad(),
+                endurance_s: plan.model.endurance_s(),
                 brake_m_s2: plan.model.max_accel_m_s2 * 0.7,
                 hull_m: plan.model.hull_radius_m,
                 separation_m: SEPARATION_HULLS * plan.model.hull_radius_m,
                 ..Envelope::default()
             }),
             planners: scenario.planners,
-            link_loss: LinkLossPolicy::default(),
+            link_loss: scenario.without_ground,
             scripts: scripts_of(scenario, index + 1),
             behaviours: scenario.behaviours.clone(),
             lease: lease(scenario),

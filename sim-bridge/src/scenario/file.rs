@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
+use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{AirspaceTable, GlobalPlanner, LocalPlanner, Planners};
 use skein_bp::behaviour::{Behaviours, Settings};
 use skein_bp::configuration::{self, Malformed};
@@ -65,6 +66,8 @@ struct FileTable {
     takeoff_height_m: Option<f64>,
     #[serde(default, deserialize_with = "field::optional_positive")]
     time_limit_s: Option<f64>,
+    #[serde(default)]
+    without_ground: LinkLossPolicy,
     world: Option<PathBuf>,
     #[serde(default)]
     mission: Vec<PathBuf>,
@@ -254,6 +257,7 @@ impl ScenarioFile {
             cruise_speed_m_s,
             planners: Planners { global: table.global, local: table.local },
             takeoff_height_m,
+            without_ground: table.without_ground,
             time_limit_s,
             wind: table.wind.map(WindConfig::from).unwrap_or_default(),
             orders,

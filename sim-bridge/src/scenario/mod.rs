@@ -24,7 +24,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nalgebra::Vector3;
 use serde::Deserialize;
+use serde::de::value::{Error as WordError, StrDeserializer};
 use skein_agent::Planners;
+use skein_agent::bthreads::LinkLossPolicy;
 use skein_bp::behaviour::{Behaviours, Chosen};
 use skein_bp::script::Assignment;
 use skein_mav::Datum;
@@ -86,6 +88,8 @@ pub struct Scenario {
     pub planners: Planners,
     /// Height above the ground at which a take-off ends.
     pub takeoff_height_m: f64,
+    /// What a vehicle does that has been without the ground station for long.
+    pub without_ground: LinkLossPolicy,
     /// Simulated seconds after which the mission has failed.
     pub time_limit_s: f64,
     /// Air that moves.
@@ -189,6 +193,14 @@ pub struct Overrides {
     /// A QGroundControl plan or LSC mission; one that all fly in trail, or one for each vehicle.
     #[arg(long = "mission", value_name = "FILE")]
     pub missions: Vec<PathBuf>,
+    /// What a vehicle does once the ground station has been silent for 5 s: continue, return or land; the scenario's own
+    /// if not given.
+    #[arg(long, value_name = "POLICY", value_parser = policy)]
+    pub without_ground: Option<LinkLossPolicy>,
+}
+
+fn policy(word: &str) -> Result<LinkLossPolicy, WordError> {
+    LinkLossPolicy::deserialize(StrDeserializer::new(word))
 }
 
 impl Scenario {
@@ -262,6 +274,7 @@ impl Scenario {
                 scenario.settle()?;
             }
         }
+        scenario.without_ground = overrides.without_ground.unwrap_or(scenario.without_ground);
         scenario.fly(set)?;
         scenario.validate()?;
         Ok(scenario)

@@ -251,6 +251,23 @@ impl VehicleModel {
         self.mass_kg * GRAVITY_M_S2 / (4.0 * self.max_thrust_n)
     }
 
+    /// The tilt that the autopilot demands at most and the rotors can hold at this height, rad.
+    pub fn top_tilt_rad(&self) -> f64 {
+        self.max_tilt_rad.min(self.hover_share().acos())
+    }
+
+    /// Speed through still air at that tilt, m/s: at most 100.
+    pub fn top_airspeed_m_s(&self) -> f64 {
+        let force_n = self.mass_kg * GRAVITY_M_S2 * self.top_tilt_rad().tan();
+        let root = self.linear_drag.powi(2) + 4.0 * self.quadratic_drag * force_n;
+        (2.0 * force_n / (self.linear_drag + root.sqrt())).min(100.0)
+    }
+
+    /// Time in hover from full to empty, s.
+    pub fn endurance_s(&self) -> f64 {
+        self.battery.capacity_wh * 3600.0 / (self.battery.hover_power_w + self.battery.idle_power_w)
+    }
+
     fn check(&self, source_name: &str) -> Result<(), VehicleError> {
         let [ixx, iyy, izz] = self.inertia;
         let positive = [

@@ -20,6 +20,52 @@ fn without_the_ground_station_vehicles_finish_by_themselves() {
     assert_eq!(lockstep.swarm.truth().collisions_vehicle, 0);
 }
 
+/// How far a vehicle of these settings comes that loses its ground station `at`, and how its mission ends.
+fn cut_off(settings: &str, at: Duration) -> (f64, Option<Outcome>) {
+    let text = format!(
+        "time_limit_s = 120.0\n{settings}\n[bounds]\nmin_m = [-20.0, -20.0, -1.0]\nmax_m = [90.0, 20.0, 15.0]\n\
+         [[vehicle]]\nstart_m = [0.0, 0.0]\nwaypoints_m = [[80.0, 0.0, 3.0]]\n"
+    );
+    let mut lockstep = Lockstep::from_text(&text);
+    lockstep.run_until(at);
+    let ground = lockstep.nodes[1].clone();
+    lockstep.network.leave(&ground);
+    let mut farthest_m: f64 = 0.0;
+    while lockstep.swarm.now() < Duration::from_secs(120)
+        && lockstep.swarm.agents().all(|a| a.outcome().is_none())
+    {
+        lockstep.step();
+        farthest_m =
+            farthest_m.max(lockstep.swarm.simulation().vehicle(0).unwrap().motion.position.xy().norm());
+    }
+    (farthest_m, lockstep.swarm.outcomes().next().unwrap().cloned())
+}
+
+/// When the vehicle of [`cut_off`] leaves the ground.
+fn lift_off() -> Duration {
+    let mut lockstep =
+        Lockstep::from_text("[[vehicle]]\nstart_m = [0.0, 0.0]\nwaypoints_m = [[80.0, 0.0, 3.0]]\n");
+    while !lockstep.swarm.simulation().vehicle(0).unwrap().airborne {
+        lockstep.step();
+    }
+    lockstep.swarm.now()
+}
+
+#[test]
+fn the_ground_lost_in_the_climb_or_before_it_is_missed() {
+    let up = lift_off();
+    let failed = || Some(Outcome::Failed("ground station lost".to_owned()));
+    for at in [up - Duration::from_millis(40), up + Duration::from_millis(500), up + Duration::from_secs(6)] {
+        let (farthest_m, outcome) = cut_off("without_ground = \"return\"", at);
+        assert_eq!(outcome, failed(), "lost at {at:?}");
+        assert!(farthest_m < 40.0, "lost at {at:?}, it went {farthest_m} m away");
+        let (farthest_m, outcome) = cut_off("without_ground = \"land\"", at);
+        assert_eq!((outcome, farthest_m < 40.0), (failed(), true), "lost at {at:?}: {farthest_m} m");
+    }
+    let (farthest_m, outcome) = cut_off("", up);
+    assert_eq!((outcome, farthest_m > 75.0), (Some(Outcome::Complete), true));
+}
+
 #[test]
 fn the_ghost_of_a_vehicle_that_falls_silent_in_flight_is_flown_around() {
     let mut all_arrived = 0;

@@ -13,3 +13,4 @@ mod no_lidar;
 mod scenarios;
 mod scripts;
 mod tasks;
+mod wind;

@@ -1,6 +1,6 @@
 //! Telemetry from the messages that an autopilot sends to everyone.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use mavlink::dialects::common::{
@@ -25,11 +25,18 @@ pub(super) struct Reports {
     datum: Datum,
     /// Follows from `telemetry.local_origin`.
     local: Option<LocalFrame>,
+    batteries: Batteries,
 }
 
 impl Reports {
     pub(super) fn new(datum: Datum) -> Self {
-        Self { telemetry: Telemetry::default(), dialect: dialects::UNKNOWN, datum, local: None }
+        Self {
+            telemetry: Telemetry::default(),
+            dialect: dialects::UNKNOWN,
+            datum,
+            local: None,
+            batteries: Batteries::default(),
+        }
     }
 
     /// The autopilot's local frame, once it has told its origin.
@@ -59,8 +66,8 @@ impl Reports {
             }
             MavMessage::SYS_STATUS(message) => self.on_system_status(message),
             MavMessage::BATTERY_STATUS(message) => {
-                telemetry.battery =
-                    battery(message).map(|value| Stamped { stamp: now, value }).or(telemetry.battery);
+                self.batteries.hear(now, message);
+                telemetry.battery = self.batteries.worst();
             }
             MavMessage::STATUSTEXT(message) => {
                 let text = message.text.to_str().unwrap_or_default().to_owned();
@@ -85,6 +92,10 @@ impl Reports {
         let first = telemetry.last_heartbeat.replace(now).is_none();
         if !std::mem::replace(&mut telemetry.connected, true) {
             events.push_back(MavEvent::HeartbeatRegained);
+            if !telemetry.armed {
+                // Its power may have been off, for other batteries.
+                self.batteries = Batteries::default();
+            }
         }
         let mode = self.dialect.mode(message.custom_mode);
         let from = std::mem::replace(&mut telemetry.mode, mode);
@@ -172,12 +183,31 @@ fn event_text(message: &EVENT_DATA) -> Text {
     Text { severity, text: format!("event {}{}{hex}", message.id, if len > 0 { ", arguments" } else { "" }) }
 }
 
-/// The first battery, if its charge is known.
+/// The batteries that have told their charge, each by its id with the newest one.
+#[derive(Debug, Clone, Default)]
+struct Batteries(BTreeMap<u8, Stamped<Battery>>);
+
+impl Batteries {
+    fn hear(&mut self, now: Duration, message: &BATTERY_STATUS_DATA) {
+        if let Some(value) = battery(message) {
+            self.0.insert(message.id, Stamped { stamp: now, value });
+        }
+    }
+
+    /// The one with the least charge, as of when each was known to have that much.
+    fn worst(&self) -> Option<Stamped<Battery>> {
+        let stamp = self.0.values().map(|battery| battery.stamp).min()?;
+        let least = self.0.values().min_by(|a, b| a.value.fraction.total_cmp(&b.value.fraction))?;
+        Some(Stamped { stamp, value: least.value })
+    }
+}
+
+/// The battery, if its charge is known.
 fn battery(message: &BATTERY_STATUS_DATA) -> Option<Battery> {
     // u16::MAX marks a cell that is not there, -1 an unknown charge.
     let cells = message.voltages.iter().filter(|cell| **cell != u16::MAX);
     let millivolts: u32 = cells.map(|cell| u32::from(*cell)).sum();
-    (message.id == 0 && (0..=100).contains(&message.battery_remaining)).then(|| Battery {
+    (0..=100).contains(&message.battery_remaining).then(|| Battery {
         fraction: f64::from(message.battery_remaining) / 100.0,
         voltage_v: f64::from(millivolts) / 1000.0,
     })

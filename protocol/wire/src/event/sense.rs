@@ -42,8 +42,17 @@ skein_bp::events! {
     }
     /// No neighbour is nearer than the emergency distance any more.
     Clear = "clear", Own;
-    /// What is left in the battery is what the way home needs.
-    BatteryLow = "battery_low", Own;
+    /// What is left in the battery is what the way home needs, or nobody knows what is left.
+    BatteryLow = "battery_low", Own {
+        why: Text,
+    }
+    /// On the ground the battery was changed, or charged.
+    BatteryChanged = "battery_changed", Own {
+        /// What was left before.
+        from_percent: i64 ["%", 0.0..=100.0],
+        /// What is left now.
+        to_percent: i64 ["%", 0.0..=100.0],
+    }
     /// The battery is nearly empty.
     BatteryCritical = "battery_critical", Own;
     /// The vehicle is outside its geofence.
