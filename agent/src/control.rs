@@ -8,11 +8,10 @@ use nalgebra::Vector3;
 use skein_dbp::NodeName;
 use skein_mav::{Companion, CompanionConfig, Landed, SetPoint};
 use skein_planning::map::MapError;
-use skein_wire::{Limits, Scan, State};
+use skein_wire::{Limits, Readiness, Scan, State};
 
 use crate::{
     config::AgentConfig,
-    failsafes::Failsafes,
     flight::{Flight, FlightPhase},
     instruction::Instruction,
     neighbours::{Neighbour, Neighbours},
@@ -26,9 +25,10 @@ use crate::{
         touchdown::Descent,
     },
     positioning::{Estimate, Motion, Positioning},
+    preflight::{Failsafes, Look, Others, Preflight, Situation, degrees},
     report::Report,
     scripts::Circumstances,
-    watches::{Checks, LOCATED_WITHIN, Watches},
+    watches::Watches,
 };
 
 /// What set-points were made from: the keep-alive rule, observed.
@@ -48,7 +48,13 @@ pub struct Control {
     config: Arc<AgentConfig>,
     name: NodeName,
     companion: Companion,
+    preflight: Preflight,
     failsafes: Failsafes,
+    /// What others say of their checks.
+    others: Others,
+    look: Option<Look>,
+    /// Where the vehicle landed last.
+    landed_at: Option<Vector3<f64>>,
     flight: Flight,
     positioning: Box<dyn Positioning>,
     perception: Perception,
@@ -75,7 +81,11 @@ impl Control {
                 component_id: 191,
                 datum: config.datum,
             }),
-            failsafes: Failsafes::default(),
+            preflight: Preflight::default(),
+            failsafes: Failsafes::new(config.system_id),
+            others: Others::new(),
+            look: None,
+            landed_at: None,
             flight: Flight::new(config.takeoff_height_m),
             positioning,
             perception: Perception::of_mission(&config)?,
@@ -104,6 +114,7 @@ impl Control {
         if now.saturating_sub(scan.stamp) > FRESH_FOR {
             return;
         }
+        self.look = Some(Look { stamp: scan.stamp, up_m: scan.up_m.map(f64::from) });
         let Some((position, attitude)) = self.estimate().pose_at(scan.stamp) else { return };
         // From the ground there is little to see, and much of it is the ground.
         if !self.is_airborne() {
@@ -121,6 +132,11 @@ impl Control {
             self.neighbours.hear(now, state);
         }
         self.neighbours.look_around(now);
+    }
+
+    /// Takes in what other vehicles say of their checks before take-off.
+    pub fn hear_readiness(&mut self, now: Duration, readiness: Vec<Readiness>) {
+        self.others.extend(readiness.into_iter().map(|said| (said.node.clone(), (now, said))));
     }
 
     /// The agent has not run for `pause`: if it flew the vehicle, it does not any more.
@@ -142,27 +158,38 @@ impl Control {
     }
 
     fn follow_autopilot(&mut self, now: Duration, reports: &mut Vec<Report>) {
-        self.failsafes.ask(&mut self.companion);
+        self.failsafes.ask(now, &mut self.companion);
         while let Some(event) = self.companion.poll_event() {
             self.failsafes.hear(&event, self.companion.dialect());
             reports.extend(self.flight.hear(now, &event, &mut self.companion));
         }
         let position = self.motion().map(|motion| motion.position);
-        reports.extend(self.flight.follow(now, position, &mut self.companion));
+        let report = self.flight.follow(now, position, &mut self.companion);
+        if report == Some(Report::Landed) {
+            self.landed_at = position;
+        }
+        reports.extend(report);
     }
 
     fn watch(&mut self, now: Duration, reports: &mut Vec<Report>) {
         let AgentConfig { envelope, fence, home, .. } = &*self.config;
         let (telemetry, estimate) = (self.companion.telemetry(), self.estimate());
         let (around, home) = (self.neighbours.around(), Vector3::from(*home));
-        let checks = Checks {
-            is_located: estimate.is_fresh(now, LOCATED_WITHIN),
-            has_sound_failsafes: self.failsafes.are_sound(),
-            is_clear_overhead: !around.iter().any(|neighbour| neighbour.may_be_over(&home, envelope)),
+        reports.extend(self.preflight.update(&Situation {
+            now,
+            config: &self.config,
+            telemetry,
+            make: self.companion.dialect().name(),
+            estimate,
+            failsafes: &self.failsafes,
+            look: self.look,
+            keep_out: self.perception.map().keep_out(),
+            neighbours: around,
+            others: &self.others,
+            landed_at: self.landed_at,
             is_taking_off: self.flight.is_taking_off(),
             has_somewhere_to_fly: self.guidance.has_somewhere_to_fly(),
-        };
-        reports.extend(self.watches.preflight(telemetry, checks));
+        }));
         if let (true, Some(motion)) = (self.is_airborne(), estimate.motion) {
             let position = motion.value.position;
             if let Some(battery) = telemetry.battery {
@@ -348,10 +375,22 @@ impl Control {
         self.set_points
     }
 
-    /// What makes the autopilot's own failsafes unsafe, if something does.
+    /// The checks before take-off, as others should know them.
     #[must_use]
-    pub fn complaint(&self) -> Option<&str> {
-        self.failsafes.complaint()
+    pub fn readiness(&self) -> Readiness {
+        Readiness {
+            node: self.name.clone(),
+            incarnation: self.config.incarnation,
+            home: self.config.home,
+            datum: degrees(&self.config.datum),
+            checks: self.preflight.checks().to_vec(),
+        }
+    }
+
+    /// Why a vehicle on the ground is not ready to take off.
+    #[must_use]
+    pub fn complaint(&self) -> Option<String> {
+        self.preflight.complaint()
     }
 
     /// Flight mode as the autopilot tells it.

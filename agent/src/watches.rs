@@ -3,16 +3,12 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_mav::{Battery, Landed, Telemetry};
+use skein_mav::Battery;
 
 use crate::config::Fence;
 use crate::neighbours::Neighbour;
 use crate::report::Report;
 
-/// A vehicle that takes off knows where it is from no longer ago than this.
-pub const LOCATED_WITHIN: Duration = Duration::from_millis(500);
-/// Least energy to take off with.
-const BATTERY_TO_START: f64 = 0.3;
 /// Energy kept in reserve over what the way home needs.
 const BATTERY_RESERVE: f64 = 0.15;
 /// Seconds of flight over which the drain is measured at the least.
@@ -44,24 +40,9 @@ impl Edge {
     }
 }
 
-/// The checks before take-off that the telemetry of the autopilot does not answer.
-#[derive(Clone, Copy, Debug)]
-pub struct Checks {
-    /// The vehicle's position and attitude are known, within [`LOCATED_WITHIN`].
-    pub is_located: bool,
-    pub has_sound_failsafes: bool,
-    /// Nobody flies where it would climb.
-    pub is_clear_overhead: bool,
-    /// This agent has armed it.
-    pub is_taking_off: bool,
-    /// The limits on its motion do not contradict one another.
-    pub has_somewhere_to_fly: bool,
-}
-
 /// Everything that is watched on one vehicle.
 #[derive(Debug, Default)]
 pub struct Watches {
-    ready: Edge,
     low: Edge,
     critical: Edge,
     outside: Edge,
@@ -71,22 +52,6 @@ pub struct Watches {
 }
 
 impl Watches {
-    /// Preflight: the autopilot is heard, ready to arm and charged, and the other checks pass. A vehicle that
-    /// somebody else has armed is not ready.
-    pub fn preflight(&mut self, telemetry: &Telemetry, checks: Checks) -> Option<Report> {
-        let charged = telemetry.battery.is_some_and(|battery| battery.value.fraction >= BATTERY_TO_START);
-        let ready = telemetry.connected
-            && telemetry.ready_to_arm
-            && telemetry.home.is_some()
-            && (telemetry.landed == Landed::OnGround && !telemetry.armed && checks.is_clear_overhead
-                || self.ready.0 && telemetry.armed && checks.is_taking_off)
-            && charged
-            && checks.is_located
-            && checks.has_somewhere_to_fly
-            && checks.has_sound_failsafes;
-        self.ready.turns(ready).map(|ready| if ready { Report::Ready } else { Report::Unready })
-    }
-
     /// Battery: low when what is left is what the way home needs, with reserve.
     pub fn battery(&mut self, now: Duration, battery: Battery, seconds_home: f64) -> Vec<Report> {
         // Charge is told in whole per cents, so the drain is measured over a long stretch.

@@ -5,7 +5,8 @@ pub mod px4;
 
 use mavlink::dialects::common::HEARTBEAT_DATA;
 
-use crate::dialect::{Dialect, Failsafe};
+use crate::dialect::Dialect;
+use crate::failsafe::Failsafe;
 
 /// All makes of autopilot that can be commanded.
 pub static DIALECTS: [&dyn Dialect; 2] = [&px4::Px4, &ardupilot::ArduPilot];

@@ -9,6 +9,7 @@ mod faults;
 mod gazebo_worlds;
 mod landing;
 mod limits;
+mod preflight;
 mod scenarios;
 mod scripts;
 mod tasks;
