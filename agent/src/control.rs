@@ -17,7 +17,9 @@ use crate::{
     neighbours::{Neighbour, Neighbours},
     pipeline::{
         allowed::Allowed,
+        ground_seen::GroundSeen,
         guidance::Guidance,
+        headroom::{Headroom, Look},
         layers::Layers,
         perception::{Perception, Pose},
         set_point::{FRESH_FOR, KeepAlive, keep_alive, oldest_age},
@@ -25,7 +27,7 @@ use crate::{
         touchdown::Descent,
     },
     positioning::{Estimate, Motion, Positioning},
-    preflight::{Failsafes, Look, Others, Preflight, Situation, degrees},
+    preflight::{Failsafes, Others, Preflight, Situation, degrees},
     report::Report,
     scripts::Circumstances,
     watches::Watches,
@@ -53,6 +55,7 @@ pub struct Control {
     /// What others say of their checks.
     others: Others,
     look: Option<Look>,
+    ground_seen: GroundSeen,
     /// Where the vehicle landed last.
     landed_at: Option<Vector3<f64>>,
     flight: Flight,
@@ -85,6 +88,7 @@ impl Control {
             failsafes: Failsafes::new(config.system_id),
             others: Others::new(),
             look: None,
+            ground_seen: GroundSeen::default(),
             landed_at: None,
             flight: Flight::new(config.takeoff_height_m),
             positioning,
@@ -114,12 +118,14 @@ impl Control {
         if now.saturating_sub(scan.stamp) > FRESH_FOR {
             return;
         }
-        self.look = Some(Look { stamp: scan.stamp, up_m: scan.up_m.map(f64::from) });
+        let [up_m, down_m] = [scan.up_m, scan.down_m].map(|range| range.map(f64::from));
+        self.look = Some(Look { stamp: scan.stamp, up_m, down_m });
         let Some((position, attitude)) = self.estimate().pose_at(scan.stamp) else { return };
         // From the ground there is little to see, and much of it is the ground.
         if !self.is_airborne() {
             return;
         }
+        self.ground_seen.look(&position, self.config.home[2], down_m);
         let others: Vec<_> = self.neighbours.at(now).map(|neighbour| neighbour.position()).collect();
         self.perception.take_in(scan, &Pose { position, attitude }, &others);
         let (returns, rays) = (self.perception.returns(), scan.ranges_m.len());
@@ -285,6 +291,7 @@ impl Control {
                 fence: &self.config.fence,
                 map: self.perception.map(),
                 neighbours: self.neighbours.around(),
+                ground_seen: &self.ground_seen,
             };
             descent.detour(self.guidance.steering.settles_at)
         });
@@ -296,6 +303,9 @@ impl Control {
 
     /// Ends a tick: sends a set-point, if one may be sent.
     pub fn steer(&mut self, now: Duration) {
+        let look = self.look.filter(|look| now.saturating_sub(look.stamp) <= FRESH_FOR);
+        self.guidance.headroom =
+            look.map_or(Headroom::OPEN, |look| Headroom::of(&look, &self.config.envelope));
         self.settle(now);
         if !self.flight.sends_set_points() {
             self.guidance.steering.rest();
@@ -357,6 +367,19 @@ impl Control {
     fn is_airborne(&self) -> bool {
         let telemetry = self.companion.telemetry();
         telemetry.armed && telemetry.landed != Landed::OnGround
+    }
+
+    /// The vehicle's node name.
+    #[must_use]
+    pub fn name(&self) -> &NodeName {
+        &self.name
+    }
+
+    /// Whether an autopilot is heard that does not fly.
+    #[must_use]
+    pub fn may_be_spoken_to(&self) -> bool {
+        let telemetry = self.companion.telemetry();
+        telemetry.connected && !telemetry.armed
     }
 
     #[must_use]

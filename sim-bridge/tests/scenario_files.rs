@@ -192,8 +192,8 @@ fn a_start_under_something_that_the_climb_would_meet_names_it_and_how_high_it_is
         "{text}"
     );
     // Its hull would touch the roof's edge.
-    assert!(fault(1.7, 6.2).is_some_and(|text| text.contains("`roof`")));
-    assert_eq!(fault(1.7, 6.3), None);
+    assert!(fault(1.7, 6.1).is_some_and(|text| text.contains("`roof`")));
+    assert_eq!(fault(1.7, 6.2), None);
     assert_eq!(fault(2.9, 5.0), None, "it climbs to 2 m only");
     assert!(fault(2.5, 5.0).is_some(), "it needs room above itself");
 }

@@ -107,3 +107,88 @@ impl Listed {
         }
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)] // A test fails by panicking.
+mod tests {
+    use std::collections::BTreeMap;
+
+    use skein_mav::DIALECTS;
+    use skein_wire::CheckState;
+
+    use super::*;
+
+    fn dialect(name: &str) -> &'static dyn Dialect {
+        DIALECTS.into_iter().find(|dialect| dialect.name() == name).unwrap()
+    }
+
+    /// The failsafes of an ArduPilot whose companion's system id is 3, which has told these values.
+    fn told(values: &[(&str, Option<f32>)]) -> Failsafes {
+        let mut failsafes = Failsafes::new(3);
+        failsafes.hear(&MavEvent::HeartbeatRegained, dialect("ArduPilot"));
+        for (name, value) in values {
+            let name = (*name).to_owned();
+            let event = match value {
+                Some(value) => MavEvent::ParameterRead { name, value: ParameterValue::Real(*value) },
+                None => MavEvent::ParameterMissing { name },
+            };
+            failsafes.hear(&event, dialect("ArduPilot"));
+        }
+        failsafes
+    }
+
+    fn state(failsafes: &Failsafes, name: &str) -> (CheckState, String) {
+        let check = failsafes.checks().find(|check| check.name == name).unwrap();
+        (check.state, check.value)
+    }
+
+    #[test]
+    fn a_parameter_that_is_not_told_yet_is_waited_for_and_one_that_is_lacking_is_no_fault() {
+        let failsafes = told(&[("FS_GCS_ENABLE", None), ("FS_GCS_TIMEOUT", None)]);
+        assert_eq!(state(&failsafes, "GUID_TIMEOUT").0, CheckState::Waits);
+        assert_eq!(state(&failsafes, "FS_GCS_TIMEOUT").0, CheckState::Passes);
+        assert_eq!(state(&failsafes, "FS_GCS_ENABLE").0, CheckState::Fails, "every release has this one");
+    }
+
+    #[test]
+    fn of_two_names_the_one_counts_that_the_release_has() {
+        let failsafes = told(&[("SYSID_MYGCS", Some(3.0))]);
+        assert_eq!(state(&failsafes, "SYSID_MYGCS"), (CheckState::Passes, "3".to_owned()));
+        let failsafes = told(&[("SYSID_MYGCS", None), ("MAV_GCS_SYSID", Some(255.0))]);
+        assert_eq!(state(&failsafes, "MAV_GCS_SYSID"), (CheckState::Fails, "255".to_owned()));
+    }
+
+    #[test]
+    fn the_newest_value_counts_whoever_has_set_it() {
+        let failsafes = told(&[("FS_GCS_ENABLE", Some(5.0)), ("FS_GCS_ENABLE", Some(0.0))]);
+        assert_eq!(state(&failsafes, "FS_GCS_ENABLE"), (CheckState::Fails, "0".to_owned()));
+    }
+
+    #[test]
+    fn after_a_silence_nothing_is_known_any_more() {
+        let mut failsafes = told(&[("FS_GCS_ENABLE", Some(5.0))]);
+        failsafes.hear(&MavEvent::HeartbeatRegained, dialect("ArduPilot"));
+        assert_eq!(state(&failsafes, "FS_GCS_ENABLE").0, CheckState::Waits);
+    }
+
+    #[test]
+    fn the_parameter_files_have_what_is_asked_for() {
+        let settings = |text: &str, name: usize| -> BTreeMap<String, f64> {
+            let lines = text.lines().filter(|line| !line.starts_with('#'));
+            let read = |line: &str| {
+                let words: Vec<_> = line.split([',', '\t']).collect();
+                (words[name].to_owned(), words[name + 1].parse().unwrap())
+            };
+            lines.map(read).collect()
+        };
+        let asked = |make: &str| -> BTreeMap<String, f64> {
+            dialect(make).safe_settings(1).into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+        };
+        let arducopter = settings(include_str!("../../parameters/arducopter.param"), 0);
+        assert_eq!(arducopter, asked("ArduPilot"));
+        // Names that only old releases of PX4 have would be complained of.
+        let px4 = settings(include_str!("../../parameters/px4.params"), 2);
+        assert_eq!(px4.keys().collect::<Vec<_>>(), ["BAT1_SOURCE", "COM_OBL_RC_ACT", "COM_OF_LOSS_T"]);
+        assert!(px4.iter().all(|(name, value)| asked("PX4")[name] == *value));
+    }
+}

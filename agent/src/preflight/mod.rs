@@ -20,6 +20,7 @@ use self::{
 };
 use crate::config::AgentConfig;
 use crate::neighbours::Neighbour;
+use crate::pipeline::headroom::Look;
 use crate::positioning::Estimate;
 use crate::report::Report;
 
@@ -35,14 +36,6 @@ const FAULTS_LAST: Duration = Duration::from_secs(1);
 const LAYER_M: f64 = 0.2;
 /// What the autopilot wrote longer ago has nothing to do with its present checks.
 const WRITTEN_WITHIN: Duration = Duration::from_secs(60);
-
-/// The newest look of the vehicle's sensor, on the ground too.
-#[derive(Clone, Copy, Debug)]
-pub struct Look {
-    pub stamp: Duration,
-    /// To what is above, m; none if nothing is in range.
-    pub up_m: Option<f64>,
-}
 
 /// All that the checks are made of.
 #[derive(Debug)]

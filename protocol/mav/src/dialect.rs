@@ -75,6 +75,15 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
     /// The parameters on which hangs what becomes of a vehicle that loses its companion or its energy.
     fn failsafes(&self) -> &'static [Failsafe];
 
+    /// Safe values of all these parameters, for a companion of this system id.
+    fn safe_settings(&self, system_id: u8) -> Vec<(&'static str, f64)> {
+        let of_one = |failsafe: &Failsafe| {
+            let value = (failsafe.setting)(system_id);
+            failsafe.parameters.iter().map(move |name| (*name, value))
+        };
+        self.failsafes().iter().flat_map(of_one).collect()
+    }
+
     /// The message that gives a command; see [`Dialect::take_off`] for `home_height_m`.
     ///
     /// # Errors

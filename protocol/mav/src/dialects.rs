@@ -11,6 +11,9 @@ use crate::failsafe::Failsafe;
 /// All makes of autopilot that can be commanded.
 pub static DIALECTS: [&dyn Dialect; 2] = [&px4::Px4, &ardupilot::ArduPilot];
 
+/// ArduPilot's dialect, for who starts one.
+pub static ARDUPILOT: &dyn Dialect = &ardupilot::ArduPilot;
+
 /// The dialect of an autopilot as long as none of [`DIALECTS`] is recognised.
 pub(crate) static UNKNOWN: &dyn Dialect = &Unknown;
 

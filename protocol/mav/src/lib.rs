@@ -49,7 +49,7 @@ mod telemetry;
 pub use command::{Command, CommandResult};
 pub use companion::{Companion, CompanionConfig};
 pub use dialect::Dialect;
-pub use dialects::{DIALECTS, px4};
+pub use dialects::{ARDUPILOT, DIALECTS, px4};
 pub use endpoint::{
     AutopilotCommand, Endpoint, EndpointConfig, Parameter, ParameterError, ParameterTable, Request, Ticket,
     VehicleState,
