@@ -194,6 +194,7 @@ impl Control {
             others: &self.others,
             landed_at: self.landed_at,
             is_taking_off: self.flight.is_taking_off(),
+            is_flown: self.flight.is_committed(),
             has_somewhere_to_fly: self.guidance.has_somewhere_to_fly(),
         }));
         if let (true, Some(motion)) = (self.is_airborne(), estimate.motion) {

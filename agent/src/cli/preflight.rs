@@ -120,7 +120,8 @@ impl Vehicle {
         }
         control.observe(now);
         let bytes = control.take_mavlink();
-        // To an autopilot in flight, heartbeats that begin here, and then end, are the loss of its ground station.
+        // To an autopilot in flight, heartbeats that begin here, and then end, are the loss of its ground
+        // station.
         if self.speaks_first || control.may_be_spoken_to() {
             self.autopilot.send(&bytes);
         }

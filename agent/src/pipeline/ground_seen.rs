@@ -1,4 +1,5 @@
-//! Ground seen: where the range finder that looks down has seen the ground, and whether something else is below now.
+//! Ground seen: where the range finder that looks down has seen the ground, and whether something else is
+//! below now.
 
 use std::collections::VecDeque;
 

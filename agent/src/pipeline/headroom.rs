@@ -1,5 +1,5 @@
-//! Headroom: a vehicle climbs and sinks no faster than it can stop below and above what its range finders see. The
-//! lidar sees neither a roof nor a bridge's deck from below or above.
+//! Headroom: a vehicle climbs and sinks no faster than it can stop below and above what its range finders
+//! see. The lidar sees neither a roof nor a bridge's deck from below or above.
 
 use std::time::Duration;
 

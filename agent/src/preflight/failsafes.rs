@@ -1,15 +1,19 @@
-//! Failsafes: reads the autopilot's own failsafe parameters while it is on the ground, again and again, because others
-//! may change them, and refuses unsafe ones. Its dialect lists them.
+//! Failsafes: reads the autopilot's own failsafe parameters while it is on the ground, again and again,
+//! because others may change them, and refuses unsafe ones. Its dialect lists them.
 
 use std::time::Duration;
 
 use skein_mav::{Companion, Dialect, Failsafe, MavEvent, ParameterValue};
-use skein_wire::Check;
+use skein_wire::{Check, CheckState};
 
 use super::check;
 
 /// They are read this often, so that what a vehicle takes off with is never older.
 const READ_EVERY: Duration = Duration::from_secs(3);
+
+/// Names that the autopilot did not know are asked for again in one of so many rounds: it writes a complaint
+/// of each.
+const LACKING_EVERY: u32 = 10;
 
 /// What is known of the autopilot's failsafe parameters.
 #[derive(Debug)]
@@ -20,6 +24,7 @@ pub struct Failsafes {
     make: &'static str,
     listed: Vec<Listed>,
     read_again: Duration,
+    rounds: u32,
 }
 
 #[derive(Debug)]
@@ -38,7 +43,7 @@ enum Told {
 impl Failsafes {
     /// Nothing is known yet of an autopilot whose companion has this system id.
     pub fn new(system_id: u8) -> Self {
-        Self { system_id, make: "", listed: Vec::new(), read_again: Duration::ZERO }
+        Self { system_id, make: "", listed: Vec::new(), read_again: Duration::ZERO, rounds: 0 }
     }
 
     /// Asks for the parameters, if that is due.
@@ -52,7 +57,9 @@ impl Failsafes {
         }
         if now >= self.read_again {
             self.read_again = now + READ_EVERY;
-            let names = self.listed.iter().flat_map(|listed| listed.failsafe.parameters);
+            let asks_all = self.rounds.is_multiple_of(LACKING_EVERY);
+            self.rounds = self.rounds.wrapping_add(1);
+            let names = self.listed.iter().flat_map(|listed| listed.to_ask(asks_all, self.system_id));
             names.for_each(|name| companion.read_parameter(name));
         }
     }
@@ -80,7 +87,7 @@ impl Failsafes {
             |failsafe: &Failsafe| Listed { failsafe: *failsafe, told: vec![None; failsafe.parameters.len()] };
         self.make = dialect.name();
         self.listed = dialect.failsafes().iter().map(listed).collect();
-        self.read_again = Duration::ZERO;
+        (self.read_again, self.rounds) = (Duration::ZERO, 0);
     }
 
     /// A check of each parameter.
@@ -90,6 +97,14 @@ impl Failsafes {
 }
 
 impl Listed {
+    /// The names to ask for: those that the autopilot lacks only if `all` are, or if it must have one of
+    /// them.
+    fn to_ask(&self, all: bool, system_id: u8) -> impl Iterator<Item = &'static str> + '_ {
+        let all = all || self.check(system_id).state != CheckState::Passes;
+        let names = self.failsafe.parameters.iter().copied().zip(&self.told);
+        names.filter(move |(_, told)| all || **told != Some(Told::Missing)).map(|(name, _)| name)
+    }
+
     fn check(&self, system_id: u8) -> Check {
         let Self { failsafe, told } = self;
         let names = failsafe.parameters.iter().zip(told);
@@ -114,7 +129,6 @@ mod tests {
     use std::collections::BTreeMap;
 
     use skein_mav::DIALECTS;
-    use skein_wire::CheckState;
 
     use super::*;
 
@@ -156,6 +170,18 @@ mod tests {
         assert_eq!(state(&failsafes, "SYSID_MYGCS"), (CheckState::Passes, "3".to_owned()));
         let failsafes = told(&[("SYSID_MYGCS", None), ("MAV_GCS_SYSID", Some(255.0))]);
         assert_eq!(state(&failsafes, "MAV_GCS_SYSID"), (CheckState::Fails, "255".to_owned()));
+    }
+
+    #[test]
+    fn a_name_that_the_release_lacks_is_not_asked_for_every_time() {
+        let failsafes = told(&[("SYSID_MYGCS", None), ("MAV_GCS_SYSID", Some(3.0)), ("FS_GCS_ENABLE", None)]);
+        let asked = |all| {
+            let names = failsafes.listed.iter().flat_map(|listed| listed.to_ask(all, 3));
+            names.collect::<Vec<_>>()
+        };
+        assert!(asked(true).contains(&"SYSID_MYGCS") && !asked(false).contains(&"SYSID_MYGCS"));
+        assert!(asked(false).contains(&"MAV_GCS_SYSID"));
+        assert!(asked(false).contains(&"FS_GCS_ENABLE"), "it must have this one");
     }
 
     #[test]

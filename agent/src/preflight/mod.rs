@@ -1,5 +1,5 @@
-//! Preflight: every check before take-off, each with its value and what to do if it does not pass. A vehicle is ready
-//! when all pass. Another check is a function here, and its line in [`Situation::checks`].
+//! Preflight: every check before take-off, each with its value and what to do if it does not pass. A vehicle
+//! is ready when all pass. Another check is a function here, and its line in [`Situation::checks`].
 
 mod check;
 mod failsafes;
@@ -56,6 +56,8 @@ pub struct Situation<'a> {
     pub landed_at: Option<Vector3<f64>>,
     /// This agent has armed it, and it is not up yet.
     pub is_taking_off: bool,
+    /// This agent flies it, takes it off or lands it.
+    pub is_flown: bool,
     /// The limits on its motion do not contradict one another.
     pub has_somewhere_to_fly: bool,
 }
@@ -150,6 +152,7 @@ impl Situation<'_> {
             _ if was_ready && *armed && self.is_taking_off => passes(STAND, "takes off"),
             (Landed::Unknown, _) => waits(STAND, "not told yet whether it is on the ground", "wait"),
             (Landed::OnGround, false) => passes(STAND, "on the ground, disarmed"),
+            (Landed::OnGround, true) if self.is_flown => fails(STAND, FLIES, ""),
             (Landed::OnGround, true) => fails(STAND, "somebody else has armed it", "disarm it"),
             _ => fails(STAND, FLIES, ""),
         }
@@ -223,15 +226,16 @@ impl Situation<'_> {
             return fails(name, format!("{} may be above", other.node), "wait until it has gone");
         }
         let climbs_m = takeoff_height_m + envelope.hull_m + envelope.margin_m;
-        match self.fresh_look().and_then(|look| look.up_m) {
-            Some(up_m) if up_m < climbs_m => fails(
+        match self.fresh_look().map(|look| look.up_m) {
+            Some(Some(up_m)) if up_m < climbs_m => fails(
                 name,
                 format!("a roof {up_m:.1} m above it"),
                 format!(
                     "it climbs to {takeoff_height_m} m: move it under open sky, or lower `takeoff_height_m`"
                 ),
             ),
-            _ => passes(name, "clear"),
+            Some(_) => passes(name, "clear"),
+            None => passes(name, "nobody else is above; nothing looks up"),
         }
     }
 
@@ -293,4 +297,177 @@ impl Situation<'_> {
 /// Latitude and longitude, degrees, and height, metres.
 pub fn degrees(datum: &Datum) -> [f64; 3] {
     [datum.latitude_rad.to_degrees(), datum.longitude_rad.to_degrees(), datum.height_m]
+}
+
+#[cfg(all(test, feature = "zenoh"))]
+#[allow(clippy::unwrap_used)] // A test fails by panicking.
+mod tests {
+    use nalgebra::UnitQuaternion;
+    use skein_mav::Battery;
+    use skein_planning::airspace::Airspace;
+
+    use super::*;
+    use crate::config_file::Config;
+    use crate::positioning::{Attitude, Motion};
+
+    const NOW: Duration = Duration::from_secs(50);
+
+    /// All that is told by a vehicle that is ready, or is not.
+    struct Told {
+        config: AgentConfig,
+        telemetry: Telemetry,
+        estimate: Estimate,
+        look: Option<Look>,
+        keep_out: Option<KeepOut>,
+        failsafes: Failsafes,
+        others: Others,
+        is_taking_off: bool,
+        is_flown: bool,
+        has_somewhere_to_fly: bool,
+    }
+
+    impl Told {
+        fn ready() -> Self {
+            let motion = Motion::new(Vector3::zeros(), Vector3::zeros(), [0.05, 0.1]);
+            let attitude = Attitude {
+                body_to_world: UnitQuaternion::identity(),
+                rate: Vector3::zeros(),
+                covariance: nalgebra::Matrix3::identity(),
+            };
+            let battery = Battery { fraction: 0.9, voltage_v: 15.0 };
+            Self {
+                config: Config::example().unwrap().agent,
+                telemetry: Telemetry {
+                    last_heartbeat: Some(NOW),
+                    connected: true,
+                    landed: Landed::OnGround,
+                    home: Some(Vector3::zeros()),
+                    ready_to_arm: true,
+                    battery: Some(Stamped { stamp: NOW, value: battery }),
+                    ..Telemetry::default()
+                },
+                estimate: Estimate {
+                    motion: Some(Stamped { stamp: NOW, value: motion }),
+                    attitude: Some(Stamped { stamp: NOW, value: attitude }),
+                },
+                look: Some(Look { stamp: NOW, up_m: None, down_m: None }),
+                keep_out: None,
+                failsafes: Failsafes::new(1),
+                others: Others::new(),
+                is_taking_off: false,
+                is_flown: false,
+                has_somewhere_to_fly: true,
+            }
+        }
+
+        fn update(&self, preflight: &mut Preflight, now: Duration) -> Option<Report> {
+            preflight.update(&Situation {
+                now,
+                config: &self.config,
+                telemetry: &self.telemetry,
+                make: "PX4",
+                estimate: self.estimate,
+                failsafes: &self.failsafes,
+                look: self.look,
+                keep_out: self.keep_out.as_ref(),
+                neighbours: &[],
+                others: &self.others,
+                landed_at: None,
+                is_taking_off: self.is_taking_off,
+                is_flown: self.is_flown,
+                has_somewhere_to_fly: self.has_somewhere_to_fly,
+            })
+        }
+
+        /// Why it is not ready.
+        fn why(&self) -> String {
+            let mut preflight = Preflight::default();
+            self.update(&mut preflight, NOW);
+            preflight.why()
+        }
+    }
+
+    /// The zone that begins 2 m above the origin.
+    fn zone_above() -> KeepOut {
+        let zone = "[[no_fly]]\ncentre_m = [0.0, 0.0]\nradius_m = 3.0\nfloor_m = 2.0\nceiling_m = 6.0\n";
+        let table: crate::airspace_table::AirspaceTable = toml::from_str(zone).unwrap();
+        let airspace: Airspace = table.check().unwrap();
+        KeepOut::new(airspace, 1.0, 1.0)
+    }
+
+    #[test]
+    fn each_check_that_does_not_pass_is_named_with_what_was_found() {
+        type Change = fn(&mut Told);
+        let cases: [(Change, &str); 15] = [
+            (|_| {}, ""),
+            (|told| told.telemetry.last_heartbeat = None, "autopilot: no autopilot heard"),
+            (|told| told.telemetry.connected = false, "autopilot: silent"),
+            (|told| told.estimate.motion = None, "position: no position yet"),
+            (|told| told.estimate.attitude = None, "position: position or attitude is old"),
+            (|told| told.look = None, "lidar: no scan"),
+            (|told| told.look.as_mut().unwrap().stamp -= KNOWN_WITHIN, "lidar: no scan any more"),
+            (|told| told.look.as_mut().unwrap().up_m = Some(2.9), "overhead: a roof 2.9 m above it"),
+            (|told| told.keep_out = Some(zone_above()), "airspace: closed from 2.2 m above the start"),
+            (|told| told.telemetry.battery = None, "battery: no battery told"),
+            (|told| told.telemetry.battery.as_mut().unwrap().value.fraction = 0.29, "battery: 29 %"),
+            (|told| told.has_somewhere_to_fly = false, "limits: the limits"),
+            (|told| told.telemetry.ready_to_arm = false, "arming: the autopilot's own checks fail"),
+            (|told| told.telemetry.armed = true, "stand: somebody else has armed it"),
+            (|told| told.telemetry.landed = Landed::InAir, "stand: it flies"),
+        ];
+        for (change, fault) in cases {
+            let mut told = Told::ready();
+            change(&mut told);
+            let why = told.why();
+            assert!(why.starts_with(fault) && why.is_empty() == fault.is_empty(), "{why:?}: not {fault:?}");
+        }
+        let mut high = Told::ready();
+        high.look.as_mut().unwrap().up_m = Some(3.1);
+        assert_eq!(high.why(), "", "it climbs to 2.5 m, and needs half a metre above that");
+    }
+
+    #[test]
+    fn of_an_autopilot_that_is_not_heard_nothing_else_is_told() {
+        let mut told = Told::ready();
+        (told.telemetry.last_heartbeat, told.estimate.motion, told.telemetry.battery) = (None, None, None);
+        let why = told.why();
+        assert!(why.starts_with("autopilot: ") && !why.contains(';'), "{why}");
+    }
+
+    #[test]
+    fn a_fault_is_told_at_once_and_others_once_they_last() {
+        let (mut preflight, mut told) = (Preflight::default(), Told::ready());
+        assert_eq!(told.update(&mut preflight, NOW), Some(Report::Ready));
+        told.look = Some(Look { stamp: NOW, up_m: Some(1.0), down_m: None });
+        let report = told.update(&mut preflight, NOW + CHECK_EVERY);
+        assert!(matches!(report, Some(Report::Unready(why)) if why.starts_with("overhead: ")));
+        told.has_somewhere_to_fly = false;
+        assert_eq!(told.update(&mut preflight, NOW + 2 * CHECK_EVERY), None);
+        let (mut reports, mut now) = (Vec::new(), NOW + 3 * CHECK_EVERY);
+        while now < NOW + Duration::from_secs(4) {
+            told.look = Some(Look { stamp: now, up_m: Some(1.0), down_m: None });
+            for stamp in [
+                &mut told.estimate.motion.as_mut().unwrap().stamp,
+                &mut told.estimate.attitude.as_mut().unwrap().stamp,
+            ] {
+                *stamp = now;
+            }
+            reports.extend(told.update(&mut preflight, now));
+            now += CHECK_EVERY;
+        }
+        assert!(matches!(&*reports, [Report::Unready(why)] if why.contains("limits: ")), "{reports:?}");
+    }
+
+    #[test]
+    fn a_vehicle_that_was_ready_takes_off_whatever_is_above_it_then() {
+        let (mut preflight, mut told) = (Preflight::default(), Told::ready());
+        told.update(&mut preflight, NOW);
+        (told.telemetry.armed, told.is_taking_off, told.is_flown) = (true, true, true);
+        told.telemetry.landed = Landed::TakingOff;
+        told.look.as_mut().unwrap().up_m = Some(1.0);
+        assert_eq!(told.update(&mut preflight, NOW), None);
+        (told.telemetry.landed, told.is_taking_off) = (Landed::InAir, false);
+        assert!(matches!(told.update(&mut preflight, NOW), Some(Report::Unready(_))));
+        assert_eq!(preflight.complaint(), None, "it flies");
+    }
 }

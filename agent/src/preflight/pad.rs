@@ -1,4 +1,5 @@
-//! Where the vehicle stands: on its own pad and on nobody else's, per axis and in height, and inside its fence.
+//! Where the vehicle stands: on its own pad and on nobody else's, per axis and in height, and inside its
+//! fence.
 
 use std::collections::BTreeMap;
 use std::time::Duration;

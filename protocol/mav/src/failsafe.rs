@@ -1,4 +1,5 @@
-//! Parameters of an autopilot on which hangs what becomes of a vehicle that loses its companion or its energy.
+//! Parameters of an autopilot on which hangs what becomes of a vehicle that loses its companion or its
+//! energy.
 
 use crate::parameter::ParameterValue;
 
@@ -12,7 +13,8 @@ pub struct Failsafe {
     /// A safe value for the companion of this system id.
     pub setting: fn(u8) -> f64,
     pub(crate) is_safe: fn(f64, u8) -> bool,
-    /// Whether an autopilot that tells none of these names is unsafe. Most parameters come and go with releases.
+    /// Whether an autopilot that tells none of these names is unsafe. Most parameters come and go with
+    /// releases.
     pub(crate) required: bool,
 }
 

@@ -21,8 +21,8 @@ fn alone() -> Scenario {
     Scenario::from_toml(ALONE, "scenario.toml", None, 1).unwrap()
 }
 
-/// Looks for so long on; whether the first vehicle flies then, what it says it waits for, and what it last said
-/// keeps it from being ready.
+/// Looks for so long on; whether the first vehicle flies then, what it says it waits for, and what it last
+/// said keeps it from being ready.
 fn after(lockstep: &mut Lockstep, seconds: f64) -> (bool, String, Option<String>) {
     let end = lockstep.swarm.now() + Duration::from_secs_f64(seconds);
     let mut why = None;

@@ -16,7 +16,8 @@ pub struct Readiness {
     pub home: [f64; 3],
     /// The world's origin as this vehicle is configured: latitude and longitude, degrees, and height, metres.
     pub datum: [f64; 3],
-    /// All checks, in the order in which people look at them; only the first [`Readiness::MAX_CHECKS`] travel.
+    /// All checks, in the order in which people look at them; only the first [`Readiness::MAX_CHECKS`]
+    /// travel.
     pub checks: Vec<Check>,
 }
 
