@@ -71,8 +71,7 @@ impl Pad<'_> {
 
     fn off(&self) -> [bool; 3] {
         let (offset, tolerance) = (self.motion.position - self.home, self.tolerance());
-        // What is no number is off.
-        [0, 1, 2].map(|axis| !(offset[axis].abs() <= tolerance[axis]))
+        [0, 1, 2].map(|axis| offset[axis].abs() > tolerance[axis])
     }
 
     fn is_at(&self, place: &Vector3<f64>) -> bool {

@@ -70,9 +70,11 @@ fn a_height_that_is_no_number_is_never_sent() {
     }
 }
 
-/// What an autopilot of this make may not have: of each parameter some safe and some unsafe values for a companion whose
-/// system id is 3, and whether an autopilot may lack it.
-fn judge_failsafes(autopilot: MavAutopilot, cases: &[(&[&str], &[f32], &[f32], bool)]) {
+/// Names of a parameter, some safe and some unsafe values of it, and whether an autopilot may lack it.
+type Case = (&'static [&'static str], &'static [f32], &'static [f32], bool);
+
+/// Judges all failsafes of this make, for a companion whose system id is 3.
+fn judge_failsafes(autopilot: MavAutopilot, cases: &[Case]) {
     let heartbeat = heartbeat(autopilot);
     let dialect = DIALECTS.into_iter().find(|dialect| dialect.is_spoken_by(&heartbeat)).unwrap();
     let names: Vec<_> = dialect.failsafes().iter().map(|failsafe| failsafe.parameters).collect();
