@@ -8,18 +8,19 @@ use nalgebra::Vector3;
 use skein_dbp::NodeName;
 use skein_mav::{Companion, CompanionConfig, Landed, MavEvent, SetPoint, Station, Telemetry, Text};
 use skein_planning::map::MapError;
-use skein_wire::{Limits, Scan, State};
+use skein_wire::{Limits, Readiness, Scan, State};
 
 use crate::{
     config::AgentConfig,
     energy::{Energy, known_charge},
-    failsafes::Failsafes,
     flight::{Flight, FlightPhase},
     instruction::Instruction,
     neighbours::{Neighbour, Neighbours},
     pipeline::{
         allowed::Allowed,
+        ground_seen::GroundSeen,
         guidance::Guidance,
+        headroom::{Headroom, Look},
         layers::Layers,
         perception::{Perception, Pose},
         set_point::{FRESH_FOR, KeepAlive, keep_alive, oldest_age},
@@ -27,9 +28,10 @@ use crate::{
         touchdown::Descent,
     },
     positioning::{Estimate, Motion, Positioning},
+    preflight::{Failsafes, Others, Preflight, Situation, degrees},
     report::Report,
     scripts::Circumstances,
-    watches::{Checks, LOCATED_WITHIN, Watches},
+    watches::Watches,
 };
 
 /// What set-points were made from: the keep-alive rule, observed.
@@ -53,7 +55,14 @@ pub struct Control {
     station: Station,
     /// Lines that the autopilot wrote, until they are taken.
     texts: Vec<Text>,
+    preflight: Preflight,
     failsafes: Failsafes,
+    /// What others say of their checks.
+    others: Others,
+    look: Option<Look>,
+    ground_seen: GroundSeen,
+    /// Where the vehicle landed last.
+    landed_at: Option<Vector3<f64>>,
     flight: Flight,
     positioning: Box<dyn Positioning>,
     perception: Perception,
@@ -85,7 +94,12 @@ impl Control {
             }),
             station: Station::of(config.system_id),
             texts: Vec::new(),
-            failsafes: Failsafes::default(),
+            preflight: Preflight::default(),
+            failsafes: Failsafes::new(config.system_id),
+            others: Others::new(),
+            look: None,
+            ground_seen: GroundSeen::default(),
+            landed_at: None,
             flight: Flight::new(config.takeoff_height_m),
             positioning,
             perception: Perception::of_mission(&config)?,
@@ -133,11 +147,14 @@ impl Control {
         if now.saturating_sub(scan.stamp) > FRESH_FOR {
             return;
         }
+        let [up_m, down_m] = [scan.up_m, scan.down_m].map(|range| range.map(f64::from));
+        self.look = Some(Look { stamp: scan.stamp, up_m, down_m });
         let Some((position, attitude)) = self.estimate().pose_at(scan.stamp) else { return };
         // From the ground there is little to see, and much of it is the ground.
         if !self.is_airborne() {
             return;
         }
+        self.ground_seen.look(&position, self.config.home[2], down_m);
         let others: Vec<_> = self.neighbours.at(now).map(|neighbour| neighbour.position()).collect();
         if !self.perception.take_in(scan, &Pose { position, attitude }, &others) {
             return;
@@ -152,6 +169,11 @@ impl Control {
             self.neighbours.hear(now, state);
         }
         self.neighbours.look_around(now);
+    }
+
+    /// Takes in what other vehicles say of their checks before take-off.
+    pub fn hear_readiness(&mut self, now: Duration, readiness: Vec<Readiness>) {
+        self.others.extend(readiness.into_iter().map(|said| (said.node.clone(), (now, said))));
     }
 
     /// The agent has not run for `pause`: if it flew the vehicle, it does not any more.
@@ -173,7 +195,7 @@ impl Control {
     }
 
     fn follow_autopilot(&mut self, now: Duration, reports: &mut Vec<Report>) {
-        self.failsafes.ask(&mut self.companion);
+        self.failsafes.ask(now, &mut self.companion);
         while let Some(event) = self.companion.poll_event() {
             self.failsafes.hear(&event, self.companion.dialect());
             reports.extend(self.flight.hear(now, &event, &mut self.companion));
@@ -184,25 +206,37 @@ impl Control {
             }
         }
         let position = self.motion().map(|motion| motion.position);
-        reports.extend(self.flight.follow(now, position, &mut self.companion));
+        let report = self.flight.follow(now, position, self.preflight.is_ready(), &mut self.companion);
+        if report == Some(Report::Landed) {
+            self.landed_at = position;
+        }
+        reports.extend(report);
     }
 
     fn watch(&mut self, now: Duration, reports: &mut Vec<Report>) {
         let charge = known_charge(now, self.companion.telemetry().battery);
         self.watch_energy(now, charge, reports);
-        let AgentConfig { envelope, fence, home, .. } = &*self.config;
+        let fence = &self.config.fence;
         let (telemetry, estimate) = (self.companion.telemetry(), self.estimate());
-        let (around, home) = (self.neighbours.around(), Vector3::from(*home));
-        let checks = Checks {
+        let around = self.neighbours.around();
+        reports.extend(self.preflight.update(&Situation {
+            now,
+            config: &self.config,
+            telemetry,
+            make: self.companion.dialect().name(),
+            estimate,
+            failsafes: &self.failsafes,
+            look: self.look,
+            keep_out: self.perception.map().keep_out(),
+            neighbours: around,
+            others: &self.others,
+            landed_at: self.landed_at,
             charge,
-            is_affordable: self.energy.reason_to_stay().is_none(),
-            is_located: estimate.is_fresh(now, LOCATED_WITHIN),
-            has_sound_failsafes: self.failsafes.are_sound(),
-            is_clear_overhead: !around.iter().any(|neighbour| neighbour.may_be_over(&home, envelope)),
+            shortfall: self.energy.reason_to_stay(),
             is_taking_off: self.flight.is_taking_off(),
+            is_flown: self.flight.is_committed(),
             has_somewhere_to_fly: self.guidance.has_somewhere_to_fly(),
-        };
-        reports.extend(self.watches.preflight(telemetry, checks));
+        }));
         if let (true, Some(motion)) = (self.is_airborne(), estimate.motion) {
             let position = motion.value.position;
             reports.extend(self.watches.fence(position, fence));
@@ -313,6 +347,7 @@ impl Control {
                 fence: &self.config.fence,
                 map: self.perception.map(),
                 neighbours: self.neighbours.around(),
+                ground_seen: &self.ground_seen,
             };
             let spot = self.guidance.course.landing_place();
             let spot = spot.map(|place| place.xy().push(motion.position.z));
@@ -326,6 +361,9 @@ impl Control {
 
     /// Ends a tick: sends a set-point, if one may be sent.
     pub fn steer(&mut self, now: Duration) {
+        let look = self.look.filter(|look| now.saturating_sub(look.stamp) <= FRESH_FOR);
+        self.guidance.headroom =
+            look.map_or(Headroom::OPEN, |look| Headroom::of(&look, &self.config.envelope));
         self.settle(now);
         if !self.flight.sends_set_points() {
             self.guidance.steering.rest();
@@ -403,6 +441,19 @@ impl Control {
         telemetry.armed && telemetry.landed != Landed::OnGround
     }
 
+    /// The vehicle's node name.
+    #[must_use]
+    pub fn name(&self) -> &NodeName {
+        &self.name
+    }
+
+    /// Whether an autopilot is heard that does not fly.
+    #[must_use]
+    pub fn may_be_spoken_to(&self) -> bool {
+        let telemetry = self.companion.telemetry();
+        telemetry.connected && !telemetry.armed
+    }
+
     #[must_use]
     pub fn flight(&self) -> &Flight {
         &self.flight
@@ -419,10 +470,22 @@ impl Control {
         self.set_points
     }
 
-    /// What makes the autopilot's own failsafes unsafe, or the mission too long for the battery, if something does.
+    /// The checks before take-off, as others should know them.
     #[must_use]
-    pub fn complaint(&self) -> Option<&str> {
-        self.failsafes.complaint().or_else(|| self.energy.reason_to_stay())
+    pub fn readiness(&self) -> Readiness {
+        Readiness {
+            node: self.name.clone(),
+            incarnation: self.config.incarnation,
+            home: self.config.home,
+            datum: degrees(&self.config.datum),
+            checks: self.preflight.checks().to_vec(),
+        }
+    }
+
+    /// Why a vehicle on the ground is not ready to take off.
+    #[must_use]
+    pub fn complaint(&self) -> Option<String> {
+        self.preflight.complaint()
     }
 
     /// Flight mode as the autopilot tells it.

@@ -172,6 +172,7 @@ impl AgentCore {
     fn hear(&mut self, now: Duration, link: &mut dyn Link) {
         let states = self.mission.receive(now, link);
         self.control.hear(now, states);
+        self.control.hear_readiness(now, self.mission.take_readiness());
     }
 
     /// A navigation cycle: looks along the path, and tells the others where this vehicle is.
@@ -183,6 +184,7 @@ impl AgentCore {
             self.mission.tell_scripts(&circumstances);
         }
         self.mission.catch_up(now);
+        self.mission.put_readiness(now, self.control.readiness(), link);
         if let Some(state) = self.control.state(now) {
             self.mission.put_state(state, self.control.complaint(), link);
         }

@@ -310,11 +310,12 @@ impl Flight {
     }
 
     /// Moves on to the next phase when the telemetry says so; returns what the b-threads should hear of it.
-    /// `position` is the vehicle's, m ENU.
+    /// `position` is the vehicle's, m ENU; `is_ready` tells whether it passes the checks before take-off.
     pub fn follow(
         &mut self,
         now: Duration,
         position: Option<Vector3<f64>>,
+        is_ready: bool,
         companion: &mut Companion,
     ) -> Option<Report> {
         let telemetry = companion.telemetry();
@@ -341,6 +342,14 @@ impl Flight {
                 if let Some((command, _)) = self.rejected
                     && now >= self.launch_again =>
             {
+                if !is_ready {
+                    return self.command_failed(
+                        now,
+                        command,
+                        "rejected for now, and not ready any more",
+                        companion,
+                    );
+                }
                 self.launch_again = now + LAUNCH_AGAIN;
                 companion.command(now, command);
             }
@@ -413,6 +422,7 @@ mod tests {
         reader: FrameReader,
         now: Duration,
         height_m: f64,
+        is_ready: bool,
         reports: Vec<Report>,
     }
 
@@ -426,6 +436,7 @@ mod tests {
                 reader: FrameReader::default(),
                 now: Duration::ZERO,
                 height_m: 0.0,
+                is_ready: true,
                 reports: Vec::new(),
             };
             let place = datum.place();
@@ -475,7 +486,7 @@ mod tests {
                 self.reports.extend(self.flight.hear(self.now, &event, &mut self.companion));
             }
             let position = Some(Vector3::z() * self.height_m);
-            self.reports.extend(self.flight.follow(self.now, position, &mut self.companion));
+            self.reports.extend(self.flight.follow(self.now, position, self.is_ready, &mut self.companion));
             self.reader.push(&self.companion.take_output());
             std::iter::from_fn(|| self.reader.next_frame())
                 .filter_map(|frame| match frame.message {
@@ -515,6 +526,12 @@ mod tests {
             matches!(&stand.reports[..], [Report::CommandFailed(why)] if why.starts_with("Arm: rejected"))
         );
         assert_eq!(stand.goes_on(5000), []);
+        // Nor is it given to a vehicle that is not ready any more.
+        stand.flight.carry_out(stand.now, Instruction::TakeOff, &mut stand.companion);
+        stand.acks(arm, MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
+        stand.is_ready = false;
+        assert_eq!((stand.goes_on(1000), stand.flight.phase()), (vec![], FlightPhase::Grounded));
+        stand.is_ready = true;
         // Once accepted, it climbs.
         stand.flight.carry_out(stand.now, Instruction::TakeOff, &mut stand.companion);
         stand.acks(arm, MavResult::MAV_RESULT_TEMPORARILY_REJECTED);

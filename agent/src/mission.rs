@@ -12,7 +12,9 @@ use skein_wire::event::{
     self, Advance, Complete, Declared as _, Enter, Failed, Goto, Hold, Land, Load, OrderTaken, Return,
     ScriptNews, Takeoff, Unload, What,
 };
-use skein_wire::{Fleet, KeptScript, Limits, Link, MissionState, NodeLink, State, Store, joint_roster};
+use skein_wire::{
+    Fleet, KeptScript, Limits, Link, MissionState, NodeLink, Readiness, State, Store, joint_roster,
+};
 
 use crate::{
     agent_error::AgentError,
@@ -31,6 +33,8 @@ use crate::{
 /// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for
 /// between two ticks. `skein-agent verify --script` looks at all.
 const STATES_TRIED: usize = 500;
+/// The checks before take-off are told this often, for those who have come since.
+const READINESS_PERIOD: Duration = Duration::from_secs(1);
 
 /// The outcome of a vehicle's mission.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,6 +62,7 @@ pub struct Mission {
     /// The revision of the program that these are of.
     limits_of: Option<u64>,
     fault: Option<String>,
+    told_readiness: Option<(Duration, Readiness)>,
 }
 
 impl Mission {
@@ -98,6 +103,7 @@ impl Mission {
             limits: Limits::default(),
             limits_of: None,
             fault: None,
+            told_readiness: None,
             name,
             me,
             config,
@@ -126,6 +132,22 @@ impl Mission {
         self.node.take_states()
     }
 
+    /// What vehicles have said of their checks before take-off since the last call.
+    pub fn take_readiness(&mut self) -> Vec<Readiness> {
+        self.node.take_readiness()
+    }
+
+    /// Tells the others of this vehicle's checks before take-off, if that is due: every second, and when one has
+    /// changed its state.
+    pub fn put_readiness(&mut self, now: Duration, readiness: Readiness, link: &mut dyn Link) {
+        let states = |said: &Readiness| said.checks.iter().map(|check| check.state).collect::<Vec<_>>();
+        let told = self.told_readiness.as_ref();
+        if told.is_none_or(|(at, told)| now >= *at + READINESS_PERIOD || states(told) != states(&readiness)) {
+            self.node.put_readiness(&readiness, link);
+            self.told_readiness = Some((now, readiness));
+        }
+    }
+
     /// Says to other nodes what is due.
     pub fn send(&mut self, link: &mut dyn Link) {
         self.node.send(link);
@@ -137,7 +159,7 @@ impl Mission {
     }
 
     /// Tells the others where this vehicle is and how far its task has come. `state` is that of its body.
-    pub fn put_state(&mut self, state: State, complaint: Option<&str>, link: &mut dyn Link) {
+    pub fn put_state(&mut self, state: State, complaint: Option<String>, link: &mut dyn Link) {
         let state = State {
             incarnation: self.config.incarnation,
             task: self.task.clone(),
@@ -297,16 +319,22 @@ impl Mission {
         Ok(is_member && !node.starts_with("uav/") && NodeName::new(node).is_ok_and(may_request))
     }
 
-    /// The b-threads that keep this vehicle from moving on or taking off; `complaint` is control's.
-    pub fn waiting_for(&self, complaint: Option<&str>) -> String {
-        if let Some(fault) = self.fault.as_deref().or(complaint) {
-            return fault.to_owned();
+    /// The b-threads that keep this vehicle from moving on or taking off; `complaint` is control's, why it is not ready.
+    pub fn waiting_for(&self, complaint: Option<String>) -> String {
+        if let Some(fault) = &self.fault {
+            return fault.clone();
         }
         if let Some(contradiction) = self.limits.contradiction() {
             return contradiction;
         }
         let question = self.me.any::<(Advance, Enter, Takeoff)>();
         let explanation = self.node.node().explain(question).local;
+        // One whose mission is over needs not be ready, unless somebody wants it to fly again.
+        if let Some(complaint) =
+            complaint.filter(|_| self.outcome.is_none() || !explanation.requested.is_empty())
+        {
+            return complaint;
+        }
         if explanation.requested.is_empty() {
             return String::new();
         }

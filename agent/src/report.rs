@@ -20,8 +20,8 @@ use crate::me::Me;
 pub enum Report {
     /// The checks before take-off pass.
     Ready,
-    /// They do not pass any more.
-    Unready,
+    /// They do not pass, and this is why; told anew when others do not.
+    Unready(String),
     /// The agent flies the vehicle, off the ground.
     Airborne,
     Landed,
@@ -76,7 +76,7 @@ impl Report {
     pub fn into_event(self, me: &Me) -> Event {
         match self {
             Self::Ready => me.event(Ready),
-            Self::Unready => me.event(Unready),
+            Self::Unready(why) => me.event(Unready { why: why.into() }),
             Self::Airborne => me.event(Airborne),
             Self::Landed => me.event(Landed),
             Self::FoundAirborne => me.event(FoundAirborne),

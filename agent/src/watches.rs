@@ -1,18 +1,11 @@
 //! Watches: conditions of the vehicle that are reported at the moment they change.
 
-use std::time::Duration;
-
 use nalgebra::Vector3;
-use skein_mav::{Landed, Telemetry};
 
 use crate::config::Fence;
 use crate::neighbours::Neighbour;
 use crate::report::Report;
 
-/// A vehicle that takes off knows where it is from no longer ago than this.
-pub const LOCATED_WITHIN: Duration = Duration::from_millis(500);
-/// Least energy to take off with.
-const BATTERY_TO_START: f64 = 0.3;
 /// Energy at which only landing is left.
 const BATTERY_EMERGENCY: f64 = 0.08;
 /// Centre-to-centre distance at which a neighbour is too close, m; the safety filter keeps more.
@@ -40,28 +33,9 @@ impl Edge {
     }
 }
 
-/// The checks before take-off that the telemetry of the autopilot does not answer.
-#[derive(Clone, Copy, Debug)]
-pub struct Checks {
-    /// The vehicle's position and attitude are known, within [`LOCATED_WITHIN`].
-    pub is_located: bool,
-    /// Of the battery, 0 to 1, as long as it is known.
-    pub charge: Option<f64>,
-    /// The battery holds the mission.
-    pub is_affordable: bool,
-    pub has_sound_failsafes: bool,
-    /// Nobody flies where it would climb.
-    pub is_clear_overhead: bool,
-    /// This agent has armed it.
-    pub is_taking_off: bool,
-    /// The limits on its motion do not contradict one another.
-    pub has_somewhere_to_fly: bool,
-}
-
 /// Everything that is watched on one vehicle.
 #[derive(Debug, Default)]
 pub struct Watches {
-    ready: Edge,
     low: Edge,
     critical: Edge,
     outside: Edge,
@@ -69,23 +43,6 @@ pub struct Watches {
 }
 
 impl Watches {
-    /// Preflight: the autopilot is heard, ready to arm and charged, and the other checks pass. A vehicle that
-    /// somebody else has armed is not ready.
-    pub fn preflight(&mut self, telemetry: &Telemetry, checks: Checks) -> Option<Report> {
-        let charged = checks.charge.is_some_and(|charge| charge >= BATTERY_TO_START);
-        let ready = telemetry.connected
-            && telemetry.ready_to_arm
-            && telemetry.home.is_some()
-            && (telemetry.landed == Landed::OnGround && !telemetry.armed && checks.is_clear_overhead
-                || self.ready.0 && telemetry.armed && checks.is_taking_off)
-            && charged
-            && checks.is_affordable
-            && checks.is_located
-            && checks.has_somewhere_to_fly
-            && checks.has_sound_failsafes;
-        self.ready.turns(ready).map(|ready| if ready { Report::Ready } else { Report::Unready })
-    }
-
     /// Battery: low when there is a reason to return; critical by its charge, if that is known.
     pub fn battery(&mut self, charge: Option<f64>, why_low: Option<String>) -> Vec<Report> {
         let mut reports = Vec::new();

@@ -7,7 +7,7 @@ use skein_bp::catalogue::Whose;
 use skein_bp::{Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Board, Happened, Node, NodeConfig, NodeError, NodeName};
 use skein_wire::event::{Declared as _, Heard, Situation};
-use skein_wire::{Link, MissionState, NodeLink, State, Store, joint_roster};
+use skein_wire::{Link, MissionState, NodeLink, Readiness, State, Store, joint_roster};
 
 use crate::bthreads::{self, MissionOutcome, Watch};
 use crate::config::GroundConfig;
@@ -30,6 +30,7 @@ pub struct GroundCore {
     vehicles: Vec<NodeName>,
     now: Duration,
     roster: BTreeMap<NodeName, State>,
+    readiness: BTreeMap<NodeName, Readiness>,
     order_log: OrderLog,
     evidence: Evidence,
     selections: Vec<Happened>,
@@ -80,6 +81,7 @@ impl GroundCore {
             vehicles: config.vehicles,
             now: Duration::ZERO,
             roster: BTreeMap::new(),
+            readiness: BTreeMap::new(),
             order_log: OrderLog::default(),
             evidence,
             selections: Vec::new(),
@@ -123,6 +125,11 @@ impl GroundCore {
         let outcome = self.node.pump(now, link);
         for state in self.node.take_states() {
             self.note(state);
+        }
+        for said in self.node.take_readiness() {
+            if self.vehicles.contains(&said.node) {
+                self.readiness.insert(said.node.clone(), said);
+            }
         }
         self.note_boards(link);
         let happened = self.node.node_mut().take_selections();
@@ -178,6 +185,11 @@ impl GroundCore {
     /// Every vehicle in the order of take-off, with its last word if it has been heard.
     pub fn roster(&self) -> impl Iterator<Item = (&NodeName, Option<&State>)> {
         self.vehicles.iter().map(|vehicle| (vehicle, self.roster.get(vehicle)))
+    }
+
+    /// A vehicle's checks before take-off, as it told them last; also of one that does not know where it is.
+    pub fn readiness(&self, vehicle: &NodeName) -> Option<&Readiness> {
+        self.readiness.get(vehicle)
     }
 
     /// The newest board of this station and of each vehicle.

@@ -222,7 +222,10 @@ fn who_stands_on_the_ground_waits_for_its_turn_behind_those_who_are_launched_bef
         board("uav/2", &[("mission", Bid::new().wait_for("uav/2/takeoff"), &[])]),
         board("ground/main", &[("launch", request("uav/1/takeoff"), &[])]),
     ];
-    let evidence = standing(boards, &|state| State { armed: false, ..state });
+    let mut evidence = standing(boards, &|state| State { armed: false, ..state });
+    let unready = Event::new("uav/1/unready").with("why", "home: stands 12 m east of its home");
+    let unready = happened(NOW - Duration::from_secs(3), unready, "");
+    evidence.note_event(Happened { home: node("uav/1"), ..unready });
     let explanation = of(&evidence, "uav/2");
     let [change] = &*explanation.changes else { panic!("{explanation}") };
     assert_eq!(
@@ -230,7 +233,8 @@ fn who_stands_on_the_ground_waits_for_its_turn_behind_those_who_are_launched_bef
         [
             "nobody requests `uav/2/takeoff`, which mission waits for",
             "ground/main#launch would",
-            "`uav/1/takeoff` is requested by ground/main#launch and blocked by uav/1#preflight"
+            "`uav/1/takeoff` is requested by ground/main#launch and blocked by uav/1#preflight",
+            "uav/1 is not ready: home: stands 12 m east of its home"
         ]
     );
     assert_eq!(change.needed, ["`uav/1/ready` happens, which nobody requests"]);

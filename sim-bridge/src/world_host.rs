@@ -203,9 +203,12 @@ impl WorldHost {
     /// The account of the run so far.
     #[must_use]
     pub fn account(&self) -> Account<'_> {
+        let waiting_for =
+            |index| self.heard(index).map_or_else(String::new, |state| state.waiting_for.clone());
         Account {
             simulation: &self.simulation,
             outcomes: self.outcomes().collect(),
+            waiting_for: (0..self.scan_keys.len()).map(waiting_for).collect(),
             set_points: Vec::new(),
             plan_times_ms: &[],
             events: self.events,

@@ -184,6 +184,24 @@ fn a_start_inside_an_obstacle_names_vehicle_obstacle_and_position() {
 }
 
 #[test]
+fn a_start_under_something_that_the_climb_would_meet_names_it_and_how_high_it_is() {
+    let roof = |z: f64, x: f64| {
+        format!("[[obstacle]]\nname = \"roof\"\ncentre_m = [{x}, 0.5, {z}]\nbox_m = [2.0, 2.0, 0.2]\n[gps]")
+    };
+    let fault = |z, x| read(&YARD.replacen("[gps]", &roof(z, x), 1)).err().map(|error| error.to_string());
+    let text = fault(1.7, 5.0).unwrap_or_default();
+    assert!(
+        text.starts_with("vehicle 2: obstacle `roof` is 1.6 m above the start (5.00, 0.50, 0.00)"),
+        "{text}"
+    );
+    // Its hull would touch the roof's edge.
+    assert!(fault(1.7, 6.1).is_some_and(|text| text.contains("`roof`")));
+    assert_eq!(fault(1.7, 6.2), None);
+    assert_eq!(fault(2.9, 5.0), None, "it climbs to 2 m only");
+    assert!(fault(2.5, 5.0).is_some(), "it needs room above itself");
+}
+
+#[test]
 fn a_start_or_goal_out_of_stated_bounds_is_refused() {
     let bounded = |edge: &str| format!("[bounds]\nmin_m = [{edge}, -20, -1]\nmax_m = [6, 20, 9]\n[gps]");
     let text = message("[gps]", &bounded("-4.0"));

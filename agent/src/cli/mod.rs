@@ -1,5 +1,7 @@
 //! The program of one vehicle: see `skein-agent --help`.
 
+mod lidar_scans;
+mod preflight;
 mod run;
 mod shadow_log;
 mod verify;
@@ -18,7 +20,7 @@ use crate::config_file::Config;
     name = "skein-agent",
     version,
     max_term_width = 80,
-    after_help = "Exit codes: 0 done, 1 `verify` found a violation, 2 wrong usage or input."
+    after_help = "Exit codes: 0 done, 1 `verify` found a violation, or\n`preflight` a check that does not pass, 2 wrong usage or input."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -37,6 +39,8 @@ enum Command {
         #[arg(long)]
         shadow: bool,
     },
+    /// Tell every check before take-off, with its value and what to do. Arms nothing; for a vehicle on the ground.
+    Preflight(preflight::Preflight),
     /// Model-check a vehicle's b-threads against an abstract world, or programs on a small network.
     Verify(verify::Verify),
 }
@@ -59,6 +63,9 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
         Command::Run { config, shadow } => Config::read(&config, &known)
             .and_then(|config| run::run(config, shadow))
             .map(|()| ExitCode::SUCCESS),
+        Command::Preflight(preflight) => {
+            preflight.run(&known).map(|ready| if ready { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+        }
         Command::Verify(verify) => verify.run(&known),
     };
     match done {

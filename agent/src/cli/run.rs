@@ -2,15 +2,16 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use skein_disk::{PromiseStore, ScriptStore, next_incarnation};
 use skein_mav::{Severity, Text};
+use skein_wire::Fleet;
 use skein_wire::event::{Advance, Declared as _, Homeward, What};
-use skein_wire::{Fleet, Key, Link as _, Payload, Scan};
 use skein_zenoh::{Bell, Complaints, ZenohConfig, ZenohLink, ZenohSession};
 
+use super::lidar_scans::LidarScans;
 use crate::autopilot_link::AutopilotLink;
 use crate::cli::shadow_log::ShadowLog;
 use crate::config_file::Config;
@@ -21,8 +22,6 @@ const TICK: Duration = Duration::from_millis(20);
 /// The autopilot's link is looked at this often. What has come since the last look counts as that old: so nothing that
 /// waited while the agent did not run passes for fresh.
 const LOOK: Duration = Duration::from_millis(5);
-/// A scan from further in the future comes from a clock that is wrong.
-const CLOCK_TOLERANCE: Duration = Duration::from_millis(50);
 
 /// Flies until Ctrl-C, which lands the vehicle first; as a shadow, while a pilot does.
 pub fn run(config: Config, is_shadow: bool) -> anyhow::Result<()> {
@@ -59,13 +58,12 @@ struct Driver {
     stations: Vec<AutopilotLink>,
     shadow: Option<ShadowLog>,
     link: ZenohLink,
-    scans: Option<ZenohLink>,
+    scans: Option<LidarScans>,
     bell: Bell,
     complaints: Complaints,
     began: Instant,
     looked: Duration,
     next_tick: Duration,
-    strange_scans: u64,
     /// Whether it has been told that what runs could not be written down.
     told_unsaved: bool,
 }
@@ -83,12 +81,8 @@ impl Driver {
         let fleet = Fleet::new(&config.agent.fleet).context("`fleet`")?;
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
         let link = session.link(&config.name)?;
-        let scans = config.lidar.map(|(sensor, network)| {
-            let key = Key::to_one::<Scan>(&fleet, sensor, config.name.clone());
-            let own = network.map(|network| ZenohSession::open(ZenohConfig::new(fleet.clone(), network)));
-            let session = own.transpose()?.unwrap_or_else(|| session.clone());
-            session.listen(vec![key.to_string()])
-        });
+        let lidar = config.lidar;
+        let scans = lidar.map(|it| LidarScans::open(&fleet, &config.name, it, &session)).transpose()?;
         tracing::info!(
             "{} of fleet {fleet}, life {}, Zenoh on {:?}, autopilot {}",
             config.name,
@@ -106,12 +100,11 @@ impl Driver {
             shadow,
             bell: link.bell(),
             link,
-            scans: scans.transpose()?,
+            scans,
             complaints: Complaints::default(),
             began: Instant::now(),
             looked: Duration::ZERO,
             next_tick: Duration::ZERO,
-            strange_scans: 0,
             told_unsaved: false,
         })
     }
@@ -156,30 +149,8 @@ impl Driver {
 
     fn take_in_scans(&mut self, now: Duration) {
         let Some(scans) = &mut self.scans else { return };
-        while let Some((_, payload)) = scans.poll() {
-            let Ok(Payload::Scan(scan)) = Payload::decode(&payload) else {
-                self.strange_scans += 1;
-                if self.strange_scans.is_power_of_two() {
-                    tracing::warn!("{} messages under the lidar's key are no scans", self.strange_scans);
-                }
-                continue;
-            };
-            let unix = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
-            let age = match unix.checked_sub(scan.stamp) {
-                Some(age) => age,
-                None if scan.stamp - unix <= CLOCK_TOLERANCE => Duration::ZERO,
-                None => {
-                    self.strange_scans += 1;
-                    if self.strange_scans.is_power_of_two() {
-                        tracing::warn!(
-                            "the lidar's scans come from the future: keep its computer's clock with this one's"
-                        );
-                    }
-                    continue;
-                }
-            };
-            let Some(stamp) = now.checked_sub(age) else { continue };
-            self.core.sense(now, &Scan { stamp, ..scan });
+        while let Some(scan) = scans.poll(now) {
+            self.core.sense(now, &scan);
         }
     }
 

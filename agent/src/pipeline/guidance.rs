@@ -12,6 +12,7 @@ use skein_planning::map::ClearanceMap;
 use super::{
     allowed::Allowed,
     course::Course,
+    headroom::Headroom,
     layers::Layers,
     planning::Planning,
     progress::Progress,
@@ -35,6 +36,8 @@ pub struct Guidance {
     /// An operator or a b-thread has told it to hover, and since then nobody to move.
     is_held: bool,
     allowed: Allowed,
+    /// The room above and below, as it is seen now.
+    pub headroom: Headroom,
     pub course: Course,
     pub planning: Planning,
     progress: Progress,
@@ -50,6 +53,7 @@ impl Guidance {
             leave_until: Duration::ZERO,
             is_held: false,
             allowed: Allowed::ANYTHING,
+            headroom: Headroom::OPEN,
             course: Course::default(),
             planning: Planning::new(envelope, finder),
             progress: Progress::new(envelope.separation_m, passages, escape),
@@ -161,7 +165,8 @@ impl Guidance {
     ) -> Vec<Report> {
         let (has_leave, allowed) = (self.has_leave(now), self.allowed());
         let moves_at = has_leave.then_some(now);
-        self.progress.look_ahead(moves_at, &mut self.course, &allowed, motion, map, neighbours)
+        let room = (&allowed, self.headroom);
+        self.progress.look_ahead(moves_at, &mut self.course, room, motion, map, neighbours)
     }
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles
@@ -172,6 +177,7 @@ impl Guidance {
         let following = self.course.following.as_mut().filter(|path| has_leave && !path.is_blocked);
         let attraction = self.progress.attraction();
         let lead = following.map(|following| Lead { following, attraction });
-        self.steering.steer(now, motion, lead, &allowed, surroundings)
+        let set_point = self.steering.steer(now, motion, lead, &allowed, surroundings);
+        self.headroom.keep(set_point, &motion.position)
     }
 }

@@ -8,7 +8,7 @@ use skein_planning::{
     passage::{Passage, PassageConfig, first_passage},
 };
 
-use super::{allowed::Allowed, course::Course};
+use super::{allowed::Allowed, course::Course, headroom::Headroom};
 use crate::{neighbours::Neighbour, positioning::Motion, report::Report};
 
 /// The last waypoint is reached within this distance, m.
@@ -17,6 +17,8 @@ const ARRIVAL_M: f64 = 0.35;
 const PASSING_M: f64 = 0.7;
 /// Waypoints are reached within this difference of height, m.
 const ARRIVAL_HEIGHT_M: f64 = 0.5;
+/// A home that is covered is reached within this distance, m.
+const COVERED_M: f64 = 1.5;
 /// A passage lies behind once the vehicle is this far past it, m.
 const PASSAGE_BEHIND_M: f64 = 2.5;
 
@@ -56,13 +58,13 @@ impl Progress {
         &mut self,
         moves_at: Option<Duration>,
         course: &mut Course,
-        allowed: &Allowed,
+        (allowed, headroom): (&Allowed, Headroom),
         motion: &Motion,
         map: &ClearanceMap,
         neighbours: &[Neighbour],
     ) -> Vec<Report> {
         let mut reports = Vec::new();
-        reports.extend(self.check_arrival(course, allowed, motion, neighbours));
+        reports.extend(self.check_arrival(course, (allowed, headroom), motion, neighbours));
         reports.extend(check_path(course, allowed, motion, map));
         reports.extend(self.check_passage(course, motion, map));
         reports.extend(self.check_progress(moves_at, course));
@@ -72,7 +74,7 @@ impl Progress {
     fn check_arrival(
         &self,
         course: &mut Course,
-        allowed: &Allowed,
+        (allowed, headroom): (&Allowed, Headroom),
         motion: &Motion,
         neighbours: &[Neighbour],
     ) -> Option<Report> {
@@ -88,7 +90,10 @@ impl Progress {
             // A place in the air that another vehicle has is passed at a distance, not fought over.
             (false, true) => 2.0 * self.separation_m,
         };
-        let arrives = offset.xy().norm() < within_m && offset.z.abs() < ARRIVAL_HEIGHT_M;
+        // Above or under what covers its home it is as near to it as it can come: where it lands, is seen then.
+        let is_covered = waypoint.is_home && headroom.ends_before(offset.z);
+        let arrives = offset.xy().norm() < within_m && offset.z.abs() < ARRIVAL_HEIGHT_M
+            || is_covered && offset.xy().norm() < COVERED_M;
         (arrives && !std::mem::replace(&mut course.has_arrived, true))
             .then_some(Report::Arrived { leg: waypoint.leg })
     }

@@ -32,8 +32,9 @@ const PLANAR_BAND_M: f64 = 0.4;
 const GIVES_WAY_M: f64 = 1.0;
 /// Speed at which a hovering vehicle goes back to its place, at most, m/s.
 const STATION_KEEPING_M_S: f64 = 0.5;
-/// Speed at which a vehicle that is to land goes to where it can, at most, m/s.
+/// Speed at which a vehicle that is to land goes to where it can, at most, m/s; further away, for each metre, 1/s.
 const SETTLING_M_S: f64 = 1.0;
+const SETTLING_SHARE: f64 = 0.5;
 
 /// Makes set-points.
 #[derive(Debug)]
@@ -150,7 +151,9 @@ impl Steering {
     fn aside(&mut self, place: Vector3<f64>, motion: &Motion) -> Wish {
         self.follower.pause();
         self.hover_at = None;
-        let velocity = apf::limited(place - motion.position, SETTLING_M_S);
+        let offset = place - motion.position;
+        let far_m_s = (SETTLING_SHARE * offset.norm()).min(self.envelope.cruise_m_s);
+        let velocity = apf::limited(offset, far_m_s.max(SETTLING_M_S));
         Wish { velocity, height_m: place.z }
     }
 

@@ -5,6 +5,7 @@ use skein_dbp::NodeName;
 use skein_planning::airspace::places_around;
 use skein_planning::map::{ClearanceMap, VoxelState};
 
+use super::ground_seen::GroundSeen;
 use crate::config::{Envelope, Fence};
 use crate::neighbours::Neighbour;
 
@@ -14,6 +15,12 @@ const DRIFT_M: f64 = 0.3;
 const STOPS_WITHIN: f64 = 0.3;
 /// A place to go down is looked for within this distance, m.
 const REACH_M: f64 = 8.0;
+/// Where the ground was seen it goes down up to this far away, m.
+const FURTHEST_M: f64 = 20.0;
+/// So much higher there may be a way aside, m.
+const LIFT_M: f64 = 1.0;
+/// What covers the ground reaches this far beyond where it is seen, m.
+const COVER_WIDE_M: f64 = 1.5;
 /// What the map knows below is looked at every so often, m: no more than a voxel is wide.
 const LAYER_M: f64 = 0.2;
 /// Nearer than this a place is reached, m.
@@ -43,16 +50,33 @@ pub struct Descent<'a> {
     pub map: &'a ClearanceMap,
     /// The others, in the air and on the ground.
     pub neighbours: &'a [Neighbour],
+    /// Where its range finder has seen the ground, and whether it sees it now.
+    pub ground_seen: &'a GroundSeen,
 }
 
 impl Descent<'_> {
     /// Where to go first, at the vehicle's height: `None` if it is slow and can go down where it is, or nowhere within
     /// reach. `chosen` is kept as long as it will do.
     pub fn detour(&self, chosen: Option<Vector3<f64>>) -> Option<Vector3<f64>> {
-        let mut places = chosen.into_iter().chain(places_around(&self.stop, REACH_M));
+        let mut places = chosen.into_iter().chain(self.places());
         let place = places.find(|place| self.is_free_below(place) && self.can_be_reached(place))?;
         let is_there = self.speed_m_s < SLOW_M_S && (place - self.stop).xy().norm() <= ARRIVAL_M;
         (!is_there).then_some(place)
+    }
+
+    /// Places to go down, in the order in which they are tried. Above a cover first those where the ground was seen; and
+    /// then from higher up, as what is next below leaves no way aside.
+    fn places(&self) -> impl Iterator<Item = Vector3<f64>> {
+        let is_covered = self.ground_seen.is_covered();
+        let seen = if is_covered { self.ground_seen.places(&self.stop) } else { Vec::new() };
+        let is_near = |place: &Vector3<f64>| (place - self.stop).xy().norm() <= FURTHEST_M;
+        let level: Vec<_> =
+            seen.into_iter().filter(is_near).chain(places_around(&self.stop, REACH_M)).collect();
+        let lifts = if is_covered { 2 } else { 1 };
+        (0..lifts).flat_map(move |lift| {
+            let lift = Vector3::z() * (f64::from(lift) * LIFT_M);
+            level.clone().into_iter().map(move |place| place + lift)
+        })
     }
 
     /// Whether nobody and nothing known is straight below a place.
@@ -65,6 +89,13 @@ impl Descent<'_> {
         self.neighbours.iter().filter(|neighbour| self.gives_way_to(neighbour)).all(is_apart)
             && self.map.keep_out().is_none_or(|zones| zones.room_below_m(place, self.ground_m) >= 0.0)
             && self.is_empty_below(place)
+            && !self.is_covered(place)
+    }
+
+    /// Whether a place is over what the range finder sees between the vehicle and the ground: that is wider than what
+    /// it sees of it.
+    fn is_covered(&self, place: &Vector3<f64>) -> bool {
+        self.ground_seen.is_covered() && (place - self.position).xy().norm() < COVER_WIDE_M
     }
 
     /// Of two above one another the lower goes first; at the same height the one whose name comes first.
@@ -87,11 +118,15 @@ impl Descent<'_> {
         })
     }
 
-    /// Whether the way to a place at the same height is free, and nobody is there.
+    /// Whether the way to a place at the same height, or from straight above to a higher one, is free, and nobody is
+    /// there.
     fn can_be_reached(&self, place: &Vector3<f64>) -> bool {
         let Descent { position, map, .. } = self;
+        let position = &position.xy().push(place.z.max(position.z));
         let Fence { min, max } = self.fence;
-        let is_inside = (0..2).all(|axis| (min[axis]..=max[axis]).contains(&place[axis]));
+        let is_lifted = place.z > self.position.z;
+        let mut axes = if is_lifted { 0..3 } else { 0..2 };
+        let is_inside = axes.all(|axis| (min[axis]..=max[axis]).contains(&place[axis]));
         let clearance_m = self.envelope.hull_m.min(map.clearance(position));
         let is_taken = |neighbour: &Neighbour| {
             neighbour.armed && (neighbour.position() - place).norm() < self.envelope.separation_m
@@ -142,6 +177,15 @@ mod tests {
         neighbours: &[Neighbour],
         chosen: Option<Vector3<f64>>,
     ) -> Option<Vector3<f64>> {
+        detour_over(&GroundSeen::default(), map, neighbours, chosen)
+    }
+
+    fn detour_over(
+        ground_seen: &GroundSeen,
+        map: &ClearanceMap,
+        neighbours: &[Neighbour],
+        chosen: Option<Vector3<f64>>,
+    ) -> Option<Vector3<f64>> {
         let (me, envelope) = (name("uav/5"), Envelope::default());
         let descent = Descent {
             name: &me,
@@ -153,6 +197,7 @@ mod tests {
             fence: &FENCE,
             map,
             neighbours,
+            ground_seen,
         };
         descent.detour(chosen)
     }
@@ -165,10 +210,10 @@ mod tests {
 
     #[test]
     fn a_fast_vehicle_first_comes_to_where_it_stops() {
-        let (me, envelope, map) = (name("uav/5"), Envelope::default(), map());
+        let (me, envelope, map, seen) = (name("uav/5"), Envelope::default(), map(), GroundSeen::default());
         let flies = |speed_m_s, chosen| {
             let stop = HERE + Vector3::x();
-            let (name, envelope, fence, map) = (&me, &envelope, &FENCE, &map);
+            let (name, envelope, fence, map, ground_seen) = (&me, &envelope, &FENCE, &map, &seen);
             let at = Descent {
                 name,
                 position: HERE,
@@ -179,6 +224,7 @@ mod tests {
                 fence,
                 map,
                 neighbours: &[],
+                ground_seen,
             };
             at.detour(chosen)
         };
@@ -236,5 +282,39 @@ mod tests {
         };
         let everywhere: Vec<Neighbour> = (0..625).map(standing).collect();
         assert_eq!(detour(&map(), &everywhere, None), None);
+    }
+
+    #[test]
+    fn over_what_covers_the_ground_it_goes_back_to_where_it_has_seen_it() {
+        let mut seen = GroundSeen::default();
+        seen.look(&Vector3::new(9.0, 0.0, 3.0), 0.0, Some(3.0));
+        seen.look(&Vector3::new(6.0, 0.0, 3.0), 0.0, Some(3.0));
+        assert_eq!(detour_over(&seen, &map(), &[], None), None, "the ground is below");
+        seen.look(&HERE, 0.0, Some(1.5));
+        let chosen = detour_over(&seen, &map(), &[], None);
+        assert_eq!(chosen, Some(Vector3::new(6.0, 0.0, 3.0)));
+        assert_eq!(detour_over(&seen, &map(), &[], chosen), chosen);
+        let other = [other("uav/1", [6.0, 0.0, 0.1], false)];
+        assert_eq!(detour_over(&seen, &map(), &other, chosen), Some(Vector3::new(9.0, 0.0, 3.0)));
+    }
+
+    #[test]
+    fn over_what_covers_the_ground_everywhere_so_far_it_goes_some_way_aside() {
+        let mut seen = GroundSeen::default();
+        seen.look(&HERE, 0.0, Some(1.5));
+        let place = detour_over(&seen, &map(), &[], None).unwrap();
+        assert!((1.5..2.6).contains(&(place - HERE).norm()), "{place}");
+    }
+
+    #[test]
+    fn from_close_above_a_deck_it_goes_up_first() {
+        let mut seen = GroundSeen::default();
+        seen.look(&Vector3::new(5.0, 0.0, 3.0), 0.0, Some(3.0));
+        seen.look(&HERE, 0.0, Some(0.4));
+        let mut map = map();
+        for (x, y) in (-10..=10).flat_map(|x| (-10..=10).map(move |y| (x, y))) {
+            map.insert(&Vector3::new(f64::from(x) * 0.2, f64::from(y) * 0.2, 2.8));
+        }
+        assert_eq!(detour_over(&seen, &map, &[], None), Some(Vector3::new(5.0, 0.0, 4.0)));
     }
 }

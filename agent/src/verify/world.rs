@@ -156,10 +156,11 @@ pub(super) fn passage(me: &Me, other: Option<&NodeName>) -> Part {
 pub(super) fn checks(me: &Me) -> Part {
     let up = me.any::<(Airborne, PilotTook, FoundAirborne, Slept)>();
     let up_at_once = Place::new("failing, not yet told").rules_out(me.any::<Takeoff>());
+    let unready = || me.event(Unready { why: "battery: 20 %".into() });
     Part::new(vec![
-        Place::new("failing").offers(me.event(Ready), "passing"),
-        Place::new("passing").offers(me.event(Unready), "failing").hears(up, "failing, not yet told"),
-        up_at_once.offers(me.event(Unready), "failing"),
+        Place::new("failing").offers(me.event(Ready), "passing").keeps_offering(unready()),
+        Place::new("passing").offers(unready(), "failing").hears(up, "failing, not yet told"),
+        up_at_once.offers(unready(), "failing"),
     ])
 }
 

@@ -151,6 +151,8 @@ function showFleet(): void {
   events.setFleet(fleetNames);
   orders.setFleet(fleetNames);
   vehicles.show(fleet);
+  const asked = fleet.vehicles.find(({ name }) => selection.has(name));
+  if (asked) why.showChecks(asked);
   scripts.show(fleet);
   view.setFleet(fleet);
   showAddressees();

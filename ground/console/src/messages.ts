@@ -44,6 +44,12 @@ needed: Array<string>,
  */
 cycle: Array<string>, };
 
+export type CheckView = { name: string,
+/**
+ * `passes`, `fails` or `waits`.
+ */
+state: string, value: string, advice: string, };
+
 /**
  * A message of a browser.
  */
@@ -179,4 +185,8 @@ export type StateView = { position: [number, number, number], velocity: [number,
 
 export type To = string | Array<string>;
 
-export type VehicleView = { name: string, heard: boolean, link: LinkView, notes: Array<string>, };
+export type VehicleView = { name: string, heard: boolean, link: LinkView, notes: Array<string>,
+/**
+ * Its checks before take-off.
+ */
+checks: Array<CheckView>, };

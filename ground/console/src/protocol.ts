@@ -34,8 +34,10 @@ export type Obstacle = station.Obstacle;
 export type Scene = Told<'scene'>;
 
 /** A vehicle; what it says of itself may be missing. */
-export type Vehicle = Omit<station.VehicleView, keyof station.StateView> &
+export type Vehicle = With<Omit<station.VehicleView, keyof station.StateView>, { checks: Check[] }> &
   Doubtful<station.StateView, 'position' | 'velocity' | 'yaw_rad' | 'battery' | 'mission'>;
+export type Check = With<station.CheckView, { state: CheckState }>;
+export type CheckState = 'passes' | 'fails' | 'waits';
 export type Outcome = station.OutcomeView;
 export type Fleet = With<Told<'fleet'>, { vehicles: Vehicle[] }>;
 
@@ -190,7 +192,15 @@ function readVehicle(json: Raw<station.VehicleView | station.StateView>): Vehicl
     scripts: strings(json.scripts),
     link: { alive: link.alive === true, age_ms: number(link.age_ms) },
     notes: strings(json.notes),
+    checks: list(json.checks, readCheck),
   };
+}
+
+/** One whose state is none that this console knows does not pass as far as it can tell. */
+function readCheck(json: Raw<station.CheckView>): Check | null {
+  const name = string(json.name);
+  const state = json.state === 'passes' || json.state === 'fails' ? json.state : 'waits';
+  return name ? { name, state, value: string(json.value), advice: string(json.advice) } : null;
 }
 
 function readScript(json: Json): Script {

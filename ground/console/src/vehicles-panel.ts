@@ -9,7 +9,7 @@ import { html, setAttribute, setText } from './dom';
 import { type Identity, identities } from './identity';
 import type { Fleet, Vehicle } from './protocol';
 import type { Selection } from './selection';
-import { durationWords, spaced, waitingWords } from './words';
+import { durationWords, faultWords, spaced, waitingWords } from './words';
 
 /** Below these a battery is low or nearly empty. */
 const BATTERY_LOW = 0.3;
@@ -127,7 +127,7 @@ class Row {
 
   show(vehicle: Vehicle, groundZ: number): void {
     const { element } = this;
-    const link = !vehicle.heard ? 'unheard' : vehicle.link.alive ? 'alive' : 'lost';
+    const link = linkState(vehicle);
     setAttribute(element, 'data-link', link);
     setAttribute(element, 'data-mode', vehicle.heard ? vehicle.mode : '');
     setAttribute(element, 'data-mission', vehicle.mission);
@@ -141,7 +141,7 @@ class Row {
 
     setText(this.task, taskWords(vehicle, link));
     setAttribute(this.task, 'title', this.task.textContent);
-    const waiting = link === 'alive' ? waitingWords(vehicle.waiting_for) : '';
+    const waiting = link !== 'alive' ? '' : vehicle.heard ? waitingWords(vehicle.waiting_for) : faultWords(vehicle.checks);
     setText(this.waiting, waiting);
     setAttribute(this.waiting, 'title', waiting || null);
     this.waiting.hidden = !waiting;
@@ -160,27 +160,35 @@ class Row {
   }
 }
 
-function linkWords({ link: { age_ms: ageMs } }: Vehicle, link: 'alive' | 'lost' | 'unheard'): string {
+type LinkState = 'alive' | 'lost' | 'unheard';
+
+/** A vehicle that lives may not know yet where it is, and then it is not heard. */
+function linkState({ heard, link }: Vehicle): LinkState {
+  return link.alive ? 'alive' : heard ? 'lost' : 'unheard';
+}
+
+function linkWords({ link: { age_ms: ageMs } }: Vehicle, link: LinkState): string {
   if (link === 'unheard') return 'never heard';
   if (link === 'lost') return 'link lost';
   return ageMs === null ? 'alive' : durationWords(ageMs);
 }
 
-function taskWords(vehicle: Vehicle, link: 'alive' | 'lost' | 'unheard'): string {
+function taskWords(vehicle: Vehicle, link: LinkState): string {
   if (link === 'unheard') return 'No word from it since the station started';
   if (link === 'lost') {
     const { age_ms: ageMs } = vehicle.link;
     const last = vehicle.task || spaced(vehicle.mode);
     return [ageMs === null ? 'Silent' : `Silent for ${durationWords(ageMs)}`, last && `last: ${last}`].filter(Boolean).join(' · ');
   }
+  if (!vehicle.heard) return 'Does not know yet where it is';
   const done = { complete: '✓ mission complete', failed: '✕ mission failed', under_way: '' }[vehicle.mission ?? 'under_way'];
   return [done, vehicle.task, vehicle.armed ? '' : 'disarmed'].filter(Boolean).join(' · ');
 }
 
 /** `8, of which 1 silent`. */
 function countWords(vehicles: readonly Vehicle[]): string {
-  const silent = vehicles.filter(({ heard, link }) => heard && !link.alive).length;
-  const unheard = vehicles.filter(({ heard }) => !heard).length;
+  const count = (state: LinkState): number => vehicles.filter((vehicle) => linkState(vehicle) === state).length;
+  const [silent, unheard] = [count('lost'), count('unheard')];
   const parts = [`${vehicles.length}`];
   if (silent > 0) parts.push(`${silent} silent`);
   if (unheard > 0) parts.push(`${unheard} never heard`);

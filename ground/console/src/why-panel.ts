@@ -4,12 +4,14 @@
  */
 
 import { html, setText } from './dom';
-import type { Blocker, Change, PastEvent, Requested, Why } from './protocol';
+import type { Blocker, Change, Check, PastEvent, Requested, Vehicle, Why } from './protocol';
 import { clockWords, durationWords, spaced } from './words';
 
 export class WhyPanel {
   private readonly content = html('div', { class: 'reasons', tabindex: '0', role: 'region', 'aria-labelledby': 'why-title' });
   private vehicle: string | null = null;
+  private checks: HTMLElement[] = [];
+  private reasons: HTMLElement[] = [];
   /** What is shown, so that only what differs is laid out anew. */
   private shown = '';
 
@@ -30,6 +32,7 @@ export class WhyPanel {
     if (vehicle === this.vehicle) return;
     this.vehicle = vehicle;
     this.shown = '';
+    [this.checks, this.reasons] = [[], []];
     setText(this.title, `Why ${vehicle ?? ''}`);
     this.content.replaceChildren(html('p', { class: 'reason-note' }, 'Asking the station…'));
     this.content.scrollTop = 0;
@@ -42,20 +45,44 @@ export class WhyPanel {
   show(why: Why): void {
     if (why.vehicle !== this.vehicle) return;
     setText(this.title, titleWords(why));
-    const parts = [
+    this.reasons = [
       ...section('Because', why.changes.map(changeItem)),
       ...section('Requested now', why.requests.map(requestItem)),
       ...section('Last events', why.events.map(eventItem)),
       ...section('Limits on its motion', why.limits.map((limit) => html('li', {}, limit))),
       ...why.doubts.map((doubt) => html('p', { class: 'reason-note' }, `Not sure: ${doubt}.`)),
     ];
-    const frame = html('div', {}, ...parts);
-    if (frame.innerHTML === this.shown) return;
-    this.shown = frame.innerHTML;
+    this.layOut();
+  }
+
+  /** The checks before take-off of the vehicle that is asked about; only on the ground are there any. */
+  showChecks({ armed, checks }: Vehicle): void {
+    this.checks = armed ? [] : section('Checks before take-off', [...checks].sort(byState).map(checkItem));
+    if (this.reasons.length > 0 || this.checks.length > 0) this.layOut();
+  }
+
+  private layOut(): void {
+    const parts = [...this.checks, ...this.reasons];
+    const shown = parts.map((each) => each.outerHTML).join('');
+    if (shown === this.shown) return;
+    this.shown = shown;
     const { scrollTop } = this.content;
     this.content.replaceChildren(...parts);
     this.content.scrollTop = scrollTop;
   }
+}
+
+/** Those that do not pass come first. */
+function byState(one: Check, other: Check): number {
+  return Number(one.state === 'passes') - Number(other.state === 'passes');
+}
+
+function checkItem({ name, state, value, advice }: Check): HTMLElement {
+  const mark = { passes: '✓', fails: '✕', waits: '…' }[state];
+  const item = html('li', { class: 'reason', 'data-kind': state === 'passes' ? 'free' : 'blocked' });
+  item.append(html('span', { class: 'check-mark', 'data-state': state }, `${mark} `), html('strong', {}, name), ` ${value}`);
+  if (advice) item.append(html('p', { class: 'reason-blocked' }, `→ ${advice}`));
+  return item;
 }
 
 /** `Why uav/3 stands still, for 12 s`. */

@@ -2,7 +2,7 @@
  * What the swarm reports, in words for people.
  */
 
-import type { Command, Outcome } from './protocol';
+import type { Check, Command, Outcome } from './protocol';
 import { What } from './vocabulary';
 
 const ORDER_NAMES: Record<string, string> = {
@@ -33,6 +33,14 @@ export function waitingWords(waitingFor: string): string {
   }
   const holders = [...byNode].map(([node, bthreads]) => `${node}: ${bthreads.join(', ')}`);
   return holders.length === 0 ? '' : `held by ${holders.join('; ')}`;
+}
+
+/** What keeps a vehicle from being ready, by its checks: `position: no position yet; battery: no battery told`. */
+export function faultWords(checks: readonly Check[]): string {
+  return checks
+    .filter(({ state }) => state !== 'passes')
+    .map(({ name, value }) => `${name}: ${value}`)
+    .join('; ');
 }
 
 /** `uav/2#right_of_way` (elsewhere) or `right_of_way` (its own). */

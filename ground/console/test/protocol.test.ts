@@ -30,6 +30,18 @@ test('a vehicle never heard of has nulls and throws nothing', () => {
   assert.deepEqual(vehicle.notes, []);
 });
 
+test('a check of a state that is not known does not pass, and one without a name is dropped', () => {
+  const fleet = read({
+    type: 'fleet',
+    vehicles: [{ name: 'uav/1', checks: [{ name: 'home', state: 'fails', value: 'far', advice: 'carry it' }, { name: 'x', state: 'odd' }, {}] }],
+  });
+  assert.ok(fleet?.type === 'fleet');
+  assert.deepEqual(fleet.vehicles[0]?.checks, [
+    { name: 'home', state: 'fails', value: 'far', advice: 'carry it' },
+    { name: 'x', state: 'waits', value: '', advice: '' },
+  ]);
+});
+
 test('positions that are no positions are dropped', () => {
   const fleet = read({
     type: 'fleet',

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { clockWords, dataWords, durationWords, nameWords, orderName, outcomeWords, waitingWords } from '../src/words';
+import { clockWords, dataWords, durationWords, faultWords, nameWords, orderName, outcomeWords, waitingWords } from '../src/words';
 
 test('a b-thread elsewhere that blocks is named with its node', () => {
   assert.equal(waitingWords('ground/main#hold'), 'held by ground/main: hold');
@@ -19,6 +19,12 @@ test('a complaint in a sentence stays as it is', () => {
   const complaint = 'COM_OF_LOSS_T, needed for offboard, cannot be read';
   assert.equal(waitingWords(complaint), complaint);
   assert.equal(waitingWords(''), '');
+});
+
+test('checks that do not pass are named with what was found', () => {
+  const check = (name: string, state: 'passes' | 'fails' | 'waits', value: string) => ({ name, state, value, advice: '' });
+  const checks = [check('autopilot', 'passes', 'PX4'), check('position', 'waits', 'no position yet'), check('battery', 'fails', '12 %')];
+  assert.equal(faultWords(checks), 'position: no position yet; battery: 12 %');
 });
 
 test('durations come in the largest unit that fits', () => {

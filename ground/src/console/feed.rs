@@ -13,7 +13,7 @@ use skein_bp::Value;
 use skein_bp::script::ScriptFile;
 use skein_dbp::{Happened, NodeName, Peer};
 use skein_wire::event::{Advance, Declared as _, Homeward};
-use skein_wire::{Form, MissionState, Scene, State};
+use skein_wire::{Check, Form, MissionState, Scene, State};
 
 use super::subscription::{Broadcast, Subscription, Text};
 use crate::core::GroundCore;
@@ -119,6 +119,8 @@ pub(super) struct VehicleView<'a> {
     heard: bool,
     link: LinkView,
     notes: Vec<String>,
+    /// Its checks before take-off.
+    checks: Vec<CheckView<'a>>,
     /// All fields of a [`StateView`], or none.
     #[cfg_attr(test, ts(skip))]
     #[serde(flatten)]
@@ -130,6 +132,16 @@ pub(super) struct VehicleView<'a> {
 pub(super) struct LinkView {
     alive: bool,
     age_ms: Option<f64>,
+}
+
+#[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct CheckView<'a> {
+    name: &'a str,
+    /// `passes`, `fails` or `waits`.
+    state: &'static str,
+    value: &'a str,
+    advice: &'a str,
 }
 
 #[derive(Serialize)]
@@ -290,7 +302,11 @@ fn fleet(now: Duration, station: &GroundCore) -> Message<'_> {
                 skein_wire::VERSION
             )
         };
-        vehicle_view(now, name, state, peer.copied(), skewed.get(name).map(note))
+        let checks = station.readiness(name).map_or(&[][..], |said| &said.checks);
+        VehicleView {
+            checks: checks.iter().map(check_view).collect(),
+            ..vehicle_view(now, name, state, peer.copied(), skewed.get(name).map(note))
+        }
     };
     let outcome = station.finished().map(|outcome| OutcomeView {
         succeeded: outcome.succeeded(),
@@ -312,8 +328,13 @@ fn vehicle_view<'a>(
         heard: state.is_some(),
         link: LinkView { alive: peer.is_some_and(|peer| peer.alive), age_ms },
         notes: note.into_iter().collect(),
+        checks: Vec::new(),
         state: state.map(state_view),
     }
+}
+
+fn check_view(check: &Check) -> CheckView<'_> {
+    CheckView { name: &check.name, state: check.state.word(), value: &check.value, advice: &check.advice }
 }
 
 fn state_view(state: &State) -> StateView<'_> {

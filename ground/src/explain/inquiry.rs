@@ -3,9 +3,11 @@
 use std::collections::BTreeSet;
 
 use skein_bp::EventSet;
-use skein_dbp::{Board, BoardLease, BoardRequest, BoardRow, NodeName, first_two_chunks};
+use skein_dbp::{Board, BoardLease, BoardRequest, BoardRow, Happened, NodeName, first_two_chunks};
 use skein_wire::MissionState;
-use skein_wire::event::{Advance, Declared as _, Enter, Events as _, Goto, Homeward, Takeoff};
+use skein_wire::event::{
+    Advance, Declared as _, Enter, Events as _, Goto, Homeward, Ready, Takeoff, Unready,
+};
 
 use super::evidence::Evidence;
 use super::explanation::Change;
@@ -169,9 +171,20 @@ impl<'a> Inquiry<'a> {
                 self.name(&blocker),
                 renewed.unwrap_or_default()
             ));
+            let said = self.because.len();
+            self.because.extend(self.why_unready(&blocker.node, request));
             self.go_on(&blocker, lease);
-            self.because.pop();
+            self.because.truncate(said - 1);
         }
+    }
+
+    /// The checks that do not pass, by the word of a vehicle that keeps itself on the ground.
+    fn why_unready(&self, blocker: &NodeName, request: &BoardRequest) -> Option<String> {
+        let is_own = Takeoff.at(blocker) == request.event;
+        let known = self.evidence.vehicle(blocker).filter(|_| is_own)?;
+        let checks = |event: &&Happened| matches!(event.event.kind(), Ready::NAME | Unready::NAME);
+        let unready = Unready::read(&known.latest_events().find(checks)?.event)?;
+        Some(format!("{blocker} is not ready: {}", unready.why))
     }
 
     /// What would let `party` go on, or its lease here lapse?

@@ -305,8 +305,9 @@ impl Companion {
                 }
             }
             MavMessage::PARAM_VALUE(message) => {
-                let read = self.parameters.on_value(message, self.dialect().parameter_encoding());
-                self.events.extend(read.map(|(name, value)| MavEvent::ParameterRead { name, value }));
+                let encoding = self.dialect().parameter_encoding();
+                let (name, value) = self.parameters.on_value(message, encoding);
+                self.events.push_back(MavEvent::ParameterRead { name, value });
             }
             message if for_me => {
                 self.events.extend(self.missions.receive(now, message, self.autopilot, &mut self.writer));

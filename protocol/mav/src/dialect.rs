@@ -6,8 +6,9 @@ use std::time::Duration;
 use mavlink::dialects::common::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd};
 
 use crate::command::{Command, CommandResult};
+use crate::failsafe::Failsafe;
 use crate::mode::FlightMode;
-use crate::parameter::{ParameterEncoding, ParameterValue};
+use crate::parameter::ParameterEncoding;
 use crate::set_point::SetPoint;
 use crate::telemetry::Telemetry;
 
@@ -76,8 +77,17 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
         ParameterEncoding::Bytewise
     }
 
-    /// The parameters that decide what the autopilot does when its companion dies.
+    /// The parameters on which hangs what becomes of a vehicle that loses its companion or its energy.
     fn failsafes(&self) -> &'static [Failsafe];
+
+    /// Safe values of all these parameters, for a companion of this system id.
+    fn safe_settings(&self, system_id: u8) -> Vec<(&'static str, f64)> {
+        let of_one = |failsafe: &Failsafe| {
+            let value = (failsafe.setting)(system_id);
+            failsafe.parameters.iter().map(move |name| (*name, value))
+        };
+        self.failsafes().iter().flat_map(of_one).collect()
+    }
 
     /// The message that gives a command; see [`Dialect::take_off`] for `home_height_m`.
     ///
@@ -113,36 +123,4 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
 
 fn arm(param1: f32) -> COMMAND_LONG_DATA {
     COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, param1, ..Default::default() }
-}
-
-/// A failsafe parameter of an autopilot, and the values with which a vehicle may fly.
-#[derive(Debug, Clone, Copy)]
-pub struct Failsafe {
-    pub parameter: &'static str,
-    pub(crate) is_safe: fn(f64) -> bool,
-    /// The safe values, in words.
-    pub(crate) expected: &'static str,
-    /// Whether an autopilot that does not tell its value is unsafe.
-    pub(crate) required: bool,
-}
-
-impl Failsafe {
-    /// The same, for autopilots that may lack the parameter.
-    pub(crate) const fn optional(self) -> Self {
-        Self { required: false, ..self }
-    }
-
-    /// Judges what the autopilot told; `None` if it told nothing.
-    ///
-    /// # Errors
-    /// The reason why the vehicle must not fly.
-    pub fn judge(&self, value: Option<ParameterValue>) -> Result<(), String> {
-        let Self { parameter, expected, .. } = self;
-        match value.map(ParameterValue::as_f64) {
-            Some(value) if (self.is_safe)(value) => Ok(()),
-            Some(value) => Err(format!("{parameter} is {value}, expected {expected}")),
-            None if self.required => Err(format!("{parameter} cannot be read, expected {expected}")),
-            None => Ok(()),
-        }
-    }
 }

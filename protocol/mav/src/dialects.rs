@@ -5,10 +5,14 @@ pub mod px4;
 
 use mavlink::dialects::common::HEARTBEAT_DATA;
 
-use crate::dialect::{Dialect, Failsafe};
+use crate::dialect::Dialect;
+use crate::failsafe::Failsafe;
 
 /// All makes of autopilot that can be commanded.
 pub static DIALECTS: [&dyn Dialect; 2] = [&px4::Px4, &ardupilot::ArduPilot];
+
+/// ArduPilot's dialect, for who starts one.
+pub static ARDUPILOT: &dyn Dialect = &ardupilot::ArduPilot;
 
 /// The dialect of an autopilot as long as none of [`DIALECTS`] is recognised.
 pub(crate) static UNKNOWN: &dyn Dialect = &Unknown;

@@ -21,7 +21,7 @@ pub enum MavEvent {
     HeartbeatLost,
     /// Heartbeats came (again).
     HeartbeatRegained,
-    /// A parameter that was read or written has this value.
+    /// A parameter has this value: it was read or written, by whomever.
     ParameterRead { name: String, value: ParameterValue },
     /// A parameter that was asked for never came: the autopilot does not have it, or the link is bad.
     ParameterMissing { name: String },

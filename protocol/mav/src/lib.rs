@@ -36,6 +36,7 @@ mod dialect;
 mod dialects;
 mod endpoint;
 mod event;
+mod failsafe;
 mod frame;
 mod geodesy;
 mod mission;
@@ -49,13 +50,14 @@ mod telemetry;
 
 pub use command::{Command, CommandResult};
 pub use companion::{Companion, CompanionConfig};
-pub use dialect::{Dialect, Failsafe};
-pub use dialects::{DIALECTS, px4};
+pub use dialect::Dialect;
+pub use dialects::{ARDUPILOT, DIALECTS, px4};
 pub use endpoint::{
     AutopilotCommand, Endpoint, EndpointConfig, Parameter, ParameterError, ParameterTable, Request, Ticket,
     VehicleState,
 };
 pub use event::MavEvent;
+pub use failsafe::Failsafe;
 pub use frame::{Address, Frame, FrameReader, FrameWriter};
 pub use geodesy::{Datum, Geodetic, LocalFrame};
 pub use mavlink::dialects::common as messages;

@@ -1,7 +1,7 @@
 //! What every dialect in the list must hold to.
 
 use skein_mav::messages::{HEARTBEAT_DATA, MavAutopilot, MavCmd};
-use skein_mav::{Command, CommandResult, DIALECTS, FlightMode};
+use skein_mav::{Command, CommandResult, DIALECTS, FlightMode, ParameterValue};
 
 fn heartbeat(autopilot: MavAutopilot) -> HEARTBEAT_DATA {
     HEARTBEAT_DATA { autopilot, ..Default::default() }
@@ -70,25 +70,53 @@ fn a_height_that_is_no_number_is_never_sent() {
     }
 }
 
+/// Names of a parameter, some safe and some unsafe values of it, and whether an autopilot may lack it.
+type Case = (&'static [&'static str], &'static [f32], &'static [f32], bool);
+
+/// Judges all failsafes of this make, for a companion whose system id is 3.
+fn judge_failsafes(autopilot: MavAutopilot, cases: &[Case]) {
+    let heartbeat = heartbeat(autopilot);
+    let dialect = DIALECTS.into_iter().find(|dialect| dialect.is_spoken_by(&heartbeat)).unwrap();
+    let names: Vec<_> = dialect.failsafes().iter().map(|failsafe| failsafe.parameters).collect();
+    assert_eq!(names, cases.iter().map(|case| case.0).collect::<Vec<_>>());
+    for (failsafe, (names, safe, unsafe_, may_lack)) in dialect.failsafes().iter().zip(cases) {
+        let judge = |value| failsafe.judge(Some(ParameterValue::Real(value)), 3);
+        for value in *safe {
+            assert_eq!(judge(*value), Ok(()), "{names:?} {value}");
+        }
+        for value in unsafe_.iter().chain(&[f32::NAN, -1.0]) {
+            let remedy = judge(*value).unwrap_err();
+            assert_eq!(remedy, format!("set it to {}: {}", (failsafe.setting)(3), failsafe.expected));
+        }
+        assert_eq!(judge((failsafe.setting)(3) as f32), Ok(()), "{names:?}: its remedy is none");
+        assert_eq!(failsafe.judge(None, 3).is_ok(), *may_lack, "{names:?}");
+    }
+}
+
 #[test]
 fn px4_flies_only_with_failsafes_that_keep_it_in_the_air() {
-    let heartbeat = heartbeat(MavAutopilot::MAV_AUTOPILOT_PX4);
-    let px4 = DIALECTS.into_iter().find(|dialect| dialect.is_spoken_by(&heartbeat)).unwrap();
-    let judge = |parameter: &str, value: Option<f32>| {
-        let failsafe = px4.failsafes().iter().find(|failsafe| failsafe.parameter == parameter).unwrap();
-        failsafe.judge(value.map(skein_mav::ParameterValue::Real))
-    };
-    for (parameter, safe, unsafe_) in [
-        ("COM_OF_LOSS_T", &[0.0, 0.5, 2.0][..], &[2.5, -1.0, f32::NAN][..]),
-        ("COM_OBL_RC_ACT", &[0.0, 1.0, 3.0, 4.0, 5.0], &[2.0, 6.0, 7.0, 8.0, -1.0, 3.5, f32::NAN]),
-    ] {
-        for value in safe {
-            assert_eq!(judge(parameter, Some(*value)), Ok(()), "{parameter} {value}");
-        }
-        for value in unsafe_ {
-            let complaint = judge(parameter, Some(*value)).unwrap_err();
-            assert!(complaint.starts_with(&format!("{parameter} is {value}, expected ")), "{complaint}");
-        }
-        assert!(judge(parameter, None).is_err_and(|complaint| complaint.contains("cannot be read")));
-    }
+    judge_failsafes(
+        MavAutopilot::MAV_AUTOPILOT_PX4,
+        &[
+            (&["COM_OF_LOSS_T"], &[0.0, 0.5, 2.0], &[2.5], false),
+            (&["COM_OBL_RC_ACT"], &[0.0, 1.0, 3.0, 4.0, 5.0], &[2.0, 6.0, 7.0, 8.0, 3.5], false),
+            (&["COM_OBL_ACT"], &[0.0, 1.0, 2.0], &[3.0, 4.0], true),
+            (&["BAT1_SOURCE", "BAT_SOURCE"], &[0.0, 1.0, 2.0], &[3.0], true),
+        ],
+    );
+}
+
+#[test]
+fn ardupilot_flies_only_with_failsafes_that_bring_it_down() {
+    judge_failsafes(
+        MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+        &[
+            (&["GUID_TIMEOUT"], &[0.1, 0.5, 1.0], &[1.1, 3.0], true),
+            // 2 goes on with a mission, 6 looks for a landing in it, 7 stands still for ever.
+            (&["FS_GCS_ENABLE"], &[1.0, 3.0, 4.0, 5.0], &[0.0, 2.0, 6.0, 7.0], false),
+            (&["SYSID_MYGCS", "MAV_GCS_SYSID"], &[3.0], &[1.0, 255.0], false),
+            (&["FS_GCS_TIMEOUT"], &[2.0, 5.0], &[10.0], true),
+            (&["BATT_MONITOR"], &[3.0, 4.0, 16.0], &[0.0], false),
+        ],
+    );
 }

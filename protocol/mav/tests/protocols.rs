@@ -6,7 +6,8 @@ use crate::lossy_link::{Pair, datum};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use skein_mav::messages::{
-    BATTERY_STATUS_DATA, COMMAND_LONG_DATA, MavCmd, MavFrame, SET_POSITION_TARGET_LOCAL_NED_DATA,
+    BATTERY_STATUS_DATA, COMMAND_LONG_DATA, MavCmd, MavFrame, MavParamType, PARAM_VALUE_DATA,
+    SET_POSITION_TARGET_LOCAL_NED_DATA,
 };
 use skein_mav::{
     Address, AutopilotCommand, Command, CommandResult, Companion, CompanionConfig, FlightMode, FrameWriter,
@@ -308,6 +309,24 @@ fn a_parameter_out_of_range_keeps_its_value_and_says_why() {
     }));
     let told = |event: &MavEvent| matches!(event, MavEvent::Text(text) if text.text.contains("0 to 10"));
     assert!(pair.events.iter().any(told), "{:?}", pair.events);
+}
+
+#[test]
+fn a_parameter_that_somebody_else_has_set_is_told_too() {
+    let mut pair = Pair::connected(0.0, 1);
+    let mut autopilot = FrameWriter::new(Address { system_id: 3, component_id: 1 });
+    autopilot.write(&PARAM_VALUE_DATA {
+        param_id: "COM_OF_LOSS_T".into(),
+        param_value: 9.0,
+        param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+        ..Default::default()
+    });
+    pair.companion.receive(pair.now(), &autopilot.take());
+    pair.step();
+    assert!(pair.events.contains(&MavEvent::ParameterRead {
+        name: "COM_OF_LOSS_T".into(),
+        value: ParameterValue::Real(9.0)
+    }));
 }
 
 #[test]

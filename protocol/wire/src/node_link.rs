@@ -8,7 +8,7 @@ use skein_dbp::{Board, Kept, Node, NodeError, NodeName, Recipient};
 use crate::decode_error::DecodeError;
 use crate::key::{Fleet, Key};
 use crate::link::Link;
-use crate::message::{Payload, State};
+use crate::message::{Payload, Readiness, Record, State};
 use crate::store::Store;
 
 /// One pump takes in so many messages at most, so that a flood cannot keep a node from going on.
@@ -38,6 +38,7 @@ pub struct NodeLink {
     /// Promises that the store has not taken yet.
     unsaved: Option<Kept>,
     states: Vec<State>,
+    readiness: Vec<Readiness>,
     /// Other nodes' boards, for who reads them.
     boards: Option<VecDeque<Board>>,
     board_due: Duration,
@@ -69,6 +70,7 @@ impl NodeLink {
             store: None,
             unsaved: None,
             states: Vec::new(),
+            readiness: Vec::new(),
             boards: None,
             board_due: Duration::ZERO,
             told_board: None,
@@ -101,8 +103,16 @@ impl NodeLink {
 
     /// Tells all what state this node's vehicle is in.
     pub fn put_state(&mut self, state: &State, link: &mut dyn Link) {
-        let key = Key::to_all::<State>(&self.fleet, self.node.name().clone());
-        link.put(&key, Payload::State(state.clone()).encode());
+        self.put_to_all::<State>(Payload::State(state.clone()), link);
+    }
+
+    /// Tells all how this node's vehicle passes its checks before take-off.
+    pub fn put_readiness(&mut self, readiness: &Readiness, link: &mut dyn Link) {
+        self.put_to_all::<Readiness>(Payload::Readiness(readiness.clone()), link);
+    }
+
+    fn put_to_all<R: Record>(&mut self, payload: Payload, link: &mut dyn Link) {
+        link.put(&Key::to_all::<R>(&self.fleet, self.node.name().clone()), payload.encode());
         self.stats.sent += 1;
     }
 
@@ -142,6 +152,11 @@ impl NodeLink {
         std::mem::take(&mut self.states)
     }
 
+    /// The checks of other vehicles that have arrived since the last call, in order.
+    pub fn take_readiness(&mut self) -> Vec<Readiness> {
+        std::mem::take(&mut self.readiness)
+    }
+
     pub fn node(&self) -> &Node {
         &self.node
     }
@@ -173,6 +188,8 @@ impl NodeLink {
                 Ok(payload) if !key.fits(&payload) => self.stats.forged += 1,
                 Ok(Payload::State(state)) if state.node == *self.node.name() => {}
                 Ok(Payload::State(state)) => self.states.push(state),
+                Ok(Payload::Readiness(readiness)) if readiness.node == *self.node.name() => {}
+                Ok(Payload::Readiness(readiness)) => self.readiness.push(readiness),
                 Ok(Payload::Board(board)) => self.note_board(board),
                 Ok(Payload::Message(message)) => self.node.handle(now, message),
                 // Not for a node: a sensor's and a world's words have listeners of their own.

@@ -9,7 +9,7 @@ use skein_dbp::{
     BidAck, BidRecord, JointWord, Message, Occurrence, OnLoss, Presence, Refusal, RefusalReason, RemoteBid,
     Repair, ServedRequest,
 };
-use skein_wire::{DecodeError, Echo, NodeName, Payload, State, VERSION, proto};
+use skein_wire::{Check, CheckState, DecodeError, Echo, NodeName, Payload, Readiness, State, VERSION, proto};
 
 fn node_name() -> impl Strategy<Value = NodeName> {
     "[a-z]{1,8}/[a-z0-9_.-]{1,8}".prop_map(|name| NodeName::new(&name).unwrap())
@@ -197,4 +197,50 @@ fn a_bottomless_set_is_refused() {
 fn the_descriptor_set_holds_the_trace_schema() {
     let text = String::from_utf8_lossy(skein_wire::FILE_DESCRIPTOR_SET);
     assert!(text.contains("TraceEvent") && text.contains("skein.proto"));
+}
+
+fn readiness() -> Readiness {
+    let check = |state| Check {
+        name: "home".into(),
+        state,
+        value: "stands 12 m west of its home".into(),
+        advice: "carry it to its pad".into(),
+    };
+    Readiness {
+        node: NodeName::new("uav/1").unwrap(),
+        incarnation: 3,
+        home: [1.0, -2.0, 0.5],
+        datum: [47.397742, 8.545594, 488.0],
+        checks: [CheckState::Passes, CheckState::Fails, CheckState::Waits].map(check).into(),
+    }
+}
+
+#[test]
+fn checks_survive_the_way_over_the_wire_and_those_that_do_not_pass_are_told() {
+    let payload = Payload::Readiness(readiness());
+    assert_eq!(Payload::decode(&payload.encode()), Ok(payload));
+    let faults: Vec<_> = readiness().faults().map(|check| check.state).collect();
+    assert_eq!(faults, [CheckState::Fails, CheckState::Waits]);
+    assert!(!readiness().is_ready());
+}
+
+#[test]
+fn impossible_checks_are_refused_with_the_field_at_fault() {
+    type Change = fn(&mut proto::Readiness);
+    let cases: [(&str, Change); 4] = [
+        ("Readiness.home", |said| said.home = Some(proto::Vec3 { x: f64::NAN, y: 0.0, z: 0.0 })),
+        ("Readiness.datum", |said| {
+            said.datum = Some(proto::Datum { latitude_deg: 91.0, longitude_deg: 0.0, height_m: 0.0 });
+        }),
+        ("Readiness.datum", |said| said.datum = None),
+        ("Readiness.checks", |said| said.checks = vec![proto::Check::default(); 65]),
+    ];
+    for (field, change) in cases {
+        let mut inner = proto::Readiness::from(&readiness());
+        change(&mut inner);
+        let body = Some(proto::packet::Body::Readiness(inner));
+        let bytes = proto::Packet { version: VERSION, body }.encode_to_vec();
+        let error = Payload::decode(&bytes).unwrap_err().to_string();
+        assert!(error.contains(field), "{error} does not name {field}");
+    }
 }

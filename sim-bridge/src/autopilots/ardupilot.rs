@@ -7,9 +7,9 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use skein_mav::Datum;
 use skein_mav::simulator::Motion;
 use skein_mav::simulator::ardupilot::{Servos, answer};
+use skein_mav::{ARDUPILOT, Datum};
 use skein_world::{MotorCommands, Pilot, Quadrotor, STEP, SensorReadings, VehicleModel};
 
 use super::instance::{Instance, fresh};
@@ -250,11 +250,10 @@ fn find_defaults(program: &Path) -> anyhow::Result<PathBuf> {
 fn parameters_of(index: usize, model: &VehicleModel) -> String {
     let nominal_v = (model.battery.full_v + model.battery.empty_v) / 2.0;
     let capacity_mah = model.battery.capacity_wh / nominal_v * 1000.0;
-    let companion = index + 1;
-    format!(
-        "FRAME_CLASS 1\nFRAME_TYPE 1\nBATT_MONITOR 4\nBATT_CAPACITY {capacity_mah:.0}\n\
-         GUID_TIMEOUT 0.5\nFS_GCS_ENABLE 5\nSYSID_MYGCS {companion}\nMAV_GCS_SYSID {companion}\n"
-    )
+    let frame = "FRAME_CLASS 1\nFRAME_TYPE 1\n";
+    let failsafes = ARDUPILOT.safe_settings(u8::try_from(index + 1).unwrap_or(u8::MAX));
+    let failsafes = failsafes.iter().map(|(name, value)| format!("{name} {value}\n"));
+    format!("{frame}BATT_CAPACITY {capacity_mah:.0}\n{}", failsafes.collect::<String>())
 }
 
 #[cfg(test)]

@@ -15,6 +15,8 @@ pub struct Account<'a> {
     pub simulation: &'a Simulation,
     /// The end of each vehicle's mission, by its agent's word.
     pub outcomes: Vec<Option<Outcome>>,
+    /// What keeps each vehicle from moving on, by its agent's word; empty if nothing does.
+    pub waiting_for: Vec<String>,
     /// The inputs of each agent's set-points, where they are known.
     pub set_points: Vec<SetPointRecord>,
     /// The times of plans, where they are known.
@@ -86,7 +88,11 @@ fn vehicle(account: &Account<'_>, index: usize) -> VehicleSummary {
         Some(Outcome::Failed(why)) => (summary::Outcome::LandedEarly, Some(why.clone())),
         None if airborne => (summary::Outcome::Airborne, Some("it was still in the air".to_owned())),
         None if flew => (summary::Outcome::LandedEarly, Some("it landed before its goal".to_owned())),
-        None => (summary::Outcome::Grounded, Some("it never took off".to_owned())),
+        None => {
+            let why = account.waiting_for.get(index).map(String::as_str).unwrap_or_default();
+            let colon = if why.is_empty() { "" } else { ": " };
+            (summary::Outcome::Grounded, Some(format!("it never took off{colon}{why}")))
+        }
     };
     let set_points = account.set_points.get(index).copied().unwrap_or_default();
     VehicleSummary {

@@ -231,6 +231,7 @@ impl Swarm {
         Account {
             simulation: &self.simulation,
             outcomes: self.outcomes().map(Option::<&Outcome>::cloned).collect(),
+            waiting_for: self.agents().map(|agent| agent.status(self.now()).waiting_for).collect(),
             set_points: self.agents().map(AgentCore::set_points).collect(),
             plan_times_ms: self.plan_times.milliseconds(),
             events: self.events,

@@ -45,6 +45,8 @@ pub enum ScenarioError {
     MissionCount { missions: usize, vehicles: usize },
     #[error("vehicle {vehicle}: start {} is inside obstacle `{obstacle}` (its hull overlaps by {overlap_m:.2} m); move the start", place(.position))]
     StartInObstacle { vehicle: usize, obstacle: String, position: Vector3<f64>, overlap_m: f64 },
+    #[error("vehicle {vehicle}: obstacle `{obstacle}` is {above_m:.1} m above the start {}, from which it climbs {climbs_m} m; move the start, or lower `takeoff_height_m`", place(.position))]
+    Overhead { vehicle: usize, obstacle: String, position: Vector3<f64>, above_m: f64, climbs_m: f64 },
     #[error("vehicle {vehicle}: {what} {} is outside the world, which reaches from {} to {}", place(.position), place(.min), place(.max))]
     OutsideBounds {
         vehicle: usize,

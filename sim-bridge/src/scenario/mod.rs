@@ -50,6 +50,10 @@ pub const DEFAULT_TIME_LIMIT_S: f64 = 300.0;
 /// From a route to bounds that grow with it, in metres.
 const ROUTE_MARGIN: Vector3<f64> = Vector3::new(5.0, 5.0, 5.0);
 
+/// Room that a vehicle needs above the height to which it climbs, in metres, and how finely the climb is looked at.
+const CLIMB_ROOM_M: f64 = 0.25;
+const CLIMB_STEP_M: f64 = 0.05;
+
 /// Room between two hulls on the ground, in metres, below which a scenario is refused.
 const HULL_ROOM_M: f64 = 0.2;
 
@@ -368,8 +372,28 @@ impl Scenario {
                 position: vehicle.start,
                 overlap_m: hull - nearest.distance_m,
             }),
-            _ => Ok(()),
+            _ => self.check_climb(number, vehicle),
         }
+    }
+
+    /// A vehicle takes off straight up, and looks at nothing on the way.
+    fn check_climb(&self, number: usize, vehicle: &VehiclePlan) -> Result<(), ScenarioError> {
+        let hull = vehicle.model.hull_radius_m;
+        let steps = ((self.takeoff_height_m + CLIMB_ROOM_M) / CLIMB_STEP_M).ceil() as u32;
+        let touched = (0..=steps).find_map(|step| {
+            let centre = vehicle.start + Vector3::z() * (hull + f64::from(step) * CLIMB_STEP_M);
+            self.scene.nearest(&centre).filter(|nearest| nearest.distance_m < hull).map(|it| (centre, it))
+        });
+        let Some((centre, nearest)) = touched else { return Ok(()) };
+        let above = self.scene.cast_ray(&vehicle.start.into(), &Vector3::z(), centre.z + hull);
+        Err(ScenarioError::Overhead {
+            vehicle: number,
+            obstacle: nearest.obstacle.name.clone(),
+            position: vehicle.start,
+            // What only sticks out into the column is as high as where it is touched.
+            above_m: above.unwrap_or(centre.z - vehicle.start.z),
+            climbs_m: self.takeoff_height_m,
+        })
     }
 
     fn check_waypoints(

@@ -145,3 +145,41 @@ fn a_pilot_who_takes_over_on_the_way_to_where_it_would_land_has_it() {
     assert_eq!(commands(&lockstep), last, "the agent goes on commanding");
     assert!(is_airborne(&lockstep, 1) && place(&lockstep, 1).z > 2.0, "{}", place(&lockstep, 1));
 }
+
+/// A vehicle whose home is under a bridge's deck that reaches from `low_m` to `high_m`, 12 by 6 m, comes back at 3 m. On
+/// its way out it flew to `out_m`. Returns where it lands.
+fn comes_home_under_a_deck([low_m, high_m]: [f64; 2], out_m: f64) -> Vector3<f64> {
+    let mut lockstep = Lockstep::from_text(&format!(
+        "name = \"bridge\"\ntakeoff_height_m = 1.2\n\
+         [[obstacle]]\nname = \"deck\"\ncentre_m = [0.0, 0.0, {}]\nbox_m = [12.0, 6.0, {}]\n\
+         [[vehicle]]\nstart_m = [0.0, 0.0]\nwaypoints_m = [[20.0, 0.0, {out_m}], [40.0, 0.0, 3.0]]\n",
+        (low_m + high_m) / 2.0,
+        high_m - low_m
+    ));
+    step_until(&mut lockstep, "it does not fly", |lockstep| place(lockstep, 0).x > 18.0);
+    lockstep.swarm.order(&Order::Return(Who::All)).unwrap();
+    step_until(&mut lockstep, "it does not land", |lockstep| !is_airborne(lockstep, 0));
+    assert_eq!(lockstep.swarm.truth().collisions_obstacle, 0, "it meets the deck");
+    place(&lockstep, 0)
+}
+
+#[test]
+fn a_vehicle_that_comes_home_above_a_deck_lands_beside_it() {
+    for (deck, out_m) in [([2.0, 2.2], 3.0), ([2.0, 2.6], 1.2), ([2.0, 2.7], 3.0)] {
+        let place = comes_home_under_a_deck(deck, out_m);
+        assert!(place.z < 0.5, "{deck:?}: it stands on the deck, at {place}");
+        assert!(place.x.abs() > 6.2 || place.y.abs() > 3.2, "{deck:?}: it is under the deck, at {place}");
+    }
+}
+
+#[test]
+fn a_home_whose_height_is_inside_a_deck_is_left_for_a_place_beside_it() {
+    let place = comes_home_under_a_deck([2.6, 3.4], 4.5);
+    assert!(place.z < 0.5, "{place}");
+}
+
+#[test]
+fn a_vehicle_under_a_deck_does_not_climb_through_it() {
+    let place = comes_home_under_a_deck([2.0, 2.4], 6.0);
+    assert!(place.z < 0.5, "{place}");
+}

@@ -33,17 +33,15 @@ impl Parameters {
         self.pending.push(Pending { name: name.to_owned(), write, patience: None });
     }
 
-    /// A value arrived. Returns it if it was asked for.
+    /// A value arrived, which somebody else may have asked for or set.
     pub(super) fn on_value(
         &mut self,
         message: &PARAM_VALUE_DATA,
         encoding: ParameterEncoding,
-    ) -> Option<(String, ParameterValue)> {
-        let name = name_from_wire(&message.param_id);
-        let asked = |pending: &Pending| pending.patience.is_some() && pending.name == name;
-        let index = self.pending.iter().position(asked)?;
-        let value = ParameterValue::decode(message.param_value, message.param_type, encoding);
-        Some((self.pending.remove(index).name, value))
+    ) -> (String, ParameterValue) {
+        let name = name_from_wire(&message.param_id).to_owned();
+        self.pending.retain(|pending| pending.patience.is_none() || pending.name != name);
+        (name, ParameterValue::decode(message.param_value, message.param_type, encoding))
     }
 
     /// Sends what is due; returns the names given up.

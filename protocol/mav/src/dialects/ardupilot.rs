@@ -5,10 +5,10 @@ use std::time::Duration;
 use mavlink::dialects::common::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd};
 use nalgebra::Vector3;
 
-use super::px4;
 use crate::axes;
 use crate::command::{Command, CommandResult};
-use crate::dialect::{Dialect, Failsafe};
+use crate::dialect::Dialect;
+use crate::failsafe::Failsafe;
 use crate::mode::FlightMode;
 use crate::parameter::ParameterEncoding;
 use crate::set_point::SetPoint;
@@ -25,6 +25,45 @@ const MODES: [(FlightMode, u8); 6] = [
     (FlightMode::Manual, 16),
     // BRAKE. LOITER would read the absent throttle stick as "descend".
     (FlightMode::Hold, 17),
+];
+
+/// Set-points that stop, and then heartbeats that stop: GUIDED alone would hold the vehicle for ever.
+const FAILSAFES: [Failsafe; 5] = [
+    Failsafe {
+        parameters: &["GUID_TIMEOUT"],
+        expected: "at most 1 s without set-points",
+        setting: |_| 0.5,
+        is_safe: |seconds, _| (0.0..=1.0).contains(&seconds),
+        required: false,
+    },
+    Failsafe {
+        parameters: &["FS_GCS_ENABLE"],
+        expected: "return or land when heartbeats stop (1, 3, 4, 5)",
+        setting: |_| 5.0,
+        is_safe: |action, _| [1.0, 3.0, 4.0, 5.0].contains(&action),
+        required: true,
+    },
+    Failsafe {
+        parameters: &["SYSID_MYGCS", "MAV_GCS_SYSID"],
+        expected: "the agent's own heartbeats count (`autopilot.system_id`)",
+        setting: |own| own.into(),
+        is_safe: |counts, own| counts == f64::from(own),
+        required: true,
+    },
+    Failsafe {
+        parameters: &["FS_GCS_TIMEOUT"],
+        expected: "at most 5 s without heartbeats",
+        setting: |_| 5.0,
+        is_safe: |seconds, _| (0.0..=5.0).contains(&seconds),
+        required: false,
+    },
+    Failsafe {
+        parameters: &["BATT_MONITOR"],
+        expected: "a battery monitor (4: voltage and current)",
+        setting: |_| 4.0,
+        is_safe: |monitor, _| monitor >= 1.0,
+        required: true,
+    },
 ];
 
 /// Gain from height error to climb where planar set-points become velocities, 1/s.
@@ -107,8 +146,7 @@ impl Dialect for ArduPilot {
         ParameterEncoding::Cast
     }
 
-    /// None of its own are read so far.
     fn failsafes(&self) -> &'static [Failsafe] {
-        &px4::FAILSAFES_IF_PRESENT
+        &FAILSAFES
     }
 }

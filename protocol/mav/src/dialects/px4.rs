@@ -3,7 +3,8 @@
 use mavlink::dialects::common::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd};
 
 use crate::command::CommandResult;
-use crate::dialect::{Dialect, Failsafe};
+use crate::dialect::Dialect;
+use crate::failsafe::Failsafe;
 use crate::mode::FlightMode;
 use crate::set_point::SetPoint;
 use crate::telemetry::Telemetry;
@@ -30,25 +31,42 @@ const POSITION_CONTROL: u8 = 3;
 const AUTO: u8 = 4;
 const OFFBOARD: u8 = 6;
 
-const FAILSAFES: [Failsafe; 2] = [
+const FAILSAFES: [Failsafe; 4] = [
     Failsafe {
-        parameter: OFFBOARD_LOSS_TIMEOUT,
-        is_safe: |seconds| (0.0..=2.0).contains(&seconds),
+        parameters: &[OFFBOARD_LOSS_TIMEOUT],
         expected: "at most 2 s without set-points",
+        setting: |_| 1.0,
+        is_safe: |seconds, _| (0.0..=2.0).contains(&seconds),
         required: true,
     },
     Failsafe {
-        parameter: OFFBOARD_LOSS_ACTION,
-        is_safe: |action| OffboardLoss::from_number(action).is_some_and(|it| !it.drops_vehicle()),
+        parameters: &[OFFBOARD_LOSS_ACTION],
         expected: "position, altitude, return, land or hold (0, 1, 3, 4, 5)",
+        setting: |_| 4.0,
+        is_safe: |action, _| OffboardLoss::from_number(action).is_some_and(|it| !it.drops_vehicle()),
         required: true,
+    },
+    // The same without a remote control, up to PX4 1.13: 3 ends the flight, 4 stops the motors.
+    Failsafe {
+        parameters: &["COM_OBL_ACT"],
+        expected: "land, hold or return (0, 1, 2)",
+        setting: |_| 0.0,
+        is_safe: |action, _| [0.0, 1.0, 2.0].contains(&action),
+        required: false,
+    },
+    Failsafe {
+        parameters: &["BAT1_SOURCE", "BAT_SOURCE"],
+        expected: "a battery monitor: a power module, another one, or the motor controllers (0, 1, 2)",
+        setting: |_| 0.0,
+        is_safe: |source, _| [0.0, 1.0, 2.0].contains(&source),
+        required: false,
     },
 ];
 
 /// The same for autopilots of which nothing is known: they probably lack these parameters.
-pub(super) const FAILSAFES_IF_PRESENT: [Failsafe; 2] = {
-    let [timeout, action] = FAILSAFES;
-    [timeout.optional(), action.optional()]
+pub(super) const FAILSAFES_IF_PRESENT: [Failsafe; 4] = {
+    let [timeout, action, without_remote, battery] = FAILSAFES;
+    [timeout.optional(), action.optional(), without_remote, battery]
 };
 
 /// The reaction of a vehicle to set-points that stop, in the order of the numbers.

@@ -8,8 +8,11 @@ skein_bp::events! {
 
     /// Preflight checks pass.
     Ready = "ready", Own;
-    /// A preflight check that had passed fails again.
-    Unready = "unready", Own;
+    /// A preflight check does not pass: told when that begins, and when others do not.
+    Unready = "unready", Own {
+        /// The checks that do not pass, in words.
+        why: Text,
+    }
     /// The vehicle is in the air at its take-off height.
     Airborne = "airborne", Own;
     /// The vehicle stands on the ground, disarmed.

@@ -10,6 +10,7 @@ mod event_set;
 mod field;
 mod occurrence;
 mod presence;
+mod readiness;
 mod record;
 mod repair;
 mod scan;
@@ -21,6 +22,7 @@ use skein_dbp::{BidAck, BidRecord, Board, Message, NodeName, Occurrence, Presenc
 
 pub(crate) use self::field::{Result, node, ns};
 pub use self::{
+    readiness::{Check, CheckState, Readiness},
     record::{Addressee, Kind, Record},
     scan::Scan,
     scene::{Form, Scene, Solid},
@@ -93,7 +95,9 @@ messages! {
     /// A world, for display.
     Scene(Scene),
     /// The bids of all b-threads at a node.
-    Board(Board);
+    Board(Board),
+    /// A vehicle's checks before take-off.
+    Readiness(Readiness);
 }
 
 impl Payload {

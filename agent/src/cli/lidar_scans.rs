@@ -1,0 +1,64 @@
+//! The lidar's scans as they come over Zenoh, on this program's clock.
+
+use std::time::{Duration, SystemTime};
+
+use anyhow::Context as _;
+use skein_wire::{Fleet, Key, Link as _, NodeName, Payload, Scan};
+use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
+
+/// A scan from further in the future comes from a clock that is wrong.
+const CLOCK_TOLERANCE: Duration = Duration::from_millis(50);
+
+/// Where the scans come in; what is no scan, or from the future, is counted and told now and then.
+pub struct LidarScans {
+    link: ZenohLink,
+    strange: u64,
+}
+
+impl LidarScans {
+    /// Listens to what `sensor` puts for `vehicle`, on a way of its own if there is one.
+    pub fn open(
+        fleet: &Fleet,
+        vehicle: &NodeName,
+        (sensor, network): (NodeName, Option<NetworkSettings>),
+        session: &ZenohSession,
+    ) -> anyhow::Result<Self> {
+        let key = Key::to_one::<Scan>(fleet, sensor, vehicle.clone());
+        let own = network.map(|network| ZenohSession::open(ZenohConfig::new(fleet.clone(), network)));
+        let session = own.transpose()?.unwrap_or_else(|| session.clone());
+        let link = session.listen(vec![key.to_string()]).context("`lidar`")?;
+        Ok(Self { link, strange: 0 })
+    }
+
+    /// Takes the next scan that has come, if there is one; `now` is this program's clock.
+    pub fn poll(&mut self, now: Duration) -> Option<Scan> {
+        while let Some((_, payload)) = self.link.poll() {
+            let Ok(Payload::Scan(scan)) = Payload::decode(&payload) else {
+                self.complain("messages under the lidar's key are no scans");
+                continue;
+            };
+            let unix = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
+            let age = match unix.checked_sub(scan.stamp) {
+                Some(age) => age,
+                None if scan.stamp - unix <= CLOCK_TOLERANCE => Duration::ZERO,
+                None => {
+                    self.complain(
+                        "scans come from the future: keep the lidar's computer's clock with this one's",
+                    );
+                    continue;
+                }
+            };
+            if let Some(stamp) = now.checked_sub(age) {
+                return Some(Scan { stamp, ..scan });
+            }
+        }
+        None
+    }
+
+    fn complain(&mut self, what: &str) {
+        self.strange += 1;
+        if self.strange.is_power_of_two() {
+            tracing::warn!("{} {what}", self.strange);
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! A vehicle's checks before take-off, on `readiness/<node>`: also of one that does not know yet where it is.
+
+use skein_dbp::NodeName;
+
+use super::field::{Result, at_most, finite, node, out_of_range, required, same_variants, text, vector};
+use super::record::{Addressee, Kind, Record};
+use crate::decode_error::DecodeError;
+use crate::proto;
+
+/// The checks of a vehicle before take-off, and what its places are relative to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Readiness {
+    pub node: NodeName,
+    pub incarnation: u64,
+    /// Its pad, metres ENU.
+    pub home: [f64; 3],
+    /// The world's origin as this vehicle is configured: latitude and longitude, degrees, and height, metres.
+    pub datum: [f64; 3],
+    /// All checks, in the order in which people look at them; only the first [`Readiness::MAX_CHECKS`]
+    /// travel.
+    pub checks: Vec<Check>,
+}
+
+/// One check before take-off.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Check {
+    /// Its name: one word, or that of a parameter of the autopilot.
+    pub name: String,
+    pub state: CheckState,
+    /// The value found, or the fault, in words.
+    pub value: String,
+    /// The remedy; empty if it passes.
+    pub advice: String,
+}
+
+/// The result of a check.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CheckState {
+    Passes,
+    Fails,
+    /// Not known yet.
+    #[default]
+    Waits,
+}
+
+impl Readiness {
+    /// So many checks travel.
+    pub const MAX_CHECKS: usize = 64;
+
+    /// Whether all checks pass.
+    pub fn is_ready(&self) -> bool {
+        self.faults().next().is_none()
+    }
+
+    /// The checks that do not pass.
+    pub fn faults(&self) -> impl Iterator<Item = &Check> {
+        self.checks.iter().filter(|check| check.state != CheckState::Passes)
+    }
+}
+
+impl CheckState {
+    /// The word for it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Passes => "passes",
+            Self::Fails => "fails",
+            Self::Waits => "waits",
+        }
+    }
+}
+
+impl Record for Readiness {
+    const KIND: Kind = Kind { word: "readiness", addressee: Addressee::All, every_node_listens: true };
+
+    fn sender(&self) -> Option<&NodeName> {
+        Some(&self.node)
+    }
+}
+
+same_variants!(CheckState, proto::CheckState: Waits, Passes, Fails);
+
+impl From<&Readiness> for proto::Readiness {
+    fn from(readiness: &Readiness) -> Self {
+        let check = |check: &Check| proto::Check {
+            name: check.name.clone(),
+            state: proto::CheckState::from(check.state).into(),
+            value: check.value.clone(),
+            advice: check.advice.clone(),
+        };
+        let [latitude_deg, longitude_deg, height_m] = readiness.datum;
+        Self {
+            node: text(&readiness.node),
+            incarnation: readiness.incarnation,
+            home: Some(readiness.home.into()),
+            datum: Some(proto::Datum { latitude_deg, longitude_deg, height_m }),
+            checks: readiness.checks.iter().take(Readiness::MAX_CHECKS).map(check).collect(),
+        }
+    }
+}
+
+impl TryFrom<proto::Readiness> for Readiness {
+    type Error = DecodeError;
+
+    fn try_from(readiness: proto::Readiness) -> Result<Self> {
+        at_most("Readiness.checks", readiness.checks.len(), Self::MAX_CHECKS, "at most 64 checks")?;
+        let datum = required("Readiness.datum", readiness.datum)?;
+        let within = |field, given: f64, most: f64| {
+            if given.abs() <= most {
+                Ok(given)
+            } else {
+                Err(out_of_range(field, given, "degrees on the earth"))
+            }
+        };
+        let check = |check: proto::Check| Check {
+            // One of a later version does not pass as far as this one can tell.
+            state: check.state().into(),
+            name: check.name,
+            value: check.value,
+            advice: check.advice,
+        };
+        Ok(Self {
+            node: node("Readiness.node", &readiness.node)?,
+            incarnation: readiness.incarnation,
+            home: vector("Readiness.home", &required("Readiness.home", readiness.home)?)?.into(),
+            datum: [
+                within("Readiness.datum", datum.latitude_deg, 90.0)?,
+                within("Readiness.datum", datum.longitude_deg, 180.0)?,
+                finite("Readiness.datum", datum.height_m)?,
+            ],
+            checks: readiness.checks.into_iter().map(check).collect(),
+        })
+    }
+}
