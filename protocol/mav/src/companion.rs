@@ -1,5 +1,6 @@
 //! The companion's end of an autopilot's link.
 
+mod clock;
 mod commands;
 mod missions;
 mod parameters;
@@ -143,6 +144,9 @@ impl Companion {
         if !self.telemetry().connected {
             return;
         }
+        if let Some(question) = self.reports.clock.ask(now) {
+            self.writer.write(&question);
+        }
         self.ask_for_messages(now);
         let encoding = self.dialect().parameter_encoding();
         for name in self.parameters.tick(now, encoding, self.autopilot, &mut self.writer) {
@@ -260,7 +264,8 @@ impl Companion {
         {
             return;
         }
-        if let Some(request) = self.subscriptions.next_request(now) {
+        let estimator_message = self.dialect().estimator_message();
+        if let Some(request) = self.subscriptions.next_request(now, estimator_message) {
             self.send_command(now, Purpose::Subscription, request);
         }
     }
@@ -275,6 +280,7 @@ impl Companion {
                     self.events.push_back(MavEvent::CommandAcked { command, result });
                 }
             }
+            MavMessage::TIMESYNC(message) => self.reports.clock.hear(now, message),
             MavMessage::PARAM_VALUE(message) => {
                 let read = self.parameters.on_value(message, self.dialect().parameter_encoding());
                 self.events.extend(read.map(|(name, value)| MavEvent::ParameterRead { name, value }));

@@ -3,6 +3,8 @@
 use mavlink::dialects::common::MavMessage;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc, consts};
 
+use crate::ekf_status;
+
 /// A sender or receiver: a MAVLink system and one component of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Address {
@@ -104,8 +106,8 @@ impl FrameReader {
                 Candidate::Incomplete => return None,
                 Candidate::Garbage => self.skip(1),
                 Candidate::Intact(layout) => {
-                    let payload = bytes.get(layout.payload).unwrap_or_default();
-                    let parsed = MavMessage::parse(layout.version, layout.message_id, payload);
+                    let payload = bytes.get(layout.payload.clone()).unwrap_or_default();
+                    let parsed = parse(&layout, payload);
                     self.start += layout.frame_len;
                     match parsed {
                         Ok(message) => {
@@ -139,6 +141,13 @@ impl FrameReader {
     fn skip(&mut self, bytes: usize) {
         self.start += bytes;
         self.bad_bytes += bytes as u64;
+    }
+}
+
+fn parse(layout: &Layout, payload: &[u8]) -> Result<MavMessage, mavlink::error::ParserError> {
+    match layout.message_id {
+        ekf_status::ID => Ok(MavMessage::ESTIMATOR_STATUS(ekf_status::parse(payload))),
+        id => MavMessage::parse(layout.version, id, payload),
     }
 }
 
@@ -176,7 +185,11 @@ fn examine(bytes: &[u8]) -> Candidate {
     ) else {
         return Candidate::Garbage;
     };
-    if calculate_crc(covered, MavMessage::extra_crc(message_id)) != u16::from_le_bytes([low, high]) {
+    let extra_crc = match message_id {
+        ekf_status::ID => ekf_status::EXTRA_CRC,
+        id => MavMessage::extra_crc(id),
+    };
+    if calculate_crc(covered, extra_crc) != u16::from_le_bytes([low, high]) {
         return Candidate::Garbage;
     }
     Candidate::Intact(Layout {

@@ -7,5 +7,6 @@ mod dialects;
 mod frames;
 mod geodesy;
 mod lossy_link;
+mod positions;
 mod protocols;
 mod simulator;

@@ -53,6 +53,7 @@ pub fn simulation_config(scenario: &Scenario) -> SimulationConfig {
         position: plan.start,
         yaw: plan.yaw,
         system_id,
+        position_errors: plan.position_errors.clone(),
     });
     SimulationConfig {
         scene: scenario.scene.clone(),

@@ -9,6 +9,7 @@ use super::px4;
 use crate::axes;
 use crate::command::{Command, CommandResult};
 use crate::dialect::{Dialect, Failsafe};
+use crate::ekf_status;
 use crate::mode::FlightMode;
 use crate::parameter::ParameterEncoding;
 use crate::set_point::SetPoint;
@@ -43,6 +44,10 @@ impl Dialect for ArduPilot {
 
     fn is_spoken_by(&self, heartbeat: &HEARTBEAT_DATA) -> bool {
         heartbeat.autopilot == MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA
+    }
+
+    fn estimator_message(&self) -> u32 {
+        ekf_status::ID
     }
 
     fn mode(&self, custom_mode: u32) -> FlightMode {
