@@ -20,12 +20,12 @@ use crate::{
         allowed::Allowed,
         guidance::Guidance,
         layers::Layers,
-        perception::{Perception, Pose},
+        perception::{Other, Perception, Pose},
         set_point::{FRESH_FOR, KeepAlive, keep_alive, oldest_age},
         surroundings::Surroundings,
         touchdown::Descent,
     },
-    positioning::{Estimate, Motion, Positioning},
+    positioning::{Estimate, Motion, Positioning, excess_m},
     report::Report,
     scripts::Circumstances,
     watches::{Checks, LOCATED_WITHIN, Watches},
@@ -51,6 +51,9 @@ pub struct Control {
     failsafes: Failsafes,
     flight: Flight,
     positioning: Box<dyn Positioning>,
+    estimate: Estimate,
+    /// Why the estimate is none to fly by, if so.
+    doubt: Option<String>,
     perception: Perception,
     neighbours: Neighbours,
     watches: Watches,
@@ -78,6 +81,8 @@ impl Control {
             failsafes: Failsafes::default(),
             flight: Flight::new(config.takeoff_height_m),
             positioning,
+            estimate: Estimate::default(),
+            doubt: None,
             perception: Perception::of_mission(&config)?,
             neighbours: Neighbours::new(name.clone(), config.incarnation),
             watches: Watches::default(),
@@ -91,6 +96,22 @@ impl Control {
     /// Takes in bytes from the autopilot.
     pub fn receive_mavlink(&mut self, now: Duration, bytes: &[u8]) {
         self.companion.receive(now, bytes);
+        self.locate(now);
+    }
+
+    /// Takes in the newest estimate; what was placed by those before is shifted with it.
+    fn locate(&mut self, now: Duration) {
+        let before = self.estimate.frame;
+        self.estimate = self.positioning.estimate(now, self.companion.telemetry());
+        let shift = self.estimate.frame - before;
+        if shift != Vector3::zeros() {
+            self.perception.shift(&shift);
+            self.guidance.steering.shift(&shift);
+        }
+        self.doubt = self.watches.position(&self.estimate, self.config.sigma_limit_m);
+        if let Some(motion) = &self.estimate.motion {
+            self.perception.allow_for(excess_m(motion.value.position_sigma_m()));
+        }
     }
 
     /// Bytes for the autopilot.
@@ -104,12 +125,17 @@ impl Control {
         if now.saturating_sub(scan.stamp) > FRESH_FOR {
             return;
         }
-        let Some((position, attitude)) = self.estimate().pose_at(scan.stamp) else { return };
+        let Some((position, attitude)) = self.estimate.pose_at(scan.stamp) else { return };
         // From the ground there is little to see, and much of it is the ground.
         if !self.is_airborne() {
             return;
         }
-        let others: Vec<_> = self.neighbours.at(now).map(|neighbour| neighbour.position()).collect();
+        let sigma_m = self.estimate.motion.map_or(0.0, |motion| motion.value.position_sigma_m());
+        let other = |neighbour: Neighbour| Other {
+            position: neighbour.position(),
+            off_m: excess_m(sigma_m.hypot(neighbour.track.sigma_m)),
+        };
+        let others: Vec<_> = self.neighbours.at(now).map(other).collect();
         self.perception.take_in(scan, &Pose { position, attitude }, &others);
         let (returns, rays) = (self.perception.returns(), scan.ranges_m.len());
         self.guidance.steering.look(scan.stamp, &position, returns, rays, self.perception.map());
@@ -134,6 +160,7 @@ impl Control {
     /// Begins a tick: finds out what has changed.
     pub fn observe(&mut self, now: Duration) -> Vec<Report> {
         self.companion.tick(now);
+        self.locate(now);
         let mut reports = Vec::new();
         self.follow_autopilot(now, &mut reports);
         self.watch(now, &mut reports);
@@ -153,10 +180,10 @@ impl Control {
 
     fn watch(&mut self, now: Duration, reports: &mut Vec<Report>) {
         let AgentConfig { envelope, fence, home, .. } = &*self.config;
-        let (telemetry, estimate) = (self.companion.telemetry(), self.estimate());
+        let (telemetry, estimate) = (self.companion.telemetry(), self.estimate);
         let (around, home) = (self.neighbours.around(), Vector3::from(*home));
         let checks = Checks {
-            is_located: estimate.is_fresh(now, LOCATED_WITHIN),
+            is_located: estimate.is_fresh(now, LOCATED_WITHIN) && self.doubt.is_none(),
             has_sound_failsafes: self.failsafes.are_sound(),
             is_clear_overhead: !around.iter().any(|neighbour| neighbour.may_be_over(&home, envelope)),
             is_taking_off: self.flight.is_taking_off(),
@@ -169,8 +196,12 @@ impl Control {
                 let seconds_home = (position - home).norm() / envelope.cruise_m_s + 10.0;
                 reports.extend(self.watches.battery(now, battery.value, seconds_home));
             }
-            reports.extend(self.watches.fence(position, fence));
+            let sigma_m = motion.value.position_sigma_m();
+            reports.extend(self.watches.doubt(self.doubt.as_deref(), sigma_m));
+            reports.extend(self.watches.fence(&motion.value, fence));
             reports.extend(self.watches.separation(position, around));
+        } else {
+            self.watches.stand();
         }
     }
 
@@ -195,7 +226,7 @@ impl Control {
 
     /// What this vehicle tells the others of its body, ten times a second.
     pub fn state(&mut self, now: Duration) -> Option<State> {
-        let Estimate { motion, attitude } = self.estimate();
+        let Estimate { motion, attitude, .. } = self.estimate;
         let Motion { position, velocity, .. } = motion?.value;
         let telemetry = self.companion.telemetry();
         Some(State {
@@ -247,7 +278,7 @@ impl Control {
     /// see.
     fn settle(&mut self, now: Duration) {
         let FlightPhase::Settling { until } = self.flight.phase() else { return };
-        let sees = keep_alive(now, &self.inputs()) == KeepAlive::Command;
+        let sees = self.keep_alive(now) == KeepAlive::Command && self.doubt.is_none();
         let place = self.motion().filter(|_| sees && now < until).and_then(|motion| {
             let descent = Descent {
                 name: &self.name,
@@ -275,8 +306,7 @@ impl Control {
             return;
         }
         let Some(motion) = self.motion() else { return };
-        let inputs = self.inputs();
-        match keep_alive(now, &inputs) {
+        match self.keep_alive(now) {
             KeepAlive::Command => {
                 let around = self.neighbours.around();
                 let armed = around.iter().filter(|neighbour| neighbour.armed);
@@ -288,7 +318,7 @@ impl Control {
                 };
                 let set_point = self.guidance.steer(now, &motion, &surroundings);
                 self.set_points.commands += 1;
-                let age = oldest_age(now, &inputs).unwrap_or_default();
+                let age = oldest_age(now, &self.inputs()).unwrap_or_default();
                 self.set_points.oldest_input = self.set_points.oldest_input.max(age);
                 self.companion.set_point(now, set_point);
             }
@@ -310,15 +340,23 @@ impl Control {
     /// When what set-points are made from was measured.
     fn inputs(&self) -> Vec<Option<Duration>> {
         let scan = self.config.lidar.then(|| self.perception.last_scan());
-        self.estimate().stamps().into_iter().chain(scan).collect()
+        self.estimate.stamps().into_iter().chain(scan).collect()
     }
 
-    fn estimate(&self) -> Estimate {
-        self.positioning.estimate(self.companion.telemetry())
+    /// The keep-alive rule. While the autopilot is heard and only its position is doubted, it is told to stand still
+    /// until it is told to land: there is nothing that its own failsafe would know better.
+    fn keep_alive(&self, now: Duration) -> KeepAlive {
+        match keep_alive(now, &self.inputs()) {
+            KeepAlive::Silence if self.doubt.is_some() => {
+                let others: Vec<_> = self.inputs().into_iter().skip(1).collect();
+                keep_alive(now, &others).at_most_stop()
+            }
+            kept => kept,
+        }
     }
 
     fn motion(&self) -> Option<Motion> {
-        self.estimate().motion.map(|motion| motion.value)
+        self.estimate.motion.map(|motion| motion.value)
     }
 
     /// The motion of a vehicle that this agent flies.
@@ -348,10 +386,10 @@ impl Control {
         self.set_points
     }
 
-    /// What makes the autopilot's own failsafes unsafe, if something does.
+    /// What makes the autopilot's own failsafes unsafe, or its position none to fly by, if something does.
     #[must_use]
     pub fn complaint(&self) -> Option<&str> {
-        self.failsafes.complaint()
+        self.failsafes.complaint().or(self.doubt.as_deref())
     }
 
     /// Flight mode as the autopilot tells it.

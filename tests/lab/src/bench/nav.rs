@@ -34,7 +34,7 @@ const AROUND_M: [f64; 2] = [3.0, 9.0];
 /// Navigation cycles begin this often.
 const CYCLE: Duration = Duration::from_millis(100);
 /// Standard deviations of position, metres, and velocity, m/s.
-const SIGMA: [f64; 2] = [0.05, 0.1];
+const SIGMA: [f64; 3] = [0.05, 0.05, 0.1];
 /// Height of the flight, metres.
 const HEIGHT_M: f64 = 3.0;
 
