@@ -130,7 +130,7 @@ impl Control {
         if !self.is_airborne() {
             return;
         }
-        let sigma_m = self.estimate.motion.map_or(0.0, |motion| motion.value.position_sigma_m());
+        let sigma_m = self.position_sigma_m();
         let other = |neighbour: Neighbour| Other {
             position: neighbour.position(),
             off_m: excess_m(sigma_m.hypot(neighbour.track.sigma_m)),
@@ -378,6 +378,12 @@ impl Control {
     #[must_use]
     pub fn guidance(&self) -> &Guidance {
         &self.guidance
+    }
+
+    /// Standard deviation of the position, m; 0 while there is none.
+    #[must_use]
+    pub fn position_sigma_m(&self) -> f64 {
+        self.motion().map_or(0.0, |motion| motion.position_sigma_m())
     }
 
     /// What set-points were made from so far.

@@ -9,6 +9,7 @@ mod faults;
 mod gazebo_worlds;
 mod landing;
 mod limits;
+mod positions;
 mod scenarios;
 mod scripts;
 mod tasks;

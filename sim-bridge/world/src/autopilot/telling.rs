@@ -8,6 +8,9 @@ use skein_mav::VehicleState;
 
 use crate::position_error::{PositionFault, PositionFaultKind};
 
+/// What is told late falls behind by a second in so many: no time stamp goes back.
+const FALLS_BEHIND: u32 = 2;
+
 /// The faults of one autopilot's telling.
 #[derive(Debug, Clone)]
 pub(super) struct Telling {
@@ -63,7 +66,7 @@ impl Telling {
         let (mut late, mut freezes) = (Duration::ZERO, false);
         for fault in self.faults.iter().filter(|fault| fault.is_on(now)) {
             match fault.kind {
-                PositionFaultKind::Late(by) => late = late.max(by),
+                PositionFaultKind::Late(by) => late = late.max(by.min((now - fault.at) / FALLS_BEHIND)),
                 PositionFaultKind::Freezes => freezes = true,
                 _ => {}
             }
