@@ -13,6 +13,11 @@ const LONGEST_ROUND_TRIP: Duration = Duration::from_secs(5);
 /// Messages overtake one another by no more than this; whose clock goes back further has begun anew.
 const OVERTAKES: Duration = Duration::from_millis(500);
 
+/// Of an autopilot that does not answer, a pause longer than this is its own and no delay.
+const LONGEST_WAIT: Duration = Duration::from_secs(1);
+/// Its clock goes slower than the companion's by no more than this, s/s.
+const SLIPS: f64 = 0.01;
+
 /// A time stamp after those before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stamp {
@@ -45,7 +50,10 @@ impl Reading {
 pub(super) struct Clock {
     ask_at: Duration,
     reading: Option<Reading>,
-    newest: Option<Duration>,
+    /// As far as an autopilot that does not answer lets itself be known: by the position that came soonest.
+    soonest: Option<Reading>,
+    /// The newest time stamp, and when it came.
+    newest: Option<(Duration, Duration)>,
 }
 
 impl Clock {
@@ -78,24 +86,38 @@ impl Clock {
     }
 
     /// Takes in the time stamp of a position.
-    pub(super) fn stamp(&mut self, time: Duration) -> Stamp {
+    pub(super) fn stamp(&mut self, now: Duration, time: Duration) -> Stamp {
         let stamp = match self.newest {
-            Some(newest) if time == newest => Stamp::Same,
-            Some(newest) if time + OVERTAKES < newest => Stamp::Restarted,
-            Some(newest) if time < newest => return Stamp::Overtaken,
+            Some((newest, _)) if time == newest => Stamp::Same,
+            Some((newest, _)) if time + OVERTAKES < newest => Stamp::Restarted,
+            Some((newest, _)) if time < newest => return Stamp::Overtaken,
             _ => Stamp::Newer,
         };
         if stamp == Stamp::Restarted {
-            self.reading = None;
+            (self.reading, self.soonest) = (None, None);
         }
-        self.newest = Some(time);
+        self.compare(now, time);
+        self.newest = Some((time, now));
         stamp
+    }
+
+    /// Learns where the clock stands from when a time stamp came. A pause of both is none of the messages.
+    fn compare(&mut self, now: Duration, time: Duration) {
+        let paused = self.newest.is_some_and(|(newest, came)| {
+            now.saturating_sub(came) > time.saturating_sub(newest) + LONGEST_WAIT
+        });
+        let heard = Reading { ahead_s: time.as_secs_f64() - now.as_secs_f64(), round_trip_s: 0.0, at: now };
+        let known = self.soonest.filter(|known| {
+            let slipped_s = SLIPS * now.saturating_sub(known.at).as_secs_f64();
+            !paused && heard.ahead_s < known.ahead_s - slipped_s
+        });
+        self.soonest = known.or(Some(heard));
     }
 
     /// How old something is that was measured at `time` on the autopilot's clock; `None` while it is not known where
     /// that stands.
     pub(super) fn age(&self, now: Duration, time: Duration) -> Option<Duration> {
-        let age_s = now.as_secs_f64() + self.reading?.ahead_s - time.as_secs_f64();
+        let age_s = now.as_secs_f64() + self.reading.or(self.soonest)?.ahead_s - time.as_secs_f64();
         Duration::try_from_secs_f64(age_s.max(0.0)).ok().filter(|age| *age <= LONGEST_ROUND_TRIP)
     }
 }
@@ -141,6 +163,26 @@ mod tests {
     }
 
     #[test]
+    fn of_an_autopilot_that_does_not_answer_a_growing_delay_is_known_and_a_pause_is_none() {
+        let mut clock = Clock::default();
+        let age = |clock: &mut Clock, now, its| {
+            clock.stamp(ms(now), ms(its));
+            clock.age(ms(now), ms(its)).unwrap()
+        };
+        assert_eq!(age(&mut clock, 1000, 70_000), ms(0));
+        assert_eq!(age(&mut clock, 1030, 70_020), ms(10));
+        // A queue that grows by half of each second.
+        let late: Vec<_> = (1..=50).map(|n| age(&mut clock, 1030 + 40 * n, 70_020 + 20 * n)).collect();
+        assert!(late[49] > ms(900) && late[49] < ms(1050), "{:?}", late[49]);
+        // A simulator that stands still for five seconds.
+        assert_eq!(age(&mut clock, 9000, 71_040), ms(0));
+        // What was held back for as long comes in at once.
+        age(&mut clock, 15_000, 71_060);
+        assert_eq!(age(&mut clock, 15_000, 77_000), ms(0));
+        assert!(age(&mut clock, 15_500, 77_020) > ms(450));
+    }
+
+    #[test]
     fn a_question_and_an_answer_to_nobody_tell_nothing() {
         let mut clock = Clock::default();
         for (tc1, ts1) in [(0, 500_000_000), (-5, 500_000_000), (7, -1), (7, i64::MAX), (i64::MAX, 7)] {
@@ -152,7 +194,7 @@ mod tests {
     #[test]
     fn time_stamps_go_on_stay_overtake_or_begin_anew() {
         let mut clock = Clock::default();
-        let stamps = [5000, 5020, 5020, 5010, 5040, 100, 120].map(|time| clock.stamp(ms(time)));
+        let stamps = [5000, 5020, 5020, 5010, 5040, 100, 120].map(|time| clock.stamp(ms(9000), ms(time)));
         use Stamp::{Newer, Overtaken, Restarted, Same};
         assert_eq!(stamps, [Newer, Newer, Same, Overtaken, Newer, Restarted, Newer]);
     }

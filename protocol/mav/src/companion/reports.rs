@@ -122,7 +122,7 @@ impl Reports {
         let velocity = axes::ned_to_enu(&velocity);
         let position = self.local.as_ref().map(|local| local.position_to_world(&position));
         let telemetry = &mut self.telemetry;
-        match self.clock.stamp(time) {
+        match self.clock.stamp(now, time) {
             Stamp::Overtaken => return,
             // Said again, it is as old as it was. Of a clock that stands the values tell.
             Stamp::Same
