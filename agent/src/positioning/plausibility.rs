@@ -85,6 +85,8 @@ pub struct Plausibility {
     /// When the position last changed.
     changed: Duration,
     origin: Option<Geodetic>,
+    /// The origin has moved, and no position from there has come yet.
+    awaits_origin: bool,
     restarts: u32,
     had_gps: bool,
     /// The last jump or restart that is not forgotten yet, and when it was found.
@@ -104,9 +106,11 @@ impl Plausibility {
             (self.shock, self.jumped) = (None, Vector3::zeros());
         }
         let has_restarted = std::mem::replace(&mut self.restarts, telemetry.restarts) != telemetry.restarts;
-        let origin_moved = self.origin.is_some() && self.origin != telemetry.local_origin;
+        self.awaits_origin |= self.origin.is_some() && self.origin != telemetry.local_origin;
         self.origin = telemetry.local_origin;
+        let last = self.newest();
         let jump = self.follow(telemetry, sigma_m);
+        let origin_moved = self.newest() != last && std::mem::take(&mut self.awaits_origin);
         self.jumped += jump.unwrap_or_default();
         self.frame += jump.unwrap_or_default();
         let by_m = self.jumped.norm();
@@ -121,6 +125,11 @@ impl Plausibility {
         if let Some(doubt) = found {
             self.shock = Some((now, doubt));
         }
+    }
+
+    /// When the newest position came.
+    fn newest(&self) -> Option<Duration> {
+        self.samples.back().map(|sample| sample.stamp)
     }
 
     /// The jump that the newest position shows, if it is new and does.
@@ -368,6 +377,8 @@ mod tests {
         told.run(1000);
         assert_eq!(told.doubt(), None, "the first origin is none that moved");
         told.telemetry.local_origin = origin(473_978_620);
+        told.look(told.now);
+        assert_eq!(told.doubt(), None, "how far is not known before a position from there");
         told.position.y += 13.0;
         told.run(20);
         assert!(matches!(told.doubt(), Some(Doubt::OriginMoved(m)) if (m - 13.0).abs() < 0.1));
