@@ -121,6 +121,9 @@ pub struct Planners {
     pub local: LocalPlanner,
 }
 
+/// See [`AgentConfig::sigma_limit_m`].
+pub const DEFAULT_SIGMA_LIMIT_M: f64 = 2.0;
+
 /// What tells where the vehicle is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -157,6 +160,8 @@ pub struct AgentConfig {
     pub return_altitude_m: f64,
     /// What tells where it is.
     pub position: PositionSource,
+    /// A position of a greater standard deviation is none to fly by, m.
+    pub sigma_limit_m: f64,
     /// Whether the vehicle has a lidar: without scans younger than 200 ms it then stands still.
     pub lidar: bool,
     pub fence: Fence,

@@ -18,7 +18,7 @@ use skein_zenoh::NetworkSettings;
 use crate::airspace_table::AirspaceTable;
 use crate::autopilot_link::Address;
 use crate::bthreads::LinkLossPolicy;
-use crate::config::{AgentConfig, Envelope, Fence, Planners, PositionSource};
+use crate::config::{AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, Planners, PositionSource};
 use crate::field;
 
 /// The file, field by field. What is never written keeps its default in files that are made.
@@ -37,6 +37,8 @@ pub struct AgentFile {
     pub seed: u64,
     #[serde(default)]
     position: PositionSource,
+    #[serde(default = "sigma_limit_m", deserialize_with = "field::positive")]
+    sigma_limit_m: f64,
     pub autopilot: Autopilot,
     pub lidar: Option<Lidar>,
     pub datum: DatumTable,
@@ -118,6 +120,10 @@ fn state() -> PathBuf {
     "state".into()
 }
 
+fn sigma_limit_m() -> f64 {
+    DEFAULT_SIGMA_LIMIT_M
+}
+
 fn lease_ms() -> f64 {
     1000.0
 }
@@ -186,6 +192,7 @@ impl AgentFile {
             // TOML has no greater number.
             seed: agent.seed.min(i64::MAX.unsigned_abs()),
             position: agent.position,
+            sigma_limit_m: agent.sigma_limit_m,
             autopilot: Autopilot {
                 link,
                 system_id: agent.system_id,
@@ -243,6 +250,7 @@ impl AgentFile {
             takeoff_height_m: self.mission.takeoff_height_m,
             return_altitude_m: self.mission.return_altitude_m,
             position: self.position,
+            sigma_limit_m: self.sigma_limit_m,
             lidar: lidar.is_some(),
             fence: self.fence,
             airspace,

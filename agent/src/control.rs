@@ -22,12 +22,12 @@ use crate::{
         guidance::Guidance,
         headroom::{Headroom, Look},
         layers::Layers,
-        perception::{Perception, Pose},
+        perception::{Other, Perception, Pose},
         set_point::{FRESH_FOR, KeepAlive, keep_alive, oldest_age},
         surroundings::Surroundings,
         touchdown::Descent,
     },
-    positioning::{Estimate, Motion, Positioning},
+    positioning::{Estimate, Motion, Positioning, excess_m},
     preflight::{Failsafes, Others, Preflight, Situation, degrees},
     report::Report,
     scripts::Circumstances,
@@ -65,6 +65,9 @@ pub struct Control {
     landed_at: Option<Vector3<f64>>,
     flight: Flight,
     positioning: Box<dyn Positioning>,
+    estimate: Estimate,
+    /// Why the estimate is none to fly by, if so.
+    doubt: Option<String>,
     perception: Perception,
     neighbours: Neighbours,
     watches: Watches,
@@ -102,6 +105,8 @@ impl Control {
             landed_at: None,
             flight: Flight::new(config.takeoff_height_m),
             positioning,
+            estimate: Estimate::default(),
+            doubt: None,
             perception: Perception::of_mission(&config)?,
             neighbours: Neighbours::new(name.clone(), config.incarnation),
             watches: Watches::default(),
@@ -123,6 +128,22 @@ impl Control {
     /// Takes in bytes from the autopilot.
     pub fn receive_mavlink(&mut self, now: Duration, bytes: &[u8]) {
         self.companion.receive(now, bytes);
+        self.locate(now);
+    }
+
+    /// Takes in the newest estimate; what was placed by those before is shifted with it.
+    fn locate(&mut self, now: Duration) {
+        let before = self.estimate.frame;
+        self.estimate = self.positioning.estimate(now, self.companion.telemetry());
+        let shift = self.estimate.frame - before;
+        if shift != Vector3::zeros() {
+            self.perception.shift(&shift);
+            self.guidance.steering.shift(&shift);
+        }
+        self.doubt = self.watches.position(&self.estimate, self.config.sigma_limit_m);
+        if let Some(motion) = &self.estimate.motion {
+            self.perception.allow_for(excess_m(motion.value.position_sigma_m()));
+        }
     }
 
     /// Bytes for the autopilot.
@@ -149,13 +170,18 @@ impl Control {
         }
         let [up_m, down_m] = [scan.up_m, scan.down_m].map(|range| range.map(f64::from));
         self.look = Some(Look { stamp: scan.stamp, up_m, down_m });
-        let Some((position, attitude)) = self.estimate().pose_at(scan.stamp) else { return };
+        let Some((position, attitude)) = self.estimate.pose_at(scan.stamp) else { return };
         // From the ground there is little to see, and much of it is the ground.
         if !self.is_airborne() {
             return;
         }
         self.ground_seen.look(&position, self.config.home[2], down_m);
-        let others: Vec<_> = self.neighbours.at(now).map(|neighbour| neighbour.position()).collect();
+        let sigma_m = self.position_sigma_m();
+        let other = |neighbour: Neighbour| Other {
+            position: neighbour.position(),
+            off_m: excess_m(sigma_m.hypot(neighbour.track.sigma_m)),
+        };
+        let others: Vec<_> = self.neighbours.at(now).map(other).collect();
         if !self.perception.take_in(scan, &Pose { position, attitude }, &others) {
             return;
         }
@@ -187,6 +213,7 @@ impl Control {
     /// Begins a tick: finds out what has changed.
     pub fn observe(&mut self, now: Duration) -> Vec<Report> {
         self.companion.tick(now);
+        self.locate(now);
         let mut reports = Vec::new();
         self.follow_autopilot(now, &mut reports);
         self.watch(now, &mut reports);
@@ -217,7 +244,7 @@ impl Control {
         let charge = known_charge(now, self.companion.telemetry().battery);
         self.watch_energy(now, charge, reports);
         let fence = &self.config.fence;
-        let (telemetry, estimate) = (self.companion.telemetry(), self.estimate());
+        let (telemetry, estimate) = (self.companion.telemetry(), self.estimate);
         let around = self.neighbours.around();
         reports.extend(self.preflight.update(&Situation {
             now,
@@ -225,6 +252,7 @@ impl Control {
             telemetry,
             make: self.companion.dialect().name(),
             estimate,
+            doubt: self.doubt.as_deref(),
             failsafes: &self.failsafes,
             look: self.look,
             keep_out: self.perception.map().keep_out(),
@@ -239,8 +267,12 @@ impl Control {
         }));
         if let (true, Some(motion)) = (self.is_airborne(), estimate.motion) {
             let position = motion.value.position;
-            reports.extend(self.watches.fence(position, fence));
+            let sigma_m = motion.value.position_sigma_m();
+            reports.extend(self.watches.doubt(self.doubt.as_deref(), sigma_m));
+            reports.extend(self.watches.fence(&motion.value, fence));
             reports.extend(self.watches.separation(position, around));
+        } else {
+            self.watches.stand();
         }
     }
 
@@ -249,7 +281,7 @@ impl Control {
             reports.extend(self.energy.rest(now, charge).map(Report::BatteryChanged));
             return;
         }
-        let Estimate { motion: Some(motion), attitude } = self.estimate() else { return };
+        let Estimate { motion: Some(motion), attitude, .. } = self.estimate else { return };
         let (map, clearance_m) = (self.perception.map(), self.config.envelope.obstacle_clearance_m());
         // What the map does not reach to, or has forgotten, is not known to be clear.
         let is_mapped = |place: &_| map.voxels().index_of(place).is_some();
@@ -283,7 +315,7 @@ impl Control {
 
     /// What this vehicle tells the others of its body, ten times a second.
     pub fn state(&mut self, now: Duration) -> Option<State> {
-        let Estimate { motion, attitude } = self.estimate();
+        let Estimate { motion, attitude, .. } = self.estimate;
         let Motion { position, velocity, .. } = motion?.value;
         let telemetry = self.companion.telemetry();
         Some(State {
@@ -335,7 +367,7 @@ impl Control {
     /// see.
     fn settle(&mut self, now: Duration) {
         let FlightPhase::Settling { until } = self.flight.phase() else { return };
-        let sees = keep_alive(now, &self.inputs()) == KeepAlive::Command;
+        let sees = self.keep_alive(now) == KeepAlive::Command && self.doubt.is_none();
         let place = self.motion().filter(|_| sees && now < until).and_then(|motion| {
             let descent = Descent {
                 name: &self.name,
@@ -370,8 +402,7 @@ impl Control {
             return;
         }
         let Some(motion) = self.motion() else { return };
-        let inputs = self.inputs();
-        match keep_alive(now, &inputs) {
+        match self.keep_alive(now) {
             KeepAlive::Command => {
                 let around = self.neighbours.around();
                 let armed = around.iter().filter(|neighbour| neighbour.armed);
@@ -384,7 +415,7 @@ impl Control {
                 };
                 let set_point = self.guidance.steer(now, &motion, &surroundings);
                 self.set_points.commands += 1;
-                let age = oldest_age(now, &inputs).unwrap_or_default();
+                let age = oldest_age(now, &self.inputs()).unwrap_or_default();
                 self.set_points.oldest_input = self.set_points.oldest_input.max(age);
                 self.send(now, set_point);
             }
@@ -419,15 +450,23 @@ impl Control {
     /// When what set-points are made from was measured.
     fn inputs(&self) -> Vec<Option<Duration>> {
         let scan = self.config.lidar.then(|| self.perception.last_scan());
-        self.estimate().stamps().into_iter().chain(scan).collect()
+        self.estimate.stamps().into_iter().chain(scan).collect()
     }
 
-    fn estimate(&self) -> Estimate {
-        self.positioning.estimate(self.companion.telemetry())
+    /// The keep-alive rule. While the autopilot is heard and only its position is doubted, it is told to stand still
+    /// until it is told to land: there is nothing that its own failsafe would know better.
+    fn keep_alive(&self, now: Duration) -> KeepAlive {
+        match keep_alive(now, &self.inputs()) {
+            KeepAlive::Silence if self.doubt.is_some() => {
+                let others: Vec<_> = self.inputs().into_iter().skip(1).collect();
+                keep_alive(now, &others).at_most_stop()
+            }
+            kept => kept,
+        }
     }
 
     fn motion(&self) -> Option<Motion> {
-        self.estimate().motion.map(|motion| motion.value)
+        self.estimate.motion.map(|motion| motion.value)
     }
 
     /// The motion of a vehicle that this agent flies.
@@ -462,6 +501,12 @@ impl Control {
     #[must_use]
     pub fn guidance(&self) -> &Guidance {
         &self.guidance
+    }
+
+    /// Standard deviation of the position, m; 0 while there is none.
+    #[must_use]
+    pub fn position_sigma_m(&self) -> f64 {
+        self.motion().map_or(0.0, |motion| motion.position_sigma_m())
     }
 
     /// What set-points were made from so far.

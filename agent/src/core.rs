@@ -249,6 +249,11 @@ impl AgentCore {
         self.control.set_points()
     }
 
+    /// Standard deviation of the position, as others are told, m; 0 while there is none.
+    pub fn position_sigma_m(&self) -> f64 {
+        self.control.position_sigma_m()
+    }
+
     /// The path ahead, from the vehicle to its waypoint; empty without one.
     pub fn path_ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
         self.control.guidance().course.path_ahead()

@@ -41,7 +41,10 @@ pub use self::cli::main;
 pub use self::{
     agent_error::AgentError,
     airspace_table::{AirspaceError, AirspaceTable},
-    config::{AgentConfig, Envelope, Fence, GlobalPlanner, LocalPlanner, Planners, PositionSource},
+    config::{
+        AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, GlobalPlanner, LocalPlanner, Planners,
+        PositionSource,
+    },
     control::SetPointRecord,
     core::{AgentCore, Status},
     flight::FlightPhase,

@@ -13,6 +13,7 @@ use skein_planning::separation;
 use skein_wire::{Echo, State};
 
 use crate::config::Envelope;
+use crate::positioning::excess_m;
 
 /// A neighbour silent for longer than this is not relied on to keep its distance: with three of ten messages lost,
 /// that is one in 170 000.
@@ -87,7 +88,8 @@ impl Neighbour {
             age_s => age_s.min(MOST_UNSEEN_S) + CLIMB_S,
         };
         let offset = self.position().xy() - place.xy();
-        self.armed && offset.norm() <= envelope.separation_m + unseen_s * envelope.cruise_m_s
+        let off_m = excess_m(self.track.sigma_m);
+        self.armed && offset.norm() <= envelope.separation_m + off_m + unseen_s * envelope.cruise_m_s
     }
 }
 

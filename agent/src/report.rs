@@ -8,8 +8,8 @@ use skein_dbp::NodeName;
 use skein_mav::FlightMode;
 use skein_wire::event::{
     self, Airborne, Arrived, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed,
-    FenceBreached, FoundAirborne, Landed, Leave, PathBlocked, PilotTook, Planned, Ready, Slept, Stuck,
-    TooClose, Unplannable, Unready,
+    FenceBreached, FoundAirborne, Landed, Leave, PathBlocked, PilotTook, Planned, PositionDoubted,
+    PositionTrusted, Ready, Slept, Stuck, TooClose, Unplannable, Unready,
 };
 
 use crate::energy::Changed;
@@ -44,6 +44,13 @@ pub enum Report {
     BatteryCritical,
     /// The vehicle is outside its fence.
     FenceBreached,
+    /// The vehicle does not know where it is, in the air; the standard deviation of its position, m.
+    PositionDoubted {
+        why: String,
+        sigma_m: f64,
+    },
+    /// It does again.
+    PositionTrusted,
     /// A neighbour is inside the emergency distance.
     TooClose(NodeName),
     /// No neighbour is any more.
@@ -89,6 +96,8 @@ impl Report {
             }
             Self::BatteryCritical => me.event(BatteryCritical),
             Self::FenceBreached => me.event(FenceBreached),
+            Self::PositionDoubted { why, sigma_m } => me.event(PositionDoubted { why: why.into(), sigma_m }),
+            Self::PositionTrusted => me.event(PositionTrusted),
             Self::TooClose(other) => me.event(TooClose { other: other.as_str().into() }),
             Self::Clear => me.event(Clear),
             Self::Planned { leg, length_m } => me.event(Planned { leg, length_m }),

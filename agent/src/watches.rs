@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use crate::config::Fence;
 use crate::neighbours::Neighbour;
+use crate::positioning::{Estimate, Motion, excess_m};
 use crate::report::Report;
 
 /// Energy at which only landing is left.
@@ -14,6 +15,9 @@ const EMERGENCY_DISTANCE_M: f64 = 1.0;
 const CLEAR_DISTANCE_M: f64 = 1.2;
 /// How far outside the fence is a breach and not an estimate's noise, m.
 const FENCE_TOLERANCE_M: f64 = 0.3;
+
+/// A position that was too uncertain is one to fly by again below this share of the limit.
+const TRUSTED_BELOW: f64 = 0.8;
 
 /// A condition that is told once when it begins and once when it ends.
 #[derive(Debug, Default)]
@@ -39,6 +43,9 @@ pub struct Watches {
     low: Edge,
     critical: Edge,
     outside: Edge,
+    doubted: Edge,
+    /// The position is too uncertain, and becomes so above a limit.
+    uncertain: bool,
     close: Edge,
 }
 
@@ -55,11 +62,36 @@ impl Watches {
         reports
     }
 
-    /// Geofence: the vehicle is outside.
-    pub fn fence(&mut self, position: Vector3<f64>, fence: &Fence) -> Option<Report> {
+    /// Position: why it is none to fly by, if so. Too uncertain is one above `limit_m`, until it is well below.
+    pub fn position(&mut self, estimate: &Estimate, limit_m: f64) -> Option<String> {
+        let sigma_m = estimate.motion.map_or(0.0, |motion| motion.value.position_sigma_m());
+        self.uncertain = sigma_m > if self.uncertain { TRUSTED_BELOW * limit_m } else { limit_m };
+        let uncertain =
+            || format!("the position is uncertain by {sigma_m:.1} m, more than {limit_m} m (sigma_limit_m)");
+        let shock = || estimate.shock.filter(|_| self.uncertain).map(|shock| shock.to_string());
+        let doubt = estimate.doubt.map(|doubt| doubt.to_string());
+        doubt.or_else(shock).or_else(|| self.uncertain.then(uncertain))
+    }
+
+    /// The same in the air, as news; `why` is what [`position`](Self::position) says.
+    pub fn doubt(&mut self, why: Option<&str>, sigma_m: f64) -> Option<Report> {
+        self.doubted.turns(why.is_some()).map(|_| match why {
+            Some(why) => Report::PositionDoubted { why: why.to_owned(), sigma_m },
+            None => Report::PositionTrusted,
+        })
+    }
+
+    /// On the ground nothing is doubted in the air.
+    pub fn stand(&mut self) {
+        self.doubted = Edge::default();
+    }
+
+    /// Geofence: the vehicle is outside, by more than its position may be off.
+    pub fn fence(&mut self, motion: &Motion, fence: &Fence) -> Option<Report> {
         let outside = (0..3).any(|axis| {
-            position[axis] < fence.min[axis] - FENCE_TOLERANCE_M
-                || position[axis] > fence.max[axis] + FENCE_TOLERANCE_M
+            let tolerance_m = FENCE_TOLERANCE_M + excess_m(motion.axis_sigma_m(axis));
+            motion.position[axis] < fence.min[axis] - tolerance_m
+                || motion.position[axis] > fence.max[axis] + tolerance_m
         });
         self.outside.rises(outside).then_some(Report::FenceBreached)
     }

@@ -36,6 +36,7 @@ fn config() -> AgentConfig {
         takeoff_height_m: 2.0,
         return_altitude_m: RETURN_ALTITUDE_M,
         position: Default::default(),
+        sigma_limit_m: 2.0,
         lidar: true,
         fence: Fence { min: [-20.0, -20.0, 0.0], max: [20.0, 20.0, 10.0] },
         airspace: Default::default(),
@@ -735,6 +736,45 @@ mod separation {
         assert_eq!(vehicle.after(SECOND), NOTHING);
         assert!(!vehicle.may(Advance::NAME));
         assert_eq!(vehicle.reports(Clear::NAME), ["clear", "advance"]);
+    }
+}
+
+mod positioning {
+    use super::*;
+
+    fn doubted() -> Event {
+        PositionDoubted { why: "the position jumped by 8.0 m".into(), sigma_m: 8.0 }.at(ME)
+    }
+
+    #[test]
+    fn a_doubted_position_stops_the_vehicle_until_it_is_trusted() {
+        let mut vehicle = Vehicle::on_its_way();
+        assert_eq!(
+            vehicle.hears(doubted()),
+            ["position_doubted: the position jumped by 8.0 m", "hold: the position jumped by 8.0 m"]
+        );
+        assert_eq!(vehicle.after(9 * SECOND), NOTHING);
+        assert!(!vehicle.may(Advance::NAME) && !vehicle.may(Homeward::NAME));
+        assert_eq!(vehicle.reports(PositionTrusted::NAME), ["position_trusted", "advance"]);
+    }
+
+    #[test]
+    fn a_position_doubted_for_ten_seconds_lands_the_vehicle_and_once_more_when_it_is_handed_back() {
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.hears(doubted());
+        assert_eq!(vehicle.after(10 * SECOND), ["land: the position jumped by 8.0 m"]);
+        vehicle.hears(PilotTook { mode: "manual".into(), by: "pilot".into() }.at(ME));
+        // The mission ended with the landing, and ends so again.
+        let (hold, land) = ("hold: the position jumped by 8.0 m", "land: the position jumped by 8.0 m");
+        assert_eq!(vehicle.is_ordered(What::HandBack), ["order hand_back", "hand_back", hold, land]);
+    }
+
+    #[test]
+    fn a_vehicle_on_its_way_down_is_not_held() {
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.is_ordered(What::Land);
+        assert_eq!(vehicle.hears(doubted()), ["position_doubted: the position jumped by 8.0 m"]);
+        assert_eq!(vehicle.after(10 * SECOND), NOTHING);
     }
 }
 

@@ -49,7 +49,7 @@ fn second_in(
 ) -> Vec<SetPoint> {
     let envelope = Envelope::default();
     let mut guidance = Guidance::new(envelope, Layers::of(&envelope, FENCE, Planners::default()));
-    let motion = Motion::new(place, Vector3::zeros(), [0.05, 0.1]);
+    let motion = Motion::new(place, Vector3::zeros(), [0.05, 0.05, 0.1]);
     let surroundings = Surroundings { map: perception.map(), sees: true, obstacles: &[], neighbours, rank };
     (0..50).map(|tick| guidance.steer(Duration::from_millis(20 * tick), &motion, &surroundings)).collect()
 }

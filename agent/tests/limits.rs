@@ -35,7 +35,7 @@ impl Flight {
             guidance: Guidance::new(envelope, Layers::of(&envelope, FENCE, Planners::default())),
             perception,
             now: Duration::from_secs(1),
-            motion: Motion::new(place.into(), Vector3::zeros(), [0.05, 0.1]),
+            motion: Motion::new(place.into(), Vector3::zeros(), [0.05, 0.05, 0.1]),
             others: Vec::new(),
         }
     }
@@ -91,7 +91,7 @@ impl Flight {
         };
         let mut place = self.motion.position + velocity * 0.02;
         place.z = height_m.map_or(place.z, |height_m| place.z + (height_m - place.z).clamp(-0.02, 0.02));
-        self.motion = Motion::new(place, velocity, [0.05, 0.1]);
+        self.motion = Motion::new(place, velocity, [0.05, 0.05, 0.1]);
         set_point
     }
 

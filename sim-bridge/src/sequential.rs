@@ -14,7 +14,8 @@ use skein_dbp::{Happened, Node};
 use skein_wire::event::{
     self, Advance, Airborne, Arrived, BatteryCritical, BatteryLow, Clear, CommandFailed, Complete,
     Declared as _, Failed, FenceBreached, FoundAirborne, Hold, Homeward, Land, Landed, PathBlocked,
-    PilotTook, Plan, PlanReason, Planned, Ready, Slept, Stuck, Takeoff, TooClose, Unplannable, Unready,
+    PilotTook, Plan, PlanReason, Planned, PositionDoubted, PositionTrusted, Ready, Slept, Stuck, Takeoff,
+    TooClose, Unplannable, Unready,
 };
 
 /// The navigator's name in the trace.
@@ -34,6 +35,7 @@ pub struct Sequential {
     ready: bool,
     /// Whether a neighbour is inside the emergency distance.
     too_close: bool,
+    is_lost: bool,
     /// Escapes from local minima on the way to this waypoint.
     escapes: u8,
     acts: Vec<Event>,
@@ -80,6 +82,7 @@ impl Sequential {
             way: Way::None,
             ready: false,
             too_close: false,
+            is_lost: false,
             escapes: 0,
             acts: Vec::new(),
         }
@@ -93,6 +96,9 @@ impl Sequential {
         match (self.me.verb(report).unwrap_or_default(), &self.stage) {
             (verb @ (Ready::NAME | Unready::NAME), _) => self.ready = verb == Ready::NAME,
             (verb @ (TooClose::NAME | Clear::NAME), _) => self.too_close = verb == TooClose::NAME,
+            (verb @ (PositionDoubted::NAME | PositionTrusted::NAME), _) => {
+                self.is_lost = verb == PositionDoubted::NAME;
+            }
             (Airborne::NAME, Stage::Climbing) => self.fly(now, 0),
             (Arrived::NAME, Stage::Flying { leg }) if arrived_at == i64::try_from(*leg).ok() => {
                 self.fly(now, leg + 1);
@@ -142,7 +148,7 @@ impl Sequential {
                 self.way = Way::Asked { attempt };
                 self.acts.push(self.me.event(Plan { why }));
             }
-            Way::Known { leave_due } if now >= leave_due && !self.too_close => {
+            Way::Known { leave_due } if now >= leave_due && !self.too_close && !self.is_lost => {
                 self.way = Way::Known { leave_due: now + navigation::CYCLE };
                 let homeward = matches!(self.stage, Stage::Returning { .. });
                 self.acts.push(if homeward {

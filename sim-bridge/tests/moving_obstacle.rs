@@ -9,7 +9,7 @@ use skein_sim::cli::Controller;
 use skein_sim::fly::{self, Links, Swarm};
 use skein_sim::scenario::Scenario;
 use skein_wire::{Fleet, Network, NetworkConfig};
-use skein_world::{Simulation, Truth, VehicleModel, VehicleSetup};
+use skein_world::{PositionErrors, Simulation, Truth, VehicleModel, VehicleSetup};
 
 const SCENARIO: &str = r#"
 vehicles = 1
@@ -71,7 +71,13 @@ fn meet(local: LocalPlanner, intruder_m_s: f64, seed: u64) -> (Option<Outcome>, 
     let mut config = fly::simulation_config(&scenario);
     let start = Vector3::new(CROSSING_M, -AWAY_M, 0.0);
     let model = VehicleModel::built_in("x500").unwrap();
-    config.vehicles.push(VehicleSetup { model, position: start, yaw: 0.0, system_id: 9 });
+    config.vehicles.push(VehicleSetup {
+        model,
+        position: start,
+        yaw: 0.0,
+        system_id: 9,
+        position_errors: PositionErrors::default(),
+    });
     let network = Network::new(NetworkConfig::default(), seed);
     let links = Links {
         vehicles: vec![Box::new(network.join(&fly::vehicle_name(0)))],

@@ -9,6 +9,7 @@ use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{GlobalPlanner, LocalPlanner};
 use skein_sim::scenario::{Order, Overrides, Scenario, ScenarioError, Who};
 use skein_wire::event::What;
+use skein_world::{PositionErrors, PositionFaultKind};
 
 const YARD: &str = r#"
 name = "yard"
@@ -367,4 +368,39 @@ fn targets_are_shared_and_reached_at_one_time() -> Result<(), ScenarioError> {
     let again = Scenario::built_in("valley", None, 7)?;
     assert_eq!(valley.vehicles, again.vehicles);
     Ok(())
+}
+
+#[test]
+fn errors_of_positions_are_each_vehicles_own_or_those_of_all() -> Result<(), ScenarioError> {
+    let tables = "[position_error]\nsigma_m = 1.0\n[[position_fault]]\nat_s = 20.0\nfor_s = 5.0\nvehicle = 2\n\
+                  jump_m = [8.0, 0.0, 0.0]\n[[position_fault]]\nat_s = 30.0\ngps_lost = true\n[gps]";
+    let text = YARD.replace("[gps]", tables).replace(
+        "model = \"crazyflie\"",
+        "model = \"crazyflie\"\nposition_error = { sigma_m = 0.3, correlation_s = 20.0, vertical = 1.0 }",
+    );
+    let errors: Vec<_> = read(&text)?.vehicles.iter().map(|plan| plan.position_errors.clone()).collect();
+    let [first, second] = errors.as_slice() else { panic!("two vehicles: {errors:?}") };
+    assert_eq!(
+        (first.drift.sigma_m, first.drift.sigma_vertical_m, first.drift.correlation_s),
+        (1.0, 0.5, 60.0)
+    );
+    assert_eq!((second.drift.sigma_m, second.drift.sigma_vertical_m), (0.3, 0.3));
+    let kinds = |errors: &PositionErrors| errors.faults.iter().map(|fault| fault.kind).collect::<Vec<_>>();
+    let jump = PositionFaultKind::Jump(Vector3::new(8.0, 0.0, 0.0));
+    assert_eq!(kinds(first), [PositionFaultKind::GpsLost]);
+    assert_eq!(kinds(second), [jump, PositionFaultKind::GpsLost]);
+    Ok(())
+}
+
+#[test]
+fn a_position_fault_is_one_thing_of_a_vehicle_that_is_there() {
+    let fault = |fault: &str| message("[gps]", &format!("[[position_fault]]\nat_s = 1.0\n{fault}\n[gps]"));
+    for none_or_two in ["", "gps_lost = false", "freezes = true\nresets = true"] {
+        let text = fault(none_or_two);
+        assert!(text.starts_with("yard.toml: position_fault[0]: expected exactly one of jump_m"), "{text}");
+    }
+    let text = fault("resets = true\nvehicle = 3");
+    assert_eq!(text, "yard.toml: position_fault[0].vehicle: there is no vehicle 3: expected 1 to 2");
+    let text = fault("late_s = 11.0");
+    assert!(text.contains("`position_fault[0].late_s`") && text.contains("0 to 10"), "{text}");
 }

@@ -45,12 +45,24 @@ const ZONE_MARGIN_M: f64 = 1.0;
 /// Paths keep this high above terrain that is known, m.
 const TERRAIN_CLEARANCE_M: f64 = 1.0;
 
+/// Margins around known places follow the accuracy of the position in such steps, m.
+const ALLOWANCE_STEP_M: f64 = 0.25;
+
 /// Where the vehicle was, and how it lay, when a scan was taken. World ENU, body FLU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     pub position: Vector3<f64>,
     /// Body to world.
     pub attitude: UnitQuaternion<f64>,
+}
+
+/// Another vehicle, as it was heard.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Other {
+    /// ENU, m.
+    pub position: Vector3<f64>,
+    /// How far off it may be, beyond what every margin allows for, m.
+    pub off_m: f64,
 }
 
 /// The map a vehicle makes of what it senses.
@@ -69,6 +81,8 @@ pub struct Perception {
     returns: Vec<Vector3<f64>>,
     ground_m: f64,
     rolls: bool,
+    /// What margins around known places allow for the vehicle's position, m.
+    allows_for_m: f64,
     /// Which of the far rays the newest scan followed.
     far_ray: u32,
 }
@@ -118,6 +132,7 @@ impl Perception {
             returns: Vec::new(),
             ground_m: config.ground_m,
             rolls,
+            allows_for_m: 0.0,
             far_ray: 0,
         })
     }
@@ -140,18 +155,43 @@ impl Perception {
         if [floor_m, ceiling_m] == self.heights_m {
             return;
         }
-        let Ok(mut wider) = Self::new(&self.fence, self.home, [floor_m, ceiling_m]) else { return };
+        self.make_anew([floor_m, ceiling_m], &Vector3::zeros());
+    }
+
+    /// Moves all that has been seen, because the position that it was placed by has jumped by as much; ENU, m.
+    pub fn shift(&mut self, by: &Vector3<f64>) {
+        for point in self.near.iter_mut().chain(&mut self.returns) {
+            *point += by;
+        }
+        self.make_anew(self.heights_m, by);
+    }
+
+    /// Makes the map anew for these heights, with what it has seen moved.
+    fn make_anew(&mut self, heights_m: [f64; 2], moved: &Vector3<f64>) {
+        let Ok(mut anew) = Self::new(&self.fence, self.home, heights_m) else { return };
         if let Some(keep_out) = self.map.keep_out() {
-            wider = wider.with_keep_out(keep_out.clone());
+            anew = anew.with_keep_out(keep_out.clone());
         }
         if self.rolls {
             let voxels = self.map.voxels();
-            wider.map.recentre(&((voxels.clamp(&FAR_CORNER) + voxels.clamp(&-FAR_CORNER)) / 2.0));
+            anew.map.recentre(&((voxels.clamp(&FAR_CORNER) + voxels.clamp(&-FAR_CORNER)) / 2.0 + moved));
         }
-        for point in self.map.voxels().hits() {
-            wider.map.integrate(point, &[RayEnd { point, hit: true }]);
+        for seen in self.map.voxels().hits() {
+            let point = seen + moved;
+            anew.map.integrate(point, &[RayEnd { point, hit: true }]);
         }
-        (self.map, self.heights_m) = (wider.map, wider.heights_m);
+        (self.map, self.heights_m) = (anew.map, anew.heights_m);
+    }
+
+    /// Widens the margins around known places by how far the vehicle's position may be off, in steps; m.
+    pub fn allow_for(&mut self, off_m: f64) {
+        let off_m = (off_m / ALLOWANCE_STEP_M).ceil() * ALLOWANCE_STEP_M;
+        let shrinks_little =
+            (ALLOWANCE_STEP_M..=1.5 * ALLOWANCE_STEP_M).contains(&(self.allows_for_m - off_m));
+        if off_m != self.allows_for_m && !shrinks_little {
+            self.allows_for_m = off_m;
+            self.map.set_margins(ZONE_MARGIN_M + off_m, TERRAIN_CLEARANCE_M + off_m);
+        }
     }
 
     pub fn map(&self) -> &ClearanceMap {
@@ -182,7 +222,7 @@ impl Perception {
     /// Takes in a scan that was taken at `pose`, while `neighbours` were at these positions. What none has seen
     /// again for long is forgotten; without scans nothing is. A scan of which half is no measurement is none, and
     /// returns `false`.
-    pub fn take_in(&mut self, scan: &Scan, pose: &Pose, neighbours: &[Vector3<f64>]) -> bool {
+    pub fn take_in(&mut self, scan: &Scan, pose: &Pose, neighbours: &[Other]) -> bool {
         let measured = scan.ranges_m.iter().filter(|range| is_measured(**range)).count();
         if 2 * measured <= scan.ranges_m.len() {
             return false;
@@ -206,9 +246,8 @@ impl Perception {
             let (sin, cos) = (scan.angle_min + f64::from(ray) * scan.angle_step).sin_cos();
             let reach = if hit { range } else { scan.max_range_m };
             let point = pose.position + to_world * Vector3::new(reach * cos, reach * sin, 0.0);
-            let is_neighbour =
-                |other: &Vector3<f64>| (point - other).norm_squared() < NEIGHBOUR_M * NEIGHBOUR_M;
-            if hit && neighbours.iter().any(is_neighbour) {
+            let off_m = |other: &Other| (point - other.position).norm();
+            if hit && neighbours.iter().any(|other| off_m(other) < NEIGHBOUR_M) {
                 // The way to the neighbour is free; what lies behind it is not known.
                 let point = pose.position + (point - pose.position) * (1.0 - (NEIGHBOUR_M / range).min(1.0));
                 self.ends.push(RayEnd { point, hit: false });
@@ -220,12 +259,16 @@ impl Perception {
                     near.add(point);
                 }
             }
+            // Where a neighbour may be, given both errors, is nothing to remember; but it is kept clear of.
+            if hit && neighbours.iter().any(|other| off_m(other) < NEIGHBOUR_M + other.off_m) {
+                continue;
+            }
             self.ends.push(RayEnd { point, hit });
         }
         for (distance, direction) in [(scan.up_m, Vector3::z()), (scan.down_m, -Vector3::z())] {
             let point = distance.map(|distance| pose.position + to_world * direction * f64::from(distance));
             let near_neighbour = |point: &Vector3<f64>| {
-                neighbours.iter().any(|other| (point - other).norm_squared() < NEIGHBOUR_M * NEIGHBOUR_M)
+                neighbours.iter().any(|other| (point - other.position).norm() < NEIGHBOUR_M + other.off_m)
             };
             // Only what stands near the column matters: what lies far below a cone's edge is no obstacle yet.
             if let Some(point) = point.filter(|point| !near_neighbour(point)) {

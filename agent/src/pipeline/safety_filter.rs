@@ -13,6 +13,7 @@ use super::{
     surroundings::Surroundings,
 };
 use crate::config::{Envelope, Fence};
+use crate::positioning::excess_m;
 
 /// Walls of closed places are kept clear of from so far, m: further than any vehicle needs to stop.
 const WALLS_M: f64 = 15.0;
@@ -55,17 +56,18 @@ impl SafetyFilter {
         Self { fence, climb_m_s, config, evasion: Evasion::default() }
     }
 
-    /// The nearest points of the fence's walls: the filter keeps clear of them as of obstacles. From outside they are
-    /// open.
-    fn fence_ahead(&self, position: Vector3<f64>) -> impl Iterator<Item = Vector3<f64>> + '_ {
+    /// The nearest points of the fence's walls, as far as the position may be off further in: the filter keeps clear of
+    /// them as of obstacles. From outside they are open.
+    fn fence_ahead(&self, position: Vector3<f64>, off_m: f64) -> impl Iterator<Item = Vector3<f64>> + '_ {
         let Fence { min, max } = self.fence;
+        let clearance_m = self.config.obstacle_clearance_m;
         let walls =
             [0, 1].into_iter().flat_map(move |axis| [(axis, min[axis], 1.0), (axis, max[axis], -1.0)]);
         walls.filter(move |(axis, wall, inwards)| (position[*axis] - wall) * inwards > 0.0).map(
             move |(axis, wall, _)| {
                 let mut point = position;
                 point[axis] = wall;
-                point
+                nearer(point, &position, off_m, clearance_m)
             },
         )
     }
@@ -79,18 +81,20 @@ impl VelocityFilter for SafetyFilter {
         others: &[separation::Neighbour],
         surroundings: &Surroundings<'_>,
     ) -> Kept {
+        let off_m = excess_m(request.sigma_m);
         let mut obstacles: Vec<_> =
-            surroundings.obstacles.iter().copied().chain(self.fence_ahead(request.position)).collect();
+            surroundings.obstacles.iter().copied().chain(self.fence_ahead(request.position, off_m)).collect();
         let solid = obstacles.len();
         let walls = surroundings.map.keep_out().map(|keep_out| keep_out.walls(&request.position, WALLS_M));
-        obstacles.extend(walls.unwrap_or_default());
+        let clearance_m = self.config.obstacle_clearance_m;
+        let nearer = |wall| nearer(wall, &request.position, off_m, clearance_m);
+        obstacles.extend(walls.unwrap_or_default().into_iter().map(nearer));
         let mut filtered = filter(&request, others, &obstacles, &self.config);
         if obstacles.len() > solid && matches!(filtered.outcome, Outcome::Infeasible { .. }) {
             // To touch somebody or something is worse than to enter a zone.
             obstacles.truncate(solid);
             filtered = filter(&request, others, &obstacles, &self.config);
         }
-        let clearance_m = self.config.obstacle_clearance_m;
         let room = || room(request.position, surroundings.map, clearance_m);
         let Some(way) = self.evasion.decide(now, &filtered.outcome, surroundings.rank, room) else {
             return Kept { velocity: filtered.velocity, evades: false };
@@ -100,6 +104,15 @@ impl VelocityFilter for SafetyFilter {
         let request = separation::Motion { desired, planar: false, ..request };
         Kept { velocity: filter(&request, others, &obstacles, &self.config).velocity, evades: true }
     }
+}
+
+/// A wall as near as it may be to a vehicle whose position is off by so much; but not so near that it would have to
+/// move, for what it does not know.
+fn nearer(wall: Vector3<f64>, position: &Vector3<f64>, off_m: f64, clearance_m: f64) -> Vector3<f64> {
+    let offset = wall - position;
+    let distance_m = offset.norm();
+    let moved_m = off_m.min(distance_m - clearance_m);
+    if moved_m > 0.0 { wall - offset * (moved_m / distance_m) } else { wall }
 }
 
 /// Whether a vehicle can leave its height, as far as the map reaches and tells.

@@ -20,6 +20,14 @@ pub enum KeepAlive {
     Silence,
 }
 
+impl KeepAlive {
+    /// The same, but no more than a stop.
+    #[must_use]
+    pub fn at_most_stop(self) -> Self {
+        if self == Self::Command { Self::Stop } else { self }
+    }
+}
+
 /// Applies the rule at `now` to the times at which the inputs were measured.
 ///
 /// An input that was never received counts as silent.

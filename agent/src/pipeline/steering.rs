@@ -88,6 +88,14 @@ impl Steering {
         self.follower.rest();
     }
 
+    /// Every place that was placed by the vehicle's position moves with it, m.
+    pub fn shift(&mut self, by: &Vector3<f64>) {
+        for place in [&mut self.hover_at, &mut self.settles_at].into_iter().flatten() {
+            *place += by;
+        }
+        self.moving = Tracker::new(MovingConfig::default());
+    }
+
     /// Takes in the obstacle points of a scan of `rays` rays that was taken at `stamp` and `origin`; metres ENU.
     pub fn look(
         &mut self,

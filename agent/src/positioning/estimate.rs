@@ -5,6 +5,19 @@ use std::time::Duration;
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3};
 use skein_mav::Stamped;
 
+use super::plausibility::Doubt;
+
+/// Standard deviation of a position that every margin allows for, m.
+pub const NOMINAL_SIGMA_M: f64 = 0.05;
+/// Standard deviations by which what hangs on an absolute position is widened.
+const SIGMAS: f64 = 2.0;
+
+/// What to add to a margin for a position of this standard deviation: how far it may be off, beyond what every margin
+/// allows for, m.
+pub fn excess_m(sigma_m: f64) -> f64 {
+    SIGMAS * (sigma_m - NOMINAL_SIGMA_M).max(0.0)
+}
+
 /// Position and velocity. World ENU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
@@ -16,12 +29,23 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// A motion whose errors are independent and alike on all axes: standard deviations in m and m/s.
-    pub fn new(position: Vector3<f64>, velocity: Vector3<f64>, [position_m, velocity_m_s]: [f64; 2]) -> Self {
+    /// A motion whose errors are independent: standard deviations of the position east and north and of its height, m,
+    /// and of the velocity on all axes, m/s.
+    pub fn new(
+        position: Vector3<f64>,
+        velocity: Vector3<f64>,
+        [horizontal_m, vertical_m, velocity_m_s]: [f64; 3],
+    ) -> Self {
         let mut covariance = Matrix6::zeros();
-        covariance.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(position_m * position_m);
+        covariance.fixed_view_mut::<2, 2>(0, 0).fill_diagonal(horizontal_m * horizontal_m);
+        covariance[(2, 2)] = vertical_m * vertical_m;
         covariance.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(velocity_m_s * velocity_m_s);
         Self { position, velocity, covariance }
+    }
+
+    /// Standard deviation of the position on an axis: 0 is east, 1 north, 2 up.
+    pub fn axis_sigma_m(&self, axis: usize) -> f64 {
+        self.covariance[(axis, axis)].sqrt()
     }
 
     /// Standard deviation of the position along its least certain direction at most, m: exact if the axes are
@@ -49,6 +73,13 @@ pub struct Attitude {
 pub struct Estimate {
     pub motion: Option<Stamped<Motion>>,
     pub attitude: Option<Stamped<Attitude>>,
+    /// By how much the frame of positions has jumped since the beginning, m ENU: what was placed by earlier estimates
+    /// is to be shifted by as much.
+    pub frame: Vector3<f64>,
+    /// The reason not to fly by it now, if there is one.
+    pub doubt: Option<Doubt>,
+    /// What still widens its covariance, if something does.
+    pub shock: Option<Doubt>,
 }
 
 impl Estimate {
@@ -79,8 +110,10 @@ mod tests {
 
     #[test]
     fn the_standard_deviation_of_independent_axes_is_exact_and_that_of_others_not_too_small() {
-        let mut motion = Motion::new(Vector3::zeros(), Vector3::zeros(), [0.05, 0.1]);
+        let mut motion = Motion::new(Vector3::zeros(), Vector3::zeros(), [0.05, 0.05, 0.1]);
         assert_eq!(motion.position_sigma_m(), 0.05);
+        let tall = Motion::new(Vector3::zeros(), Vector3::zeros(), [0.3, 0.7, 0.1]);
+        assert_eq!((tall.axis_sigma_m(1), tall.axis_sigma_m(2)), (0.3, 0.7));
         // Long from south-west to north-east: variances of 1.9 and 0.1.
         motion.covariance[(0, 0)] = 1.0;
         motion.covariance[(1, 1)] = 1.0;

@@ -5,10 +5,12 @@
 
 mod autopilot;
 mod estimate;
+mod plausibility;
 mod source;
 
 pub use self::autopilot::Autopilot;
-pub use self::estimate::{Attitude, Estimate, Motion};
+pub use self::estimate::{Attitude, Estimate, Motion, excess_m};
+pub use self::plausibility::Doubt;
 pub use self::source::Positioning;
 
 use crate::config::PositionSource;
@@ -17,6 +19,6 @@ use crate::config::PositionSource;
 #[must_use]
 pub fn source(source: PositionSource) -> Box<dyn Positioning> {
     match source {
-        PositionSource::Autopilot => Box::new(Autopilot),
+        PositionSource::Autopilot => Box::new(Autopilot::default()),
     }
 }

@@ -46,6 +46,8 @@ pub struct Situation<'a> {
     /// The autopilot's make.
     pub make: &'static str,
     pub estimate: Estimate,
+    /// Why the estimate is none to fly by, if so.
+    pub doubt: Option<&'a str>,
     /// Of the battery, 0 to 1, as long as it is known.
     pub charge: Option<f64>,
     /// Why the battery does not hold the mission, if it does not.
@@ -192,6 +194,9 @@ impl Situation<'_> {
             None => waits(name, "no position yet", "wait for its satellites, under open sky"),
             Some(_) if !self.estimate.is_fresh(self.now, KNOWN_WITHIN) => {
                 fails(name, "position or attitude is old", "check the link to the autopilot")
+            }
+            Some(_) if let Some(why) = self.doubt => {
+                fails(name, why, "wait until its estimate is good again")
             }
             Some(motion) => passes(name, format!("good to {:.2} m", motion.value.position_sigma_m())),
         }
@@ -355,7 +360,7 @@ mod tests {
 
     impl Told {
         fn ready() -> Self {
-            let motion = Motion::new(Vector3::zeros(), Vector3::zeros(), [0.05, 0.1]);
+            let motion = Motion::new(Vector3::zeros(), Vector3::zeros(), [0.05, 0.05, 0.1]);
             let attitude = Attitude {
                 body_to_world: UnitQuaternion::identity(),
                 rate: Vector3::zeros(),
@@ -395,6 +400,7 @@ mod tests {
                 telemetry: &self.telemetry,
                 make: "PX4",
                 estimate: self.estimate,
+                doubt: None,
                 charge: self.telemetry.battery.map(|battery| battery.value.fraction),
                 shortfall: self.shortfall,
                 failsafes: &self.failsafes,

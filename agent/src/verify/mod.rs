@@ -50,7 +50,10 @@ const MAY_BLOCK: [(&str, &[&str]); 6] = [
     (Return::NAME, &["pilot", "battery"]),
     (Goto::NAME, &["pilot", "battery", "found_airborne"]),
     (Plan::NAME, &["pilot"]),
-    (Homeward::NAME, &["pilot", "separation", "obstacle_avoidance", RIGHT_OF_WAY, "found_airborne"]),
+    (
+        Homeward::NAME,
+        &["pilot", "positioning", "separation", "obstacle_avoidance", RIGHT_OF_WAY, "found_airborne"],
+    ),
 ];
 
 /// A vehicle's program under verification.

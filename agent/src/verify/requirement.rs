@@ -6,7 +6,8 @@ use skein_dbp::facts::{BlockLapsed, Confirmed, DuplicateName, PeerJoined, PeerLo
 use skein_wire::event::{
     Advance, Airborne, BatteryCritical, BatteryLow, Clear, CommandFailed, Complete, Enter, Failed,
     FenceBreached, FoundAirborne, Goto, HandBack, Homeward, Land, Landed, Leave, MOTION, OrderTaken, Passage,
-    PathBlocked, PilotTook, Plan, Planned, Ready, Return, Slept, Stuck, Takeoff, TooClose, Unready, What,
+    PathBlocked, PilotTook, Plan, Planned, PositionDoubted, PositionTrusted, Ready, Return, Slept, Stuck,
+    Takeoff, TooClose, Unready, What,
 };
 
 use crate::bthreads::{HOME_LEG, OPERATOR_LEG, RIGHT_OF_WAY};
@@ -176,6 +177,12 @@ pub fn requirements(me: &Me, fence: &Fence) -> Vec<Requirement> {
             leave.clone(),
             me.any::<TooClose>(),
             me.any::<Clear>(),
+        ),
+        Requirement::absence(
+            "while its position is doubted there is no leave to move",
+            leave.clone(),
+            me.any::<PositionDoubted>(),
+            me.any::<(PositionTrusted, Land, Landed)>(),
         ),
         Requirement::absence(
             "along a path that is known to be blocked there is no leave to move",

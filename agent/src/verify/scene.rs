@@ -30,6 +30,8 @@ skein_bp::words! {
         Pilot = "pilot",
         /// Another process under the vehicle's name, and an operator who holds and resumes.
         Name = "name",
+        /// A position that is doubted and trusted again, with a low battery and orders.
+        Position = "position",
         /// What is told to scripts only, around an undisturbed flight.
         Scripts = "scripts",
         /// All of it at once.
@@ -62,6 +64,7 @@ impl Scene {
             Self::Operator => "orders to hold, resume, land, return and go to a point, low battery",
             Self::Pilot => "pilot, sleep, start in the air, hand-back, orders, battery",
             Self::Name => "another process under this name, orders to hold, resume and return",
+            Self::Position => "a position that is doubted and trusted again, orders, low battery",
             Self::Scripts => "what is told to scripts, the ground's hold, low battery",
             Self::Everything => "all of it at once",
         }
@@ -87,7 +90,7 @@ impl Scene {
         if is_in(&[Self::Flight, Self::Energy]) {
             add("closeness", world::closeness(me, other));
         }
-        if is_in(&[Self::Energy, Self::Link, Self::Operator, Self::Pilot, Self::Scripts]) {
+        if is_in(&[Self::Energy, Self::Link, Self::Operator, Self::Pilot, Self::Position, Self::Scripts]) {
             add("battery", world::battery(me));
         }
         if is_in(&[Self::Energy]) {
@@ -104,6 +107,9 @@ impl Scene {
         }
         if let Some(ground) = ground.filter(|_| is_in(&[Self::Launch])) {
             add("joint decisions", world::together(me, ground));
+        }
+        if is_in(&[Self::Position]) {
+            add("position", world::position(me));
         }
         if is_in(&[Self::Name]) {
             add("namesake", world::namesake(me));
@@ -128,7 +134,7 @@ impl Scene {
         match self {
             Self::Operator => &[Hold, Resume, Land, Return, GoTo],
             Self::Pilot => &[HandBack, Resume, Return, Land],
-            Self::Name => &[Hold, Resume, Return],
+            Self::Name | Self::Position => &[Hold, Resume, Return],
             Self::Everything => &[Hold, Resume, Land, Return, GoTo, HandBack],
             _ => &[],
         }

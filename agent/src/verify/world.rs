@@ -10,8 +10,8 @@ use skein_dbp::facts::{BlockLapsed, Confirmed, DuplicateName, InStep, PeerJoined
 use skein_wire::event::{
     Abort, Advance, Ahead, Airborne, Arrived, At, BatteryCritical, BatteryLevel, BatteryLow, Clear,
     CommandFailed, Declared as _, Enter, FenceBreached, FoundAirborne, Goto, HandBack, Land, Landed, Launch,
-    Leave, NeighbourAt, OrderTaken, Passage, PathBlocked, PilotTook, Plan, Planned, Ready, SWARM, Slept,
-    Stuck, Takeoff, TooClose, Unplannable, Unready, What,
+    Leave, NeighbourAt, OrderTaken, Passage, PathBlocked, PilotTook, Plan, Planned, PositionDoubted,
+    PositionTrusted, Ready, SWARM, Slept, Stuck, Takeoff, TooClose, Unplannable, Unready, What,
 };
 
 use super::part::{Part, Place};
@@ -26,7 +26,8 @@ pub(super) const UNHEARD_OF: &str = "not heard of";
 /// Reports of the autopilot and the guidance that come only while the agent flies the vehicle.
 type OnTheWay = (Arrived, PathBlocked, Stuck, Passage, At, Ahead, NeighbourAt, BatteryLevel);
 /// Reports of watches that look in the air only.
-type InTheAir = (BatteryLow, BatteryCritical, FenceBreached, TooClose, Clear);
+type InTheAir =
+    (BatteryLow, BatteryCritical, FenceBreached, TooClose, Clear, PositionDoubted, PositionTrusted);
 
 /// The flight as `flight.rs` conducts it with the autopilot; `disturbed`: commands may fail, and a pilot may take over.
 pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
@@ -185,6 +186,15 @@ pub(super) fn closeness(me: &Me, other: Option<&NodeName>) -> Part {
         Place::new("far")
             .offers(me.event(TooClose { other: other.map_or("uav/0", NodeName::as_str).into() }), "close"),
         Place::new("close").offers(me.event(Clear), "far"),
+    ])
+}
+
+/// What the vehicle knows of its place.
+pub(super) fn position(me: &Me) -> Part {
+    let doubted = PositionDoubted { why: "the position jumped".into(), sigma_m: 8.0 };
+    Part::new(vec![
+        Place::new("known").offers(me.event(doubted), "doubted"),
+        Place::new("doubted").offers(me.event(PositionTrusted), "known").hears(me.any::<Landed>(), "known"),
     ])
 }
 

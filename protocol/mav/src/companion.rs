@@ -1,5 +1,6 @@
 //! The companion's end of an autopilot's link.
 
+mod clock;
 mod commands;
 mod missions;
 mod parameters;
@@ -166,6 +167,9 @@ impl Companion {
         if !self.telemetry().connected {
             return;
         }
+        if let Some(question) = self.reports.clock.ask(now) {
+            self.writer.write(&question);
+        }
         self.ask_for_messages(now);
         let encoding = self.dialect().parameter_encoding();
         for name in self.parameters.tick(now, encoding, self.autopilot, &mut self.writer) {
@@ -284,7 +288,8 @@ impl Companion {
         {
             return;
         }
-        if let Some((message_id, request)) = self.subscriptions.next_request(now) {
+        let estimator_message = self.dialect().estimator_message();
+        if let Some((message_id, request)) = self.subscriptions.next_request(now, estimator_message) {
             self.send_command(now, Purpose::Subscription(message_id), request);
         }
     }
@@ -304,6 +309,7 @@ impl Companion {
                     _ => {}
                 }
             }
+            MavMessage::TIMESYNC(message) => self.reports.clock.hear(now, message),
             MavMessage::PARAM_VALUE(message) => {
                 let encoding = self.dialect().parameter_encoding();
                 let (name, value) = self.parameters.on_value(message, encoding);

@@ -3,7 +3,8 @@
 
 use std::time::Duration;
 
-use mavlink::dialects::common::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd};
+use mavlink::MessageData as _;
+use mavlink::dialects::common::{COMMAND_LONG_DATA, ESTIMATOR_STATUS_DATA, HEARTBEAT_DATA, MavCmd};
 
 use crate::command::{Command, CommandResult};
 use crate::failsafe::Failsafe;
@@ -70,6 +71,11 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
         _kept_yaw: &mut Option<f64>,
     ) -> Option<SetPoint> {
         None
+    }
+
+    /// The message that tells how good the estimate is.
+    fn estimator_message(&self) -> u32 {
+        ESTIMATOR_STATUS_DATA::ID
     }
 
     /// The way integers are written into parameter messages.

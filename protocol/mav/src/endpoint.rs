@@ -13,10 +13,10 @@ use std::time::Duration;
 
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    AUTOPILOT_VERSION_DATA, COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA,
-    MANUAL_CONTROL_DATA, MESSAGE_INTERVAL_DATA, MISSION_CURRENT_DATA, MISSION_ITEM_REACHED_DATA,
-    MISSION_REQUEST_DATA, MISSION_REQUEST_INT_DATA, MavCmd, MavMessage, MavModeFlag, PARAM_SET_DATA,
-    PROTOCOL_VERSION_DATA, SET_MODE_DATA, STATUSTEXT_DATA,
+    AUTOPILOT_VERSION_DATA, COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, GPS_GLOBAL_ORIGIN_DATA,
+    HEARTBEAT_DATA, HOME_POSITION_DATA, MANUAL_CONTROL_DATA, MESSAGE_INTERVAL_DATA, MISSION_CURRENT_DATA,
+    MISSION_ITEM_REACHED_DATA, MISSION_REQUEST_DATA, MISSION_REQUEST_INT_DATA, MavCmd, MavMessage,
+    MavModeFlag, PARAM_SET_DATA, PROTOCOL_VERSION_DATA, SET_MODE_DATA, STATUSTEXT_DATA, TIMESYNC_DATA,
 };
 use mavlink::types::CharArray;
 use nalgebra::Vector3;
@@ -24,7 +24,7 @@ use nalgebra::Vector3;
 use crate::command::CommandResult;
 use crate::dialects::px4;
 use crate::frame::{Address, Frame, FrameReader, FrameWriter};
-use crate::geodesy::{Datum, LocalFrame};
+use crate::geodesy::{Datum, Geodetic, LocalFrame};
 use crate::mission::MissionItem;
 use crate::mode::FlightMode;
 use crate::set_point::SetPoint;
@@ -61,8 +61,12 @@ pub struct EndpointConfig {
 #[derive(Debug)]
 pub struct Endpoint {
     datum: Datum,
-    /// The autopilot's local frame; its origin is the datum.
+    /// The autopilot's local frame, its origin, and how far that has moved from the datum, ENU, m.
     local: LocalFrame,
+    origin: Geodetic,
+    moved: Vector3<f64>,
+    /// When its clock began.
+    booted: Duration,
     reader: FrameReader,
     writer: FrameWriter,
     streams: Streams,
@@ -105,6 +109,9 @@ impl Endpoint {
         Self {
             datum: config.datum,
             local: LocalFrame::new(&config.datum, &config.datum.place()),
+            origin: config.datum.place(),
+            moved: Vector3::zeros(),
+            booted: Duration::ZERO,
             reader: FrameReader::default(),
             writer: FrameWriter::new(Address::autopilot(config.system_id)),
             streams: Streams::default(),
@@ -147,8 +154,10 @@ impl Endpoint {
         self.parameters.list(&mut self.writer);
         let report = Report {
             now,
+            booted: self.booted,
             state,
             datum: &self.datum,
+            origin: self.origin,
             local: &self.local,
             mission_len: self.missions.items().len(),
         };
@@ -156,6 +165,21 @@ impl Endpoint {
             report.write(message_id, &mut self.writer);
         }
         self.streams.for_each_due(now, |message_id| report.write(message_id, &mut self.writer));
+    }
+
+    /// Puts the origin of the local frame `moved` off the datum, ENU, m, and tells so.
+    pub fn move_origin(&mut self, moved: Vector3<f64>) {
+        if self.moved != moved {
+            self.moved = moved;
+            self.origin = self.datum.to_geodetic(&moved);
+            self.local = LocalFrame::new(&self.datum, &self.origin);
+            self.streams.hurry(GPS_GLOBAL_ORIGIN_DATA::ID);
+        }
+    }
+
+    /// Counts the time since it was switched on from `now`.
+    pub fn restart_clock(&mut self, now: Duration) {
+        self.booted = now;
     }
 
     /// Tells all stations a line, cut at 50 bytes.
@@ -207,6 +231,10 @@ impl Endpoint {
                 }
             }
             MavMessage::MANUAL_CONTROL(message) => self.on_sticks(message),
+            MavMessage::TIMESYNC(message) if message.tc1 == 0 => {
+                let its = now.saturating_sub(self.booted);
+                output.write(&TIMESYNC_DATA { tc1: its.as_nanos() as i64, ..*message });
+            }
             MavMessage::PARAM_REQUEST_LIST(_) => self.parameters.begin_list(),
             MavMessage::PARAM_REQUEST_READ(message) => self.parameters.read(message, output),
             MavMessage::PARAM_SET(message) => self.on_parameter_set(message),

@@ -4,6 +4,8 @@ use mavlink::dialects::common::MavMessage;
 use mavlink::error::ParserError;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc, consts};
 
+use crate::ekf_status;
+
 /// A sender or receiver: a MAVLink system and one component of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Address {
@@ -177,7 +179,11 @@ fn examine(bytes: &[u8]) -> Candidate {
     ) else {
         return Candidate::Garbage;
     };
-    if calculate_crc(covered, MavMessage::extra_crc(message_id)) != u16::from_le_bytes([low, high]) {
+    let extra_crc = match message_id {
+        ekf_status::ID => ekf_status::EXTRA_CRC,
+        id => MavMessage::extra_crc(id),
+    };
+    if calculate_crc(covered, extra_crc) != u16::from_le_bytes([low, high]) {
         return Candidate::Garbage;
     }
     Candidate::Intact(Layout {
@@ -193,6 +199,9 @@ fn examine(bytes: &[u8]) -> Candidate {
 /// Reads a payload. A number that is newer than its enumeration becomes 0, "unknown" in what a sender reports of
 /// itself; said to somebody, 0 could be another order or answer, so that such a message is none.
 fn parse(version: MavlinkVersion, message_id: u32, payload: &[u8]) -> Option<MavMessage> {
+    if message_id == ekf_status::ID {
+        return Some(MavMessage::ESTIMATOR_STATUS(ekf_status::parse(payload)));
+    }
     let mut payload = payload.to_vec();
     let mut is_whole = true;
     loop {

@@ -34,6 +34,7 @@ mod command;
 mod companion;
 mod dialect;
 mod dialects;
+mod ekf_status;
 mod endpoint;
 mod event;
 mod failsafe;

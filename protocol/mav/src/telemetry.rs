@@ -119,6 +119,16 @@ pub struct Telemetry {
     pub landed: Landed,
     /// Position, m.
     pub position: Option<Stamped<Vector3<f64>>>,
+    /// When that was measured, on the autopilot's clock.
+    pub position_time: Option<Duration>,
+    /// How old it was when it arrived; `None` while it is not known where the autopilot's clock stands.
+    pub position_age: Option<Duration>,
+    /// Standard deviations of the position by its word, horizontal and vertical, m; `None` while it tells none.
+    pub position_sigma_m: Option<Stamped<[f64; 2]>>,
+    /// How often its clock has begun anew while it was listened to.
+    pub restarts: u32,
+    /// Whether satellites tell its position; `None` while it has not said.
+    pub has_gps_fix: Option<bool>,
     /// Velocity, m/s.
     pub velocity: Option<Stamped<Vector3<f64>>>,
     /// Attitude, body FLU to world ENU.

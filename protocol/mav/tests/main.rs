@@ -8,5 +8,6 @@ mod frames;
 mod geodesy;
 mod habits;
 mod lossy_link;
+mod positions;
 mod protocols;
 mod simulator;

@@ -34,6 +34,9 @@ fn telemetry_arrives_in_the_world_frame() {
     assert!((heard.home.unwrap() - sent.home.unwrap()).norm() < 0.02);
     let battery = heard.battery.unwrap().value;
     assert!((battery.fraction - 0.83).abs() < 1e-9 && (battery.voltage_v - 16.2).abs() < 1e-3);
+    let [horizontal_m, vertical_m] = heard.position_sigma_m.unwrap().value;
+    assert!((horizontal_m - 0.4).abs() < 1e-6 && (vertical_m - 0.7).abs() < 1e-6);
+    assert_eq!(heard.has_gps_fix, Some(true));
     assert_eq!((heard.landed, heard.mode), (Landed::OnGround, FlightMode::Hold));
     assert!(heard.sensors_ok && heard.ready_to_arm && heard.connected && !heard.armed);
 }

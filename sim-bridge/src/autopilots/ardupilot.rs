@@ -143,7 +143,8 @@ impl Pilot for ArduPilot {
         self.voltage_v = readings.battery.voltage_v;
         let state = body.state();
         let motion = Motion {
-            position: state.position,
+            // From it ArduPilot makes its satellites and its pressure.
+            position: state.position + readings.fix_error,
             velocity: state.velocity,
             attitude: state.attitude,
             angular_rate: readings.imu.angular_rate,

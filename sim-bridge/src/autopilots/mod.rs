@@ -10,8 +10,9 @@ mod px4;
 
 use std::path::{Path, PathBuf};
 
+use anyhow::{Context as _, ensure};
 use clap::Args;
-use skein_world::Simulation;
+use skein_world::{PositionErrors, PositionFaultKind, Simulation};
 
 use self::ardupilot::ArduPilot;
 use self::make::Make;
@@ -63,6 +64,8 @@ impl Autopilots {
         let datum = *scenario.scene.datum();
         for (index, plan) in scenario.vehicles.iter().enumerate() {
             let folder = folder.join("autopilots").join(format!("uav-{}", index + 1));
+            check_errors(plan.make(), &plan.position_errors)
+                .with_context(|| format!("the position of uav/{}", index + 1))?;
             match plan.make() {
                 Make::BuiltIn => {}
                 Make::Px4 => {
@@ -79,4 +82,28 @@ impl Autopilots {
         }
         Ok(())
     }
+}
+
+/// Whether an autopilot of this make can have these errors.
+fn check_errors(make: Make, errors: &PositionErrors) -> anyhow::Result<()> {
+    if make == Make::BuiltIn {
+        return Ok(());
+    }
+    ensure!(
+        errors.drift.told_m.is_none(),
+        "position_error.told_m: a real autopilot tells its own accuracy; leave it out"
+    );
+    for fault in &errors.faults {
+        ensure!(
+            !fault.kind.is_of_autopilot(),
+            "position_fault at {:?}: a real autopilot cannot be made to; expected jump_m or gps_lost",
+            fault.at
+        );
+        ensure!(
+            make != Make::Ardupilot || fault.kind != PositionFaultKind::GpsLost,
+            "position_fault at {:?}: ArduPilot makes its own satellites; expected jump_m",
+            fault.at
+        );
+    }
+    Ok(())
 }

@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 use std::time::Duration;
 
-use skein_agent::{AgentConfig, Envelope, Fence, Mind, Parts, PositionSource};
+use skein_agent::{AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, Mind, Parts, PositionSource};
 use skein_bp::{Program, script::Assignment};
 use skein_dbp::{Kept, NodeName};
 use skein_ground::{GroundConfig, Order, Who};
@@ -52,6 +52,7 @@ pub fn simulation_config(scenario: &Scenario) -> SimulationConfig {
         position: plan.start,
         yaw: plan.yaw,
         system_id,
+        position_errors: plan.position_errors.clone(),
     });
     SimulationConfig {
         scene: scenario.scene.clone(),
@@ -88,6 +89,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             return_altitude_m: (RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64)
                 .min(bounds.max.z - 1.0),
             position: PositionSource::default(),
+            sigma_limit_m: DEFAULT_SIGMA_LIMIT_M,
             lidar: plan.model.lidar.is_some(),
             fence,
             airspace: scenario.airspace.clone(),

@@ -14,7 +14,7 @@ use skein_bp::configuration::{self, Malformed};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_planning::airspace::Airspace;
 use skein_wire::event::What;
-use skein_world::{Aabb, Obstacle, Scene, Shape, VehicleModel, WindConfig};
+use skein_world::{Aabb, Drift, Obstacle, PositionErrors, Scene, Shape, VehicleModel, WindConfig};
 
 use super::antipodal::Antipodal;
 use super::coverage::Coverage;
@@ -24,6 +24,7 @@ use super::formation::Formation;
 use super::layout::Layout;
 use super::mountain;
 use super::open::Open;
+use super::position_error::{PositionErrorTable, PositionFaultTable};
 use super::targets::{PacedRoute, Targets};
 use super::window::Window;
 use super::{
@@ -85,6 +86,9 @@ struct FileTable {
     #[serde(default)]
     network: Network,
     gps: Option<GpsTable>,
+    position_error: Option<PositionErrorTable>,
+    #[serde(default)]
+    position_fault: Vec<PositionFaultTable>,
     #[serde(default)]
     order: Vec<OrderTable>,
     #[serde(default)]
@@ -168,6 +172,7 @@ struct VehicleTable {
     waypoints_m: Vec<Vector3<f64>>,
     model: Option<String>,
     autopilot: Option<Make>,
+    position_error: Option<PositionErrorTable>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -233,6 +238,7 @@ impl ScenarioFile {
         let layout = self.generate(count, seed);
         let mut plans = self.plans(count, layout.as_ref(), set.missions.is_empty(), seed)?;
         self.tune_gps(&mut plans);
+        self.mislead(&mut plans)?;
         let replaced = world.is_some() && layout.is_some();
         let (scene, notes) = self.scene(&name, layout, world)?;
         let orders = self.orders(count)?;
@@ -398,6 +404,7 @@ impl ScenarioFile {
                 pace: 1.0,
                 model: model.clone(),
                 autopilot: self.table.autopilot,
+                position_errors: PositionErrors::default(),
             };
             return Ok(layout.routes.iter().map(plan).collect());
         }
@@ -412,6 +419,7 @@ impl ScenarioFile {
             pace: 1.0,
             model,
             autopilot: self.table.autopilot,
+            position_errors: PositionErrors::default(),
         };
         Ok(vec![blank; count])
     }
@@ -451,6 +459,7 @@ impl ScenarioFile {
                 pace: 1.0,
                 model: table.model.as_deref().map_or_else(|| Ok(model.clone()), |name| self.model(name))?,
                 autopilot: table.autopilot.or(self.table.autopilot),
+                position_errors: PositionErrors::default(),
             })
         };
         tables.iter().take(count).map(plan).collect()
@@ -472,6 +481,35 @@ impl ScenarioFile {
             plan.model.gps.sigma_horizontal_m = gps.sigma_m;
             plan.model.gps.sigma_vertical_m = gps.sigma_m;
         }
+    }
+
+    /// Gives the vehicles the errors of their positions.
+    fn mislead(&self, plans: &mut [VehiclePlan]) -> Result<(), ScenarioError> {
+        for (index, plan) in plans.iter_mut().enumerate() {
+            let own = self.table.vehicle.get(index).and_then(|vehicle| vehicle.position_error);
+            plan.position_errors.drift =
+                own.or(self.table.position_error).map(Drift::from).unwrap_or_default();
+        }
+        for (i, table) in self.table.position_fault.iter().enumerate() {
+            let Some(fault) = table.fault() else {
+                let message =
+                    "expected exactly one of jump_m, origin_moves_m, late_s, freezes, gps_lost and resets";
+                return Err(self.contradiction(format!("position_fault[{i}]"), message));
+            };
+            let count = plans.len();
+            let vehicles = match table.vehicle {
+                None => 0..count,
+                Some(number) if (1..=count).contains(&number) => number - 1..number,
+                Some(number) => {
+                    let message = format!("there is no vehicle {number}: expected 1 to {count}");
+                    return Err(self.contradiction(format!("position_fault[{i}].vehicle"), message));
+                }
+            };
+            for plan in plans.iter_mut().take(vehicles.end).skip(vehicles.start) {
+                plan.position_errors.faults.push(fault);
+            }
+        }
+        Ok(())
     }
 
     /// The world of a file or of the generator, with the scenario's own obstacles and bounds; and notes on it.
@@ -596,5 +634,6 @@ fn from_under(PacedRoute { route, pace }: PacedRoute, model: &VehicleModel) -> V
         pace,
         model: model.clone(),
         autopilot: None,
+        position_errors: PositionErrors::default(),
     }
 }

@@ -16,6 +16,7 @@ mod missions;
 mod mountain;
 mod open;
 mod placement;
+mod position_error;
 mod targets;
 mod window;
 
@@ -32,7 +33,7 @@ use skein_bp::script::Assignment;
 use skein_mav::Datum;
 use skein_planning::airspace::{Airspace, KeepOut};
 use skein_wire::event::What;
-use skein_world::{Aabb, Scene, VehicleModel, WindConfig};
+use skein_world::{Aabb, PositionErrors, Scene, VehicleModel, WindConfig};
 
 pub use error::ScenarioError;
 pub use layout::SPACING_M;
@@ -124,6 +125,8 @@ pub struct VehiclePlan {
     pub model: VehicleModel,
     /// Its autopilot; none for the one that the command line names.
     pub autopilot: Option<Make>,
+    /// The errors of its position.
+    pub position_errors: PositionErrors,
 }
 
 impl VehiclePlan {

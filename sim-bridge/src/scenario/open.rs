@@ -18,16 +18,17 @@ pub struct Open {
     /// Nominal flight height, in metres.
     #[serde(deserialize_with = "positive")]
     pub height_m: f64,
+    /// Least distance between two starts, and between two goals, of one group, in metres.
+    #[serde(deserialize_with = "positive")]
+    pub spacing_m: f64,
 }
 
 impl Default for Open {
     fn default() -> Self {
-        Self { length_m: 24.0, height_m: 3.0 }
+        Self { length_m: 24.0, height_m: 3.0, spacing_m: SPACING_M }
     }
 }
 
-/// Side by side distance within a group, in metres: [`SPACING_M`] and room for [`JITTER_M`].
-const PITCH_M: f64 = SPACING_M + 2.0 * JITTER_M;
 /// Distance that a start or goal strays from its place in the row, in metres.
 const JITTER_M: f64 = 0.5;
 /// From the outermost start or goal to the world's bounds, in metres.
@@ -38,7 +39,7 @@ impl Open {
     pub fn generate(&self, vehicles: usize, rng: &mut ChaCha8Rng) -> Layout {
         let eastward = vehicles.div_ceil(2);
         // The rows must not reach into one another's start lines at the corners.
-        let half = self.length_m.max((eastward as f64 + 2.0) * PITCH_M) / 2.0;
+        let half = self.length_m.max((eastward as f64 + 2.0) * self.pitch_m()) / 2.0;
         let mut routes = self.group(eastward, half, rng);
         let turned = self.group(vehicles - eastward, half, rng);
         let swap = |v: Vector3<f64>| Vector3::new(v.y, v.x, v.z);
@@ -55,6 +56,11 @@ impl Open {
         }
     }
 
+    /// Side by side distance within a group, in metres: the least, and room for [`JITTER_M`].
+    fn pitch_m(&self) -> f64 {
+        self.spacing_m + 2.0 * JITTER_M
+    }
+
     /// A row of vehicles that fly east from `-half` to `half`, their goals shuffled.
     fn group(&self, count: usize, half: f64, rng: &mut ChaCha8Rng) -> Vec<Route> {
         let order = layout::permutation(rng, count);
@@ -62,7 +68,7 @@ impl Open {
         for (i, &goal) in order.iter().enumerate() {
             let mut y = |row: usize| {
                 let jitter = layout::uniform(rng, -JITTER_M, JITTER_M);
-                (row as f64 - (count as f64 - 1.0) / 2.0) * PITCH_M + jitter
+                (row as f64 - (count as f64 - 1.0) / 2.0) * self.pitch_m() + jitter
             };
             let (from, to) = (y(i), y(goal));
             let height = layout::spread_height(rng, self.height_m);

@@ -11,15 +11,21 @@
 //!
 //! ```
 //! use skein_world::{
-//!     MotorCommands, Obstacle, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup,
-//!     WindConfig,
+//!     MotorCommands, Obstacle, PositionErrors, Scene, Simulation, SimulationConfig, VehicleModel,
+//!     VehicleSetup, WindConfig,
 //! };
 //!
 //! let model = VehicleModel::built_in("x500")?;
 //! let climb = MotorCommands([model.hover_share() * 1.1; 4]);
 //! let mut simulation = Simulation::new(SimulationConfig {
 //!     scene: Scene::new("glade", vec![Obstacle::trunk("oak", 5.0, 0.0, 0.3, 12.0)]),
-//!     vehicles: vec![VehicleSetup { model, position: [0.0; 3].into(), yaw: 0.0, system_id: 1 }],
+//!     vehicles: vec![VehicleSetup {
+//!         model,
+//!         position: [0.0; 3].into(),
+//!         yaw: 0.0,
+//!         system_id: 1,
+//!         position_errors: PositionErrors::default(),
+//!     }],
 //!     seed: 1,
 //!     wind: WindConfig::default(),
 //! });
@@ -42,6 +48,7 @@ pub mod lidar;
 mod noise;
 pub mod obstacle;
 pub mod pilot;
+pub mod position_error;
 pub mod quadrotor;
 pub mod scene;
 pub mod sdf;
@@ -56,6 +63,7 @@ pub use csv::CsvError;
 pub use lidar::{Hull, Lidar, Surroundings};
 pub use obstacle::{Obstacle, Shape};
 pub use pilot::Pilot;
+pub use position_error::{Drift, PositionErrors, PositionFault, PositionFaultKind};
 pub use quadrotor::{MotorCommands, Quadrotor, RigidState, STEP};
 pub use scene::{Nearest, Scene};
 pub use sdf::{SdfError, Warning};

@@ -1,10 +1,13 @@
 //! A vehicle's instruments, with seeded noise.
 
+use std::time::Duration;
+
 use nalgebra::Vector3;
 use skein_mav::Battery;
 
 use crate::lidar::{Surroundings, cast_ray};
 use crate::noise::Noise;
+use crate::position_error::FixErrors;
 use crate::quadrotor::{Quadrotor, STEP};
 use crate::vehicle::VehicleModel;
 
@@ -18,6 +21,8 @@ pub struct SensorReadings {
     pub gps: Option<Gps>,
     /// Height above the world's origin by air pressure, m; carries a constant unknown offset.
     pub baro_height_m: Option<f64>,
+    /// By how much fixes and pressure height are off on purpose, ENU, m: for simulators that make their own.
+    pub fix_error: Vector3<f64>,
     /// Yaw in ENU: counter-clockwise from east, rad, in (-pi, pi].
     pub magnetic_heading: Option<f64>,
     /// Distance along body -z from the centre to the first solid, m; `None` also beyond range.
@@ -55,17 +60,19 @@ pub(crate) struct Sensors {
     gyro_bias: Vector3<f64>,
     accel_bias: Vector3<f64>,
     baro_offset_m: f64,
+    errors: FixErrors,
     /// Shifts the slow instruments in time, so that vehicles do not sample all at once.
     phase: u64,
 }
 
 impl Sensors {
-    pub(crate) fn new(model: &VehicleModel, mut noise: Noise, phase: u64) -> Self {
+    pub(crate) fn new(model: &VehicleModel, mut noise: Noise, errors: FixErrors, phase: u64) -> Self {
         Self {
             gyro_bias: noise.vector(model.imu.gyro_bias_rad_s),
             accel_bias: noise.vector(model.imu.accel_bias_m_s2),
             baro_offset_m: noise.normal(model.baro.offset_m),
             noise,
+            errors,
             phase,
         }
     }
@@ -77,6 +84,7 @@ impl Sensors {
         quadrotor: &Quadrotor,
         surroundings: &Surroundings<'_>,
     ) -> SensorReadings {
+        self.errors.step(Duration::from_millis(tick * STEP.as_millis() as u64));
         let model = quadrotor.model();
         let due = |rate_hz| is_due(tick + self.phase, rate_hz);
         let [gps, baro, compass, rangefinder] = [
@@ -87,8 +95,9 @@ impl Sensors {
         ];
         SensorReadings {
             imu: self.imu(quadrotor),
-            gps: gps.then(|| self.gps(quadrotor)),
+            gps: (gps && !self.errors.is_lost()).then(|| self.gps(quadrotor)),
             baro_height_m: baro.then(|| self.baro_height_m(quadrotor)),
+            fix_error: self.errors.offset(),
             magnetic_heading: compass.then(|| self.magnetic_heading(quadrotor)),
             rangefinder_down_m: rangefinder
                 .then(|| self.rangefinder_down_m(quadrotor, surroundings))
@@ -118,14 +127,14 @@ impl Sensors {
             self.noise.normal(gps.sigma_vertical_m),
         );
         Gps {
-            position: quadrotor.state().position + error,
+            position: quadrotor.state().position + error + self.errors.offset(),
             velocity: quadrotor.state().velocity + self.noise.vector(gps.sigma_velocity_m_s),
         }
     }
 
     fn baro_height_m(&mut self, quadrotor: &Quadrotor) -> f64 {
         let noise = self.noise.normal(quadrotor.model().baro.sigma_m);
-        quadrotor.state().position.z + self.baro_offset_m + noise
+        quadrotor.state().position.z + self.errors.offset().z + self.baro_offset_m + noise
     }
 
     fn magnetic_heading(&mut self, quadrotor: &Quadrotor) -> f64 {

@@ -10,12 +10,16 @@ use crate::autopilot::{Autopilot, AutopilotConfig};
 use crate::lidar::{Hull, Lidar, Surroundings};
 use crate::noise::Noise;
 use crate::pilot::{BuiltIn, Fixed, Pilot};
+use crate::position_error::{FixErrors, PositionErrors};
 use crate::quadrotor::{MotorCommands, Quadrotor, RigidState, STEP};
 use crate::scene::Scene;
 use crate::sensors::{SensorReadings, Sensors, is_due};
 use crate::truth::{Player, Referee, Truth};
 use crate::vehicle::VehicleModel;
 use crate::wind::{Wind, WindConfig};
+
+/// The stream of the first vehicle's position errors, beyond those of its instruments and lidar.
+const FIX_ERROR_STREAM: u64 = 1 << 32;
 
 /// All that a run depends on.
 #[derive(Debug, Clone)]
@@ -38,6 +42,7 @@ pub struct VehicleSetup {
     pub yaw: f64,
     /// MAVLink system id.
     pub system_id: u8,
+    pub position_errors: PositionErrors,
 }
 
 /// The true state of a vehicle, for referees, recorders and pictures; its agent must not see it.
@@ -220,10 +225,14 @@ impl Vehicle {
         // Steps of 12 ms: 25 vehicles share the 100 ms of a 10 Hz instrument evenly.
         let phase = 3 * index;
         let model = quadrotor.model();
-        let mut sensors = Sensors::new(model, Noise::new(seed, 2 * index), phase);
+        let errors =
+            FixErrors::new(setup.position_errors.clone(), Noise::new(seed, FIX_ERROR_STREAM + index));
+        let mut sensors = Sensors::new(model, Noise::new(seed, 2 * index), errors, phase);
         let lidar = model.lidar.map(|model| Lidar::new(model, seed, 2 * index + 1));
-        let autopilot =
-            Autopilot::new(AutopilotConfig::new(setup.system_id, model.clone(), *surroundings.scene.datum()));
+        let autopilot = Autopilot::new(AutopilotConfig {
+            position_errors: setup.position_errors.clone(),
+            ..AutopilotConfig::new(setup.system_id, model.clone(), *surroundings.scene.datum())
+        });
         Self {
             readings: sensors.read(0, &quadrotor, surroundings),
             quadrotor,

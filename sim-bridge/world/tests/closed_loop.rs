@@ -5,7 +5,8 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_mav::{Command, Companion, CompanionConfig, Landed, SetPoint};
 use skein_world::{
-    Obstacle, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup, VehicleState, WindConfig,
+    Obstacle, PositionErrors, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup, VehicleState,
+    WindConfig,
 };
 
 /// A companion and the world it flies in.
@@ -23,6 +24,7 @@ impl Flight {
             position: Vector3::new(1.0, 2.0, 0.0),
             yaw: 0.7,
             system_id: 1,
+            position_errors: PositionErrors::default(),
         };
         Self {
             simulation: Simulation::new(SimulationConfig { scene, vehicles: vec![vehicle], seed: 4, wind }),

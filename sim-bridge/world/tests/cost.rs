@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use skein_world::{
-    Hull, Lidar, MotorCommands, Obstacle, Scene, Simulation, SimulationConfig, Surroundings, VehicleModel,
-    VehicleSetup, WindConfig,
+    Hull, Lidar, MotorCommands, Obstacle, PositionErrors, Scene, Simulation, SimulationConfig, Surroundings,
+    VehicleModel, VehicleSetup, WindConfig,
 };
 
 /// 120 trunks about 5 m apart.
@@ -60,6 +60,7 @@ fn eight_vehicles() -> Simulation {
         position: Vector3::new(f64::from(i) * 3.0 - 12.0, -1.0, 0.0),
         yaw: 0.0,
         system_id: i + 1,
+        position_errors: PositionErrors::default(),
     });
     Simulation::new(SimulationConfig {
         scene: forest(),

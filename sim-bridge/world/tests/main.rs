@@ -9,6 +9,7 @@ mod csv;
 mod flight;
 mod geometry;
 mod lidar;
+mod position_error;
 mod quadrotor;
 mod sdf;
 mod simulation;

@@ -5,8 +5,8 @@ use std::time::Duration;
 use nalgebra::{UnitQuaternion, Vector3};
 use skein_wire::Scan;
 use skein_world::{
-    MotorCommands, Obstacle, RigidState, Scene, SensorReadings, Simulation, SimulationConfig, VehicleModel,
-    VehicleSetup, WindConfig,
+    MotorCommands, Obstacle, PositionErrors, RigidState, Scene, SensorReadings, Simulation, SimulationConfig,
+    VehicleModel, VehicleSetup, WindConfig,
 };
 
 fn simulation(obstacles: Vec<Obstacle>, places: &[[f64; 3]], seed: u64) -> Simulation {
@@ -16,6 +16,7 @@ fn simulation(obstacles: Vec<Obstacle>, places: &[[f64; 3]], seed: u64) -> Simul
         position: Vector3::from(*place),
         yaw: 0.0,
         system_id: index as u8 + 1,
+        position_errors: PositionErrors::default(),
     });
     Simulation::new(SimulationConfig {
         scene: Scene::new("test", obstacles),

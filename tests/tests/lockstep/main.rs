@@ -10,6 +10,7 @@ mod gazebo_worlds;
 mod landing;
 mod limits;
 mod no_lidar;
+mod positions;
 mod preflight;
 mod scenarios;
 mod scripts;

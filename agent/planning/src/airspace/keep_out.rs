@@ -40,6 +40,11 @@ impl KeepOut {
         KeepOut { airspace, margin_m, terrain_clearance_m, has_terrain, steepness }
     }
 
+    /// Other margins for the same places.
+    pub fn set_margins(&mut self, margin_m: f64, terrain_clearance_m: f64) {
+        (self.margin_m, self.terrain_clearance_m) = (margin_m, terrain_clearance_m);
+    }
+
     /// Distance to the nearest place that is closed, margin and clearance included, metres: a lower bound. Negative
     /// inside.
     pub fn room_m(&self, point: &Vector3<f64>) -> f64 {

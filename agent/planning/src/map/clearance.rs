@@ -86,6 +86,13 @@ impl ClearanceMap {
         ClearanceMap { keep_out: Some(keep_out), ..self }
     }
 
+    /// Keeps so far out of zones, and so high above terrain, from now on; see [`KeepOut::new`].
+    pub fn set_margins(&mut self, margin_m: f64, terrain_clearance_m: f64) {
+        if let Some(keep_out) = &mut self.keep_out {
+            keep_out.set_margins(margin_m, terrain_clearance_m);
+        }
+    }
+
     /// The places that are closed, if any are known.
     pub fn keep_out(&self) -> Option<&KeepOut> {
         self.keep_out.as_ref()

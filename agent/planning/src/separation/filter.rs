@@ -8,6 +8,8 @@ use crate::local::braking::stopping_speed;
 
 /// Violations smaller than this are rounding, m/s.
 const TOLERANCE_M_S: f64 = 1e-9;
+/// What position errors alone make too near is left within about this time, seconds: nobody flees from a number.
+const UNSURE_S: f64 = 3.0;
 /// A vehicle that needs no time to stop is taken to need this, seconds.
 const LEAST_STOP_S: f64 = 0.05;
 
@@ -35,6 +37,8 @@ pub struct FilterConfig {
     pub hull_radius_m: f64,
     /// Standard deviations of the relative position by which the distance is widened.
     pub sigmas: f64,
+    /// Most by which it is widened so, metres: who knows less of its place holds, and lands.
+    pub error_max_m: f64,
     /// Age at which a neighbour's state is no longer fresh, seconds: from then on its ghost grows.
     pub fresh_s: f64,
     /// Speed with which the ghost of a neighbour grows that has fallen silent, m/s.
@@ -57,7 +61,8 @@ impl Default for FilterConfig {
             latency_s: 0.5,
             jerk_m_s3: None,
             hull_radius_m: 0.25,
-            sigmas: 1.0,
+            sigmas: 2.0,
+            error_max_m: 4.0,
             fresh_s: 0.4,
             ghost_growth_m_s: 0.5,
             ghost_max_m: 3.0,
@@ -162,7 +167,8 @@ struct Limit {
 /// | neighbour that keeps its distance too | `g = d - D` | `min(g / 2, g - S_j) + w^2 / 4a`: half the gap for each, less if the neighbour has come to need more; `w` is the speed with which it leads away, less `a t` |
 /// | neighbour that does not | `g = d - D` | `g`, and `n . v_j` added to the bound if it comes nearer |
 ///
-/// For `g < 0` the bound is `g / t` (half that when shared): the vehicle must leave. `D` is widened by what is not
+/// For `g < 0` the bound is `g / t` (half that when shared): the vehicle must leave, at leisure (`g / 3 s`) as far as
+/// it is too near only by the errors of both positions. `D` is widened by what is not
 /// known of the neighbour, see [`distance_kept_m`]. Distances between vehicles are stretched vertically.
 ///
 /// A vehicle that accelerates towards it at `n . w` and changes that by no more than the jerk `j` goes on doing so for `T
@@ -256,6 +262,13 @@ fn approach(reach_m: f64, stop_s: f64, config: &FilterConfig) -> f64 {
     (reach_m / stop_s.max(LEAST_STOP_S)).min(stopping_speed(reach_m, config.decel_m_s2, config.latency_s))
 }
 
+/// The bound of a vehicle that is too near by a gap below zero, of which so much is for position errors alone:
+/// negative.
+fn leave(gap_m: f64, error_m: f64, config: &FilterConfig) -> f64 {
+    let surely_m = (gap_m + error_m).min(0.0);
+    surely_m / config.latency_s.max(LEAST_STOP_S) + (gap_m - surely_m) / UNSURE_S
+}
+
 /// A bound for a vehicle that lags behind its commands: while it is faster than the bound, it is told to be
 /// as much slower, but not to turn back.
 fn led(bound: f64, speed: f64) -> f64 {
@@ -265,7 +278,7 @@ fn led(bound: f64, speed: f64) -> f64 {
 /// The distance that a vehicle whose position has the standard deviation `sigma_m` keeps from a neighbour, centre to
 /// centre, metres:
 ///
-/// `D = separation + k sqrt(sigma_i^2 + sigma_j^2) + a_j u^2 / 2 + min(g_max, c (age - fresh)) + larger`
+/// `D = separation + min(e_max, k sqrt(sigma_i^2 + sigma_j^2)) + a_j u^2 / 2 + min(g_max, c (age - fresh)) + larger`
 ///
 /// `k` standard deviations for the errors of both positions; what the neighbour may have done since it was heard that
 /// straight on does not foretell, with an acceleration of `a_j` for `u = min(age, fresh)`; the growth `c` of the
@@ -274,9 +287,13 @@ pub fn distance_kept_m(sigma_m: f64, neighbour: &Neighbour, config: &FilterConfi
     let unheard_s = neighbour.age_s.clamp(0.0, config.fresh_s);
     let swerve = 0.5 * config.decel_m_s2 * unheard_s * unheard_s;
     let ghost = (config.ghost_growth_m_s * silent_s(neighbour, config)).min(config.ghost_max_m);
-    let error = (sigma_m * sigma_m + neighbour.sigma_m * neighbour.sigma_m).sqrt();
     let larger = (neighbour.radius_m - config.hull_radius_m).max(0.0);
-    config.separation_m + config.sigmas * error + swerve + ghost + larger
+    config.separation_m + error_m(sigma_m, neighbour, config) + swerve + ghost + larger
+}
+
+/// What is kept for the errors of both positions, metres.
+fn error_m(sigma_m: f64, neighbour: &Neighbour, config: &FilterConfig) -> f64 {
+    (config.sigmas * sigma_m.hypot(neighbour.sigma_m)).min(config.error_max_m)
 }
 
 /// For how long a neighbour's state has no longer been fresh, seconds.
@@ -299,7 +316,12 @@ fn neighbour_limit(motion: &Motion, neighbour: &Neighbour, stop: f64, config: &F
     let gap = motion.left_m(gap, &normal, stop, config);
 
     let leads_away = gradient.dot(&neighbour.velocity);
-    let bound = if neighbour.cooperative {
+    let error = error_m(motion.sigma_m, neighbour, config);
+    let bound = if gap < 0.0 {
+        let share = if neighbour.cooperative { 0.5 } else { 1.0 };
+        let theirs = if neighbour.cooperative { 0.0 } else { leads_away.min(0.0) };
+        theirs + share * leave(gap, error, config)
+    } else if neighbour.cooperative {
         approach(shared_reach(gap, leads_away, neighbour.velocity.norm(), config), stop, config)
     } else {
         leads_away.min(0.0) + approach(gap, stop, config)
@@ -311,9 +333,6 @@ fn neighbour_limit(motion: &Motion, neighbour: &Neighbour, stop: f64, config: &F
 /// `leads_away_m_s`, negative if it comes nearer; metres.
 fn shared_reach(gap_m: f64, leads_away_m_s: f64, speed_m_s: f64, config: &FilterConfig) -> f64 {
     let half = 0.5 * gap_m;
-    if gap_m < 0.0 {
-        return half;
-    }
     if leads_away_m_s > 0.0 {
         // What is left of it if the neighbour brakes from now on, when this vehicle begins to.
         let left_m_s = (leads_away_m_s - config.decel_m_s2 * config.latency_s).max(0.0);

@@ -4,12 +4,13 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use mavlink::dialects::common::{
-    ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, EVENT_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA,
-    LOCAL_POSITION_NED_DATA, MavLandedState, MavMessage, MavModeFlag, MavState, MavSysStatusSensor,
-    SYS_STATUS_DATA,
+    ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, ESTIMATOR_STATUS_DATA, EVENT_DATA, EstimatorStatusFlags,
+    GPS_RAW_INT_DATA, GpsFixType, HEARTBEAT_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA,
+    MavLandedState, MavMessage, MavModeFlag, MavState, MavSysStatusSensor, SYS_STATUS_DATA,
 };
 use nalgebra::{Quaternion, UnitQuaternion};
 
+use super::clock::{Clock, Stamp};
 use crate::axes;
 use crate::dialect::Dialect;
 use crate::dialects;
@@ -17,12 +18,18 @@ use crate::event::MavEvent;
 use crate::geodesy::{Datum, Geodetic, LocalFrame};
 use crate::telemetry::{Battery, HEARTBEAT_TIMEOUT, Landed, Severity, Stamped, Telemetry, Text};
 
+/// Standard deviation of the position of an estimator that says that it has none, m.
+const NOWHERE_SIGMA_M: f64 = 100.0;
+
 /// The telemetry, and what is needed to read the next message.
 #[derive(Debug, Clone)]
 pub(super) struct Reports {
     pub(super) telemetry: Telemetry,
     pub(super) dialect: &'static dyn Dialect,
+    pub(super) clock: Clock,
     datum: Datum,
+    /// Whether its estimator, which knows no accuracy of its own, stands by its position; `None` of one that knows.
+    stands_by: Option<bool>,
     /// Follows from `telemetry.local_origin`.
     local: Option<LocalFrame>,
     batteries: Batteries,
@@ -33,7 +40,9 @@ impl Reports {
         Self {
             telemetry: Telemetry::default(),
             dialect: dialects::UNKNOWN,
+            clock: Clock::default(),
             datum,
+            stands_by: None,
             local: None,
             batteries: Batteries::default(),
         }
@@ -51,6 +60,8 @@ impl Reports {
             MavMessage::HEARTBEAT(message) => self.on_heartbeat(now, message, events),
             MavMessage::LOCAL_POSITION_NED(message) => self.on_local_position(now, message),
             MavMessage::ATTITUDE_QUATERNION(message) => self.on_attitude(now, message),
+            MavMessage::ESTIMATOR_STATUS(message) => self.on_estimator(now, message),
+            MavMessage::GPS_RAW_INT(message) => self.on_gps(now, message),
             MavMessage::GPS_GLOBAL_ORIGIN(message) => {
                 self.on_origin(Geodetic::from_e7(message.latitude, message.longitude, message.altitude));
             }
@@ -119,10 +130,59 @@ impl Reports {
         if !position.iter().chain(velocity.iter()).all(|number| number.is_finite()) {
             return;
         }
-        let stamped = |value| Stamped { stamp: now, value };
-        self.telemetry.velocity = Some(stamped(axes::ned_to_enu(&velocity)));
-        if let Some(local) = &self.local {
-            self.telemetry.position = Some(stamped(local.position_to_world(&position)));
+        let time = Duration::from_millis(message.time_boot_ms.into());
+        let velocity = axes::ned_to_enu(&velocity);
+        let position = self.local.as_ref().map(|local| local.position_to_world(&position));
+        let telemetry = &mut self.telemetry;
+        match self.clock.stamp(now, time) {
+            Stamp::Overtaken => return,
+            // Said again, it is as old as it was. Of a clock that stands the values tell.
+            Stamp::Same
+                if telemetry.velocity.map(|known| known.value) == Some(velocity)
+                    && telemetry.position.map(|known| known.value) == position
+                    && time > Duration::ZERO =>
+            {
+                return;
+            }
+            Stamp::Restarted => telemetry.restarts += 1,
+            Stamp::Same | Stamp::Newer => {}
+        }
+        telemetry.velocity = Some(Stamped { stamp: now, value: velocity });
+        if let Some(value) = position {
+            telemetry.position = Some(Stamped { stamp: now, value });
+            telemetry.position_time = Some(time);
+            telemetry.position_age = self.clock.age(now, time);
+        }
+    }
+
+    /// An estimator tells its accuracy, or whether it stands by its position: then the receiver's accuracy counts.
+    fn on_estimator(&mut self, now: Duration, message: &ESTIMATOR_STATUS_DATA) {
+        let told = [message.pos_horiz_accuracy, message.pos_vert_accuracy].map(f64::from);
+        if told.iter().all(|sigma_m| sigma_m.is_finite() && *sigma_m > 0.0) {
+            self.stands_by = None;
+            self.telemetry.position_sigma_m = Some(Stamped { stamp: now, value: told });
+            return;
+        }
+        // Ratios of innovations to what they may be.
+        let ratios = [message.vel_ratio, message.pos_horiz_ratio, message.pos_vert_ratio];
+        let stands_by = message.flags.contains(EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_ABS)
+            && !message.flags.contains(EstimatorStatusFlags::ESTIMATOR_CONST_POS_MODE)
+            && ratios.iter().all(|ratio| *ratio <= 1.0);
+        if !stands_by {
+            self.telemetry.position_sigma_m = Some(Stamped { stamp: now, value: [NOWHERE_SIGMA_M; 2] });
+        }
+        self.stands_by = Some(stands_by);
+    }
+
+    fn on_gps(&mut self, now: Duration, message: &GPS_RAW_INT_DATA) {
+        let none = [GpsFixType::GPS_FIX_TYPE_NO_GPS, GpsFixType::GPS_FIX_TYPE_NO_FIX];
+        let has_fix =
+            !none.contains(&message.fix_type) && message.fix_type != GpsFixType::GPS_FIX_TYPE_2D_FIX;
+        self.telemetry.has_gps_fix = Some(has_fix);
+        // 0 is unknown.
+        if self.stands_by == Some(true) && has_fix && message.h_acc > 0 && message.v_acc > 0 {
+            let value = [message.h_acc, message.v_acc].map(|millimetres| f64::from(millimetres) / 1000.0);
+            self.telemetry.position_sigma_m = Some(Stamped { stamp: now, value });
         }
     }
 

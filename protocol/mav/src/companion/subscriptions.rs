@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, COMMAND_LONG_DATA, EXTENDED_SYS_STATE_DATA,
-    GPS_GLOBAL_ORIGIN_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, MavCmd,
-    SYS_STATUS_DATA,
+    ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, COMMAND_LONG_DATA, ESTIMATOR_STATUS_DATA,
+    EXTENDED_SYS_STATE_DATA, GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA,
+    LOCAL_POSITION_NED_DATA, MavCmd, SYS_STATUS_DATA,
 };
 
 /// A message that is missing is asked for this often at most.
@@ -50,6 +50,8 @@ impl Default for Subscriptions {
             (HOME_POSITION_DATA::ID, Wish::Once),
             every(EXTENDED_SYS_STATE_DATA::ID, 200),
             every(SYS_STATUS_DATA::ID, 500),
+            every(ESTIMATOR_STATUS_DATA::ID, 200),
+            every(GPS_RAW_INT_DATA::ID, 200),
             every(BATTERY_STATUS_DATA::ID, 1000),
         ];
         let list =
@@ -83,13 +85,21 @@ impl Subscriptions {
 
     /// The message that is overdue, and the command that asks for it: of several, the one not asked for the longest, so that
     /// each gets its turn even if an autopilot never answers about one of them. Streams are all asked for
-    /// once, because the autopilot may already send them at another rate.
-    pub(super) fn next_request(&mut self, now: Duration) -> Option<(u32, COMMAND_LONG_DATA)> {
+    /// once, because the autopilot may already send them at another rate. `estimator_message` is what this make
+    /// sends for `ESTIMATOR_STATUS`.
+    pub(super) fn next_request(
+        &mut self,
+        now: Duration,
+        estimator_message: u32,
+    ) -> Option<(u32, COMMAND_LONG_DATA)> {
         let overdue =
             self.list.iter_mut().filter(|known| known.is_overdue(now)).min_by_key(|known| known.asked_at)?;
         overdue.asked_at = Some(now);
         // Message ids are below 2^24 and intervals below 2^24 us, so both are exact as floats.
-        let param1 = overdue.message_id as f32;
+        let param1 = match overdue.message_id {
+            ESTIMATOR_STATUS_DATA::ID => estimator_message,
+            id => id,
+        } as f32;
         let request = match overdue.wish {
             Wish::Every(interval) => COMMAND_LONG_DATA {
                 command: MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL,

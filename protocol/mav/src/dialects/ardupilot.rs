@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use crate::axes;
 use crate::command::{Command, CommandResult};
 use crate::dialect::Dialect;
+use crate::ekf_status;
 use crate::failsafe::Failsafe;
 use crate::mode::FlightMode;
 use crate::parameter::ParameterEncoding;
@@ -82,6 +83,10 @@ impl Dialect for ArduPilot {
 
     fn is_spoken_by(&self, heartbeat: &HEARTBEAT_DATA) -> bool {
         heartbeat.autopilot == MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA
+    }
+
+    fn estimator_message(&self) -> u32 {
+        ekf_status::ID
     }
 
     fn mode(&self, custom_mode: u32) -> FlightMode {

@@ -5,24 +5,26 @@ use std::time::Duration;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA,
-    EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA, GpsFixType,
-    HEARTBEAT_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, MISSION_CURRENT_DATA, MavAutopilot,
-    MavBatteryChargeState, MavBatteryFunction, MavBatteryType, MavLandedState, MavModeFlag,
-    MavProtocolCapability, MavState, MavSysStatusSensor, MavType, MissionState, SYS_STATUS_DATA,
-    VFR_HUD_DATA,
+    ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, EstimatorStatusFlags, GLOBAL_POSITION_INT_DATA,
+    GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA, GpsFixType, HEARTBEAT_DATA, HOME_POSITION_DATA,
+    LOCAL_POSITION_NED_DATA, MISSION_CURRENT_DATA, MavAutopilot, MavBatteryChargeState, MavBatteryFunction,
+    MavBatteryType, MavLandedState, MavModeFlag, MavProtocolCapability, MavState, MavSysStatusSensor,
+    MavType, MissionState, SYS_STATUS_DATA, VFR_HUD_DATA,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::axes;
 use crate::dialects::px4;
 use crate::frame::FrameWriter;
-use crate::geodesy::{Datum, LocalFrame};
+use crate::geodesy::{Datum, Geodetic, LocalFrame};
 use crate::mode::FlightMode;
 use crate::telemetry::{Battery, Landed};
 
 /// An autopilot's state, as it reports it. Vectors are in the world's ENU frame unless they say body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VehicleState {
+    /// When position, velocity and attitude were measured, since the run began.
+    pub measured: Duration,
     pub mode: FlightMode,
     /// The motors may turn.
     pub armed: bool,
@@ -31,6 +33,10 @@ pub struct VehicleState {
     pub position: Option<Vector3<f64>>,
     /// Velocity, m/s.
     pub velocity: Vector3<f64>,
+    /// Standard deviations of the position, horizontal and vertical, m.
+    pub position_sigma_m: [f64; 2],
+    /// Whether satellites tell its position.
+    pub has_fix: bool,
     /// Attitude, body FLU to world ENU.
     pub attitude: UnitQuaternion<f64>,
     /// Angular rate, body FLU, rad/s.
@@ -53,8 +59,12 @@ pub struct VehicleState {
 /// Everything a message needs.
 pub(super) struct Report<'a> {
     pub(super) now: Duration,
+    /// When its clock began.
+    pub(super) booted: Duration,
     pub(super) state: &'a VehicleState,
     pub(super) datum: &'a Datum,
+    /// Where its local frame is.
+    pub(super) origin: Geodetic,
     pub(super) local: &'a LocalFrame,
     pub(super) mission_len: usize,
 }
@@ -76,13 +86,14 @@ impl Report<'_> {
             LOCAL_POSITION_NED_DATA::ID => write_some(self.local_position(), output),
             GLOBAL_POSITION_INT_DATA::ID => write_some(self.global_position(), output),
             GPS_RAW_INT_DATA::ID => write_some(self.gps(), output),
+            ESTIMATOR_STATUS_DATA::ID => output.write(&self.estimator_status()),
             VFR_HUD_DATA::ID => write_some(self.head_up_display(), output),
             _ => {}
         }
     }
 
     fn time_boot_ms(&self) -> u32 {
-        self.now.as_millis() as u32
+        self.state.measured.saturating_sub(self.booted).as_millis() as u32
     }
 
     fn heartbeat(&self) -> HEARTBEAT_DATA {
@@ -203,7 +214,7 @@ impl Report<'_> {
     }
 
     fn origin(&self) -> GPS_GLOBAL_ORIGIN_DATA {
-        let origin = self.datum.place();
+        let origin = self.origin;
         GPS_GLOBAL_ORIGIN_DATA {
             latitude: origin.latitude_e7(),
             longitude: origin.longitude_e7(),
@@ -262,6 +273,7 @@ impl Report<'_> {
     }
 
     fn gps(&self) -> Option<GPS_RAW_INT_DATA> {
+        let [horizontal_m, vertical_m] = self.state.position_sigma_m;
         let place = self.datum.to_geodetic(&self.state.position?);
         Some(GPS_RAW_INT_DATA {
             time_usec: self.now.as_micros() as u64,
@@ -272,10 +284,32 @@ impl Report<'_> {
             epv: u16::MAX,
             vel: (self.state.velocity.xy().norm() * 100.0) as u16,
             cog: u16::MAX,
-            fix_type: GpsFixType::GPS_FIX_TYPE_RTK_FIXED,
-            satellites_visible: 12,
+            fix_type: match self.state.has_fix {
+                true => GpsFixType::GPS_FIX_TYPE_RTK_FIXED,
+                false => GpsFixType::GPS_FIX_TYPE_NO_FIX,
+            },
+            satellites_visible: if self.state.has_fix { 12 } else { 0 },
+            h_acc: millimetres(horizontal_m),
+            v_acc: millimetres(vertical_m),
             ..Default::default()
         })
+    }
+
+    fn estimator_status(&self) -> ESTIMATOR_STATUS_DATA {
+        let [horizontal_m, vertical_m] = self.state.position_sigma_m;
+        let mut flags = EstimatorStatusFlags::ESTIMATOR_ATTITUDE
+            | EstimatorStatusFlags::ESTIMATOR_VELOCITY_HORIZ
+            | EstimatorStatusFlags::ESTIMATOR_VELOCITY_VERT
+            | EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_REL
+            | EstimatorStatusFlags::ESTIMATOR_POS_VERT_ABS;
+        flags.set(EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_ABS, self.state.has_fix);
+        ESTIMATOR_STATUS_DATA {
+            time_usec: self.state.measured.saturating_sub(self.booted).as_micros() as u64,
+            pos_horiz_accuracy: horizontal_m as f32,
+            pos_vert_accuracy: vertical_m as f32,
+            flags,
+            ..Default::default()
+        }
     }
 
     fn head_up_display(&self) -> Option<VFR_HUD_DATA> {
@@ -317,6 +351,10 @@ fn write_some<D: MessageData>(message: Option<D>, output: &mut FrameWriter) {
     if let Some(message) = message {
         output.write(&message);
     }
+}
+
+fn millimetres(metres: f64) -> u32 {
+    (metres * 1000.0).round() as u32
 }
 
 fn millivolts(battery: &Battery) -> u16 {

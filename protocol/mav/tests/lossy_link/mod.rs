@@ -17,6 +17,10 @@ pub struct Pair {
     pub companion: Companion,
     pub endpoint: Endpoint,
     pub state: VehicleState,
+    /// How late the state is told.
+    pub late: Duration,
+    /// The state is told with its last time stamp.
+    pub is_frozen: bool,
     pub events: Vec<MavEvent>,
     pub commands: Vec<AutopilotCommand>,
     pub other_requests: Vec<Request>,
@@ -52,11 +56,14 @@ impl Pair {
                 accepts_item: |item| item.z < 100.0,
             }),
             state: VehicleState {
+                measured: Duration::ZERO,
                 mode: FlightMode::Hold,
                 armed: false,
                 landed: Landed::OnGround,
                 position: Some(Vector3::new(10.0, -4.0, 0.15)),
                 velocity: Vector3::new(1.0, 2.0, 3.0),
+                position_sigma_m: [0.4, 0.7],
+                has_fix: true,
                 attitude: UnitQuaternion::from_euler_angles(0.1, -0.2, 0.3),
                 angular_rate: Vector3::new(0.01, 0.02, 0.03),
                 battery: Battery { fraction: 0.83, voltage_v: 16.2 },
@@ -67,6 +74,8 @@ impl Pair {
                 throttle: 0.0,
                 mission_item: 0,
             },
+            late: Duration::ZERO,
+            is_frozen: false,
             events: Vec::new(),
             commands: Vec::new(),
             other_requests: Vec::new(),
@@ -123,6 +132,9 @@ impl Pair {
                 }
                 other => self.other_requests.push(other),
             }
+        }
+        if !self.is_frozen {
+            self.state.measured = self.now.saturating_sub(self.late);
         }
         self.endpoint.report(self.now, &self.state);
         let down = self.endpoint.take_output();

@@ -57,4 +57,12 @@ skein_bp::events! {
     BatteryCritical = "battery_critical", Own;
     /// The vehicle is outside its geofence.
     FenceBreached = "fence_breached", Own;
+    /// In the air, the vehicle does not know where it is, or not well enough: it holds, and lands if that lasts.
+    PositionDoubted = "position_doubted", Own {
+        why: Text,
+        /// Standard deviation of its position, as it tells others.
+        sigma_m: f64 ["m", 0.0..=f64::INFINITY],
+    }
+    /// It knows where it is again.
+    PositionTrusted = "position_trusted", Own;
 }

@@ -11,6 +11,7 @@ use std::time::Duration;
 use nalgebra::{UnitQuaternion, Vector3};
 use skein_mav::axes;
 
+use crate::position_error::Drift;
 use crate::quadrotor::STEP;
 use crate::sensors::{Gps, Imu, SensorReadings};
 use crate::vehicle::{GRAVITY_M_S2, VehicleModel};
@@ -33,6 +34,8 @@ const BARO_OFFSET_GAIN: f64 = 0.002;
 const SETTLING_TIME: Duration = Duration::from_secs(2);
 /// Nor before its standard deviation of position is below this, m.
 const READY_SIGMA_M: f64 = 0.5;
+/// A position this many standard deviations beside the estimate is taken over, and a height by pressure with it.
+const RESET_SIGMAS: f64 = 10.0;
 /// Nor after this long without a fix.
 const FIX_TIMEOUT: Duration = Duration::from_secs(1);
 
@@ -71,13 +74,15 @@ pub(super) struct Estimator {
     gyro_bias: Vector3<f64>,
     filters: [AxisFilter; 3],
     baro_offset_m: Option<f64>,
+    drift: Drift,
     heading_known: bool,
     started: Option<Duration>,
     last_fix: Option<Duration>,
 }
 
 impl Estimator {
-    pub(super) fn new(model: &VehicleModel) -> Self {
+    /// `drift` is what the instruments are known to do, and is told.
+    pub(super) fn new(model: &VehicleModel, drift: Drift) -> Self {
         let (horizontal, vertical) = (model.gps.sigma_horizontal_m, model.gps.sigma_vertical_m);
         // An instrument without noise in the model is still not believed to the last digit.
         let floor = |sigma: f64| sigma.max(0.005);
@@ -97,6 +102,7 @@ impl Estimator {
             gyro_bias: Vector3::zeros(),
             filters: [AxisFilter::default(); 3],
             baro_offset_m: None,
+            drift,
             heading_known: false,
             started: None,
             last_fix: None,
@@ -112,13 +118,30 @@ impl Estimator {
         self.last_fix.is_some()
     }
 
+    /// Standard deviations of the position, horizontal and vertical, as they are told, m.
+    pub(super) fn position_sigma_m(&self) -> [f64; 2] {
+        let [east, north, up] = self.filters.map(|filter| filter.position_sigma());
+        let Drift { sigma_m, sigma_vertical_m, told_m, .. } = self.drift;
+        told_m.unwrap_or([east.max(north).hypot(sigma_m), up.hypot(sigma_vertical_m)])
+    }
+
+    pub(super) fn has_fix(&self, now: Duration) -> bool {
+        self.last_fix.is_some_and(|fix| now.saturating_sub(fix) <= FIX_TIMEOUT)
+    }
+
+    /// Begins anew with the next fix; attitude and motion go on.
+    pub(super) fn forget_position(&mut self) {
+        self.last_fix = None;
+        self.baro_offset_m = None;
+    }
+
     /// Whether the estimate is good enough to fly by; if not, why.
     pub(super) fn readiness(&self, now: Duration) -> Result<(), &'static str> {
         let age = |since: Option<Duration>| since.map(|since| now.saturating_sub(since));
         let sigma = self.filters.iter().map(|filter| filter.position_sigma()).fold(0.0, f64::max);
         if !self.heading_known {
             Err("no compass")
-        } else if age(self.last_fix).is_none_or(|age| age > FIX_TIMEOUT) {
+        } else if !self.has_fix(now) {
             Err("no GPS fix")
         } else if age(self.started).is_none_or(|age| age < SETTLING_TIME) || sigma > READY_SIGMA_M {
             Err("estimator is still settling")
@@ -187,7 +210,7 @@ impl Estimator {
         let variance = self.trust.gps_velocity_m_s * self.trust.gps_velocity_m_s;
         for (axis, filter) in self.filters.iter_mut().enumerate() {
             let sigma = self.trust.gps_position_m[axis];
-            filter.correct_position(gps.position[axis], sigma * sigma);
+            filter.take_position(gps.position[axis], sigma * sigma);
             innovation[axis] = gps.velocity[axis] - filter.velocity;
             velocity_gain = filter.correct_velocity(gps.velocity[axis], variance);
         }
@@ -214,6 +237,10 @@ impl Estimator {
             return;
         }
         let offset = self.baro_offset_m.get_or_insert(height_m - vertical.position);
+        if vertical.is_beyond(height_m - *offset, self.trust.baro_m * self.trust.baro_m) {
+            // The fixes tell whether the height or the pressure has changed.
+            *offset = height_m - vertical.position;
+        }
         *offset += BARO_OFFSET_GAIN * (height_m - vertical.position - *offset);
         vertical.correct_position(height_m - *offset, self.trust.baro_m * self.trust.baro_m);
     }
@@ -266,6 +293,20 @@ impl AxisFilter {
         self.vv -= velocity_gain * self.pv;
         self.pv -= position_gain * self.pv;
         self.pp -= position_gain * self.pp;
+    }
+
+    /// Whether a position is further off than noise can explain.
+    fn is_beyond(&self, measured: f64, variance: f64) -> bool {
+        (measured - self.position).abs() > RESET_SIGMAS * (self.pp + variance).sqrt()
+    }
+
+    /// Corrects the position, or takes it over where it is beyond.
+    fn take_position(&mut self, measured: f64, variance: f64) {
+        if self.is_beyond(measured, variance) {
+            (self.position, self.pp, self.pv) = (measured, variance, 0.0);
+        } else {
+            self.correct_position(measured, variance);
+        }
     }
 
     /// Returns the gain of the velocity.

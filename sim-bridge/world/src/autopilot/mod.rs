@@ -12,12 +12,14 @@ mod mixer;
 mod modes;
 mod parameters;
 mod position_control;
+mod telling;
 
 use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_mav::{Datum, Endpoint, EndpointConfig, MissionItem, ParameterTable, Request, VehicleState};
 
+use crate::position_error::PositionErrors;
 use crate::quadrotor::MotorCommands;
 use crate::sensors::SensorReadings;
 use crate::vehicle::VehicleModel;
@@ -28,6 +30,7 @@ use modes::{Drive, Modes, Sticks};
 use parameters::Settings;
 pub use parameters::default_parameters;
 use position_control::PositionControl;
+use telling::Telling;
 
 /// Share of full thrust of rotors that idle on the ground.
 const IDLE_SHARE: f64 = 0.05;
@@ -42,12 +45,20 @@ pub struct AutopilotConfig {
     pub datum: Datum,
     /// Its parameters; see [`default_parameters`].
     pub parameters: ParameterTable,
+    /// Of them, the faults of autopilots, and the accuracy that is told.
+    pub position_errors: PositionErrors,
 }
 
 impl AutopilotConfig {
     /// An autopilot with default parameters.
     pub fn new(system_id: u8, vehicle: VehicleModel, datum: Datum) -> Self {
-        Self { system_id, parameters: default_parameters(&vehicle), vehicle, datum }
+        Self {
+            system_id,
+            parameters: default_parameters(&vehicle),
+            vehicle,
+            datum,
+            position_errors: PositionErrors::default(),
+        }
     }
 }
 
@@ -80,6 +91,7 @@ struct Situation<'a> {
 ///     imu: Imu { angular_rate: Vector3::zeros(), specific_force: Vector3::new(0.0, 0.0, 9.81) },
 ///     gps: None,
 ///     baro_height_m: None,
+///     fix_error: Vector3::zeros(),
 ///     magnetic_heading: None,
 ///     rangefinder_down_m: None,
 ///     contact: true,
@@ -99,6 +111,7 @@ pub struct Autopilot {
     position_control: PositionControl,
     attitude_control: AttitudeControl,
     mixer: Mixer,
+    telling: Telling,
     /// Time of the last step: bytes that arrive between two steps are stamped with it.
     now: Duration,
 }
@@ -111,7 +124,8 @@ impl Autopilot {
         Self {
             datum: config.datum,
             settings: Settings::read(&config.parameters),
-            estimator: Estimator::new(model),
+            estimator: Estimator::new(model, config.position_errors.drift),
+            telling: Telling::new(&config.position_errors.faults),
             modes: Modes::default(),
             position_control: PositionControl::new(model, attitude_control.bandwidth()),
             attitude_control,
@@ -139,6 +153,11 @@ impl Autopilot {
     /// One step of 4 ms: `now` is the time since the run began, the readings are those of this step.
     pub fn step(&mut self, now: Duration, readings: &SensorReadings) -> MotorCommands {
         self.now = now;
+        if self.telling.begins_anew(now) {
+            self.estimator.forget_position();
+            self.endpoint.restart_clock(now);
+        }
+        self.endpoint.move_origin(self.telling.origin(now));
         self.estimator.update(now, readings);
         while let Some(request) = self.endpoint.next_request() {
             self.serve(request, readings);
@@ -221,11 +240,14 @@ impl Autopilot {
         let sensors_ok = situation.readiness.is_ok();
         let estimate = *situation.estimate;
         let state = VehicleState {
+            measured: self.now,
             mode: self.modes.mode(),
             armed: self.modes.armed(),
             landed: self.modes.landed(),
             position: self.estimator.has_position().then_some(estimate.position),
             velocity: estimate.velocity,
+            position_sigma_m: self.estimator.position_sigma_m(),
+            has_fix: self.estimator.has_fix(self.now),
             attitude: estimate.attitude,
             angular_rate: estimate.angular_rate,
             battery: readings.battery,
@@ -236,6 +258,6 @@ impl Autopilot {
             throttle: commands.0.iter().sum::<f64>() / 4.0,
             mission_item: self.modes.mission_item() as u16,
         };
-        self.endpoint.report(self.now, &state);
+        self.endpoint.report(self.now, &self.telling.told(self.now, state));
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_mav::{Command, Companion, CompanionConfig, FlightMode, Landed, MavEvent, SetPoint, Telemetry};
 use skein_world::{
-    Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup, VehicleState, WindConfig,
+    PositionErrors, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup, VehicleState, WindConfig,
 };
 
 /// Set-points and the companion run at 50 Hz.
@@ -33,11 +33,22 @@ pub fn velocity(x: f64, y: f64, z: f64) -> SetPoint {
 
 impl Flight {
     pub fn new(model: VehicleModel, seed: u64, wind: WindConfig) -> Self {
+        Self::misled(model, seed, wind, PositionErrors::default())
+    }
+
+    /// The same with errors of its position.
+    pub fn misled(model: VehicleModel, seed: u64, wind: WindConfig, position_errors: PositionErrors) -> Self {
         let scene = Scene::new("field", Vec::new());
         let datum = *scene.datum();
         let simulation = Simulation::new(SimulationConfig {
             scene,
-            vehicles: vec![VehicleSetup { model, position: at(2.0, -3.0, 0.0), yaw: 0.5, system_id: 1 }],
+            vehicles: vec![VehicleSetup {
+                model,
+                position: at(2.0, -3.0, 0.0),
+                yaw: 0.5,
+                system_id: 1,
+                position_errors,
+            }],
             seed,
             wind,
         });

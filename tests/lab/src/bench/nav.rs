@@ -12,7 +12,7 @@ use serde::Serialize;
 use serde_json::json;
 use skein_agent::pipeline::guidance::Guidance;
 use skein_agent::pipeline::layers::Layers;
-use skein_agent::pipeline::perception::{Perception, Pose};
+use skein_agent::pipeline::perception::{Other, Perception, Pose};
 use skein_agent::pipeline::surroundings::Surroundings;
 use skein_agent::positioning::Motion;
 use skein_agent::{AgentConfig, Report, Waypoint};
@@ -34,7 +34,7 @@ const AROUND_M: [f64; 2] = [3.0, 9.0];
 /// Navigation cycles begin this often.
 const CYCLE: Duration = Duration::from_millis(100);
 /// Standard deviations of position, metres, and velocity, m/s.
-const SIGMA: [f64; 2] = [0.05, 0.1];
+const SIGMA: [f64; 3] = [0.05, 0.05, 0.1];
 /// Height of the flight, metres.
 const HEIGHT_M: f64 = 3.0;
 
@@ -188,7 +188,8 @@ impl<'a> Flight<'a> {
             Isometry3::from_parts(Translation3::from(self.motion.position), UnitQuaternion::identity());
         let seen = skein_world::Surroundings { scene: self.scene, hulls: &[], own: 0 };
         let scan = lidar.scan(now, &pose, &seen);
-        let others: Vec<_> = neighbours.iter().map(Neighbour::predicted).collect();
+        let other = |neighbour: &Neighbour| Other { position: neighbour.predicted(), off_m: 0.0 };
+        let others: Vec<_> = neighbours.iter().map(other).collect();
 
         let began = cpu_time::this_thread()?;
         let pose = Pose { position: self.motion.position, attitude: UnitQuaternion::identity() };

@@ -8,7 +8,8 @@ use nalgebra::{Vector2, Vector3};
 use serde_json::json;
 use skein_mav::{Command, Companion, CompanionConfig, FlightMode, SetPoint};
 use skein_world::{
-    PositionIntegral, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup, WindConfig,
+    PositionErrors, PositionIntegral, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup,
+    WindConfig,
 };
 
 use crate::figure::{Figure, Line, Style};
@@ -165,7 +166,13 @@ fn fly(integral: PositionIntegral, seed: u64) -> anyhow::Result<Flight> {
     let datum = *scene.datum();
     let start = Vector3::new(RADIUS_M + AWAY_M, 0.0, 0.0);
     let wind = WindConfig { mean: Vector3::new(0.3, 0.2, 0.0), gust_sigma_m_s: 0.2, ..WindConfig::default() };
-    let vehicles = vec![VehicleSetup { model, position: start, yaw: 0.0, system_id: 1 }];
+    let vehicles = vec![VehicleSetup {
+        model,
+        position: start,
+        yaw: 0.0,
+        system_id: 1,
+        position_errors: PositionErrors::default(),
+    }];
     let mut rig = Rig {
         simulation: Simulation::new(SimulationConfig { scene, vehicles, seed, wind }),
         companion: Companion::new(CompanionConfig::new(1, datum)),

@@ -12,7 +12,7 @@ use anyhow::Context as _;
 use nalgebra::Vector3;
 use skein_swarm::traffic::{Apart, Lattice, Roads, Traveller, TravellerConfig};
 use skein_world::{
-    Aabb, STEP, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup, WindConfig,
+    Aabb, PositionErrors, STEP, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup, WindConfig,
     vehicle::GpsModel,
 };
 
@@ -119,6 +119,7 @@ impl Flight {
                 position: Vector3::new(agent.start.x, agent.start.y, 0.0),
                 yaw: 0.0,
                 system_id: u8::try_from(index + 1).context("more vehicles than MAVLink has system ids")?,
+                position_errors: PositionErrors::default(),
             });
         }
         let config = SimulationConfig { scene, vehicles, seed, wind: WindConfig::default() };
