@@ -251,7 +251,8 @@ fn leg_cost(leg: &Vector3<f64>, wind: &Wind, envelope: &Envelope) -> Option<Cost
     Some(Cost { seconds, effort_s: seconds * envelope.effort_at(airspeed_m_s) })
 }
 
-#[cfg(all(test, feature = "zenoh"))]
+#[cfg(feature = "zenoh")]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::config_file::Config;
