@@ -279,7 +279,7 @@ mod tests {
         (0..200).find_map(|second| {
             let now = S * second;
             let here = Vector3::new(4.0 * f64::from(second), 0.0, 4.0);
-            let motion = Motion::new(here, Vector3::new(4.0, 0.0, 0.0), [0.0; 2]);
+            let motion = Motion::new(here, Vector3::new(4.0, 0.0, 0.0), [0.0; 3]);
             let charge = charge(f64::from(second));
             energy.fly(now, charge, &motion, Some(&attitude), |_, _| true);
             energy.reason_to_return(now, charge, here).map(|why| (second, why))

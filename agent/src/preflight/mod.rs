@@ -381,6 +381,7 @@ mod tests {
                 estimate: Estimate {
                     motion: Some(Stamped { stamp: NOW, value: motion }),
                     attitude: Some(Stamped { stamp: NOW, value: attitude }),
+                    ..Estimate::default()
                 },
                 look: Some(Look { stamp: NOW, up_m: None, down_m: None }),
                 keep_out: None,

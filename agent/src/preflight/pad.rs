@@ -194,7 +194,7 @@ mod tests {
     impl Stand {
         fn at(place: [f64; 3], sigma_m: f64) -> Self {
             Self {
-                motion: Motion::new(place.into(), Vector3::zeros(), [sigma_m, 0.1]),
+                motion: Motion::new(place.into(), Vector3::zeros(), [sigma_m, sigma_m, 0.1]),
                 landed_at: None,
                 neighbours: Vec::new(),
                 others: Others::new(),
