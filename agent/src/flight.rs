@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_mav::{Command, CommandResult, Companion, Dialect, FlightMode, Landed, MavEvent, Telemetry};
+use skein_mav::{Command, CommandResult, Companion, FlightMode, Landed, MavEvent, Telemetry};
 
 use crate::instruction::Instruction;
 use crate::report::Report;
@@ -221,7 +221,7 @@ impl Flight {
             MavEvent::CommandTimedOut { command } => {
                 self.command_failed(now, *command, "no answer", companion)
             }
-            MavEvent::ModeChanged { from, to } if self.is_foreign(*from, *to, companion.dialect()) => {
+            MavEvent::ModeChanged { from, to } if self.is_foreign(*from, *to, companion) => {
                 // Control ends with the mode change itself; the b-threads hear of it afterwards.
                 self.phase = FlightPhase::Taken;
                 Some(Report::Taken { mode: *to, by: changed_by(now, companion.telemetry()) })
@@ -231,7 +231,8 @@ impl Flight {
     }
 
     /// Whether this agent did not ask for a change of mode.
-    fn is_foreign(&self, from: FlightMode, to: FlightMode, dialect: &dyn Dialect) -> bool {
+    fn is_foreign(&self, from: FlightMode, to: FlightMode, companion: &Companion) -> bool {
+        let (telemetry, dialect) = (companion.telemetry(), companion.dialect());
         match self.phase {
             _ if self.is_shadow => false,
             FlightPhase::Flying | FlightPhase::Settling { .. } => to != FlightMode::Offboard,
@@ -243,6 +244,8 @@ impl Flight {
                 FlightMode::Hold => !(self.is_nearly_up && dialect.takes_off_into_hold()),
                 _ => !matches!(to, FlightMode::Offboard | FlightMode::Takeoff),
             },
+            // On the ground the autopilot leaves its landing by itself.
+            FlightPhase::Landing if !telemetry.armed || telemetry.landed == Landed::OnGround => false,
             // Until it lands it may hold, for want of set-points.
             FlightPhase::Landing => {
                 from == FlightMode::Land
@@ -570,6 +573,17 @@ mod tests {
         stand.beats(HOLD, true);
         assert_eq!(stand.reports, [taken("pilot")]);
         assert_eq!(stand.goes_on(3000), [], "landing does not take it back");
+    }
+
+    #[test]
+    fn an_autopilot_that_has_landed_leaves_that_mode_by_itself() {
+        let mut stand = Stand::new();
+        stand.takes_off();
+        stand.lands();
+        stand.beats(LAND, true);
+        stand.is(MavLandedState::MAV_LANDED_STATE_ON_GROUND);
+        stand.beats(HOLD, false);
+        assert_eq!(stand.reports, [Report::Landed]);
     }
 
     #[test]

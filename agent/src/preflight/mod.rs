@@ -351,6 +351,7 @@ mod tests {
         look: Option<Look>,
         keep_out: Option<KeepOut>,
         shortfall: Option<&'static str>,
+        doubt: Option<&'static str>,
         failsafes: Failsafes,
         others: Others,
         is_taking_off: bool,
@@ -386,6 +387,7 @@ mod tests {
                 look: Some(Look { stamp: NOW, up_m: None, down_m: None }),
                 keep_out: None,
                 shortfall: None,
+                doubt: None,
                 failsafes: Failsafes::new(1),
                 others: Others::new(),
                 is_taking_off: false,
@@ -401,7 +403,7 @@ mod tests {
                 telemetry: &self.telemetry,
                 make: "PX4",
                 estimate: self.estimate,
-                doubt: None,
+                doubt: self.doubt,
                 charge: self.telemetry.battery.map(|battery| battery.value.fraction),
                 shortfall: self.shortfall,
                 failsafes: &self.failsafes,
@@ -435,7 +437,7 @@ mod tests {
     #[test]
     fn each_check_that_does_not_pass_is_named_with_what_was_found() {
         type Change = fn(&mut Told);
-        let cases: [(Change, &str); 15] = [
+        let cases: [(Change, &str); 17] = [
             (|_| {}, ""),
             (|told| told.telemetry.last_heartbeat = None, "autopilot: no autopilot heard"),
             (|told| told.telemetry.connected = false, "autopilot: silent"),
@@ -445,8 +447,10 @@ mod tests {
             (|told| told.look.as_mut().unwrap().stamp -= KNOWN_WITHIN, "lidar: no scan any more"),
             (|told| told.look.as_mut().unwrap().up_m = Some(2.9), "overhead: a roof 2.9 m above it"),
             (|told| told.keep_out = Some(zone_above()), "airspace: closed from 2.2 m above the start"),
-            (|told| told.telemetry.battery = None, "battery: no battery told"),
+            (|told| told.telemetry.battery = None, "battery: no charge told"),
             (|told| told.telemetry.battery.as_mut().unwrap().value.fraction = 0.29, "battery: 29 %"),
+            (|told| told.shortfall = Some("it takes 9 minutes"), "mission: it takes 9 minutes"),
+            (|told| told.doubt = Some("its position is uncertain"), "position: its position is uncertain"),
             (|told| told.has_somewhere_to_fly = false, "limits: the limits"),
             (|told| told.telemetry.ready_to_arm = false, "arming: the autopilot's own checks fail"),
             (|told| told.telemetry.armed = true, "stand: somebody else has armed it"),

@@ -218,6 +218,7 @@ mod tests {
             "occ/*/*",
             "presence/*/*",
             "state/*/*",
+            "readiness/*/*",
             "bid/*/*/uav/1",
             "ack/*/*/uav/1",
             "occ/*/*/uav/1",
