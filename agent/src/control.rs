@@ -28,7 +28,7 @@ use crate::{
         touchdown::Descent,
     },
     positioning::{Estimate, Motion, Positioning, excess_m},
-    preflight::{Failsafes, Others, Preflight, Situation, degrees},
+    preflight::{Failsafes, HandlingParameters, Others, Preflight, Situation, degrees},
     report::Report,
     scripts::Circumstances,
     watches::Watches,
@@ -57,6 +57,7 @@ pub struct Control {
     texts: Vec<Text>,
     preflight: Preflight,
     failsafes: Failsafes,
+    handling: HandlingParameters,
     /// What others say of their checks.
     others: Others,
     look: Option<Look>,
@@ -99,6 +100,7 @@ impl Control {
             texts: Vec::new(),
             preflight: Preflight::default(),
             failsafes: Failsafes::new(config.system_id),
+            handling: HandlingParameters::default(),
             others: Others::new(),
             look: None,
             ground_seen: GroundSeen::default(),
@@ -223,14 +225,21 @@ impl Control {
 
     fn follow_autopilot(&mut self, now: Duration, reports: &mut Vec<Report>) {
         self.failsafes.ask(now, &mut self.companion);
+        self.handling.ask(&mut self.companion);
         while let Some(event) = self.companion.poll_event() {
             self.failsafes.hear(&event, self.companion.dialect());
+            self.handling.hear(&event, self.companion.dialect());
             reports.extend(self.flight.hear(now, &event, &mut self.companion));
             if let MavEvent::Text(text) = event
                 && self.texts.len() < Telemetry::MAX_TEXTS
             {
                 self.texts.push(text);
             }
+        }
+        let envelope = self.handling.within(self.config.envelope, self.companion.dialect());
+        if envelope != *self.guidance.envelope() {
+            self.guidance.handle(envelope);
+            self.perception.handle(&envelope);
         }
         let position = self.motion().map(|motion| motion.position);
         let report = self.flight.follow(now, position, self.preflight.is_ready(), &mut self.companion);
@@ -254,6 +263,7 @@ impl Control {
             estimate,
             doubt: self.doubt.as_deref(),
             failsafes: &self.failsafes,
+            envelope: self.handling.check(self.guidance.envelope(), self.companion.dialect()),
             look: self.look,
             keep_out: self.perception.map().keep_out(),
             neighbours: around,

@@ -61,6 +61,16 @@ impl Guidance {
         }
     }
 
+    /// The vehicle is of this envelope from now on.
+    pub fn handle(&mut self, envelope: Envelope) {
+        self.envelope = envelope;
+        self.steering.handle(envelope);
+    }
+
+    pub fn envelope(&self) -> &Envelope {
+        &self.envelope
+    }
+
     /// Takes a waypoint to plan to.
     pub fn head_for(&mut self, waypoint: Waypoint) {
         self.course = Course::to(waypoint);

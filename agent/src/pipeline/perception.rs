@@ -7,7 +7,7 @@ use skein_planning::airspace::{Airspace, KeepOut};
 use skein_planning::map::{ClearanceMap, MapError, RayEnd, Sectors, VoxelMapConfig};
 use skein_wire::Scan;
 
-use crate::config::{AgentConfig, Fence};
+use crate::config::{AgentConfig, Envelope, Fence};
 
 /// Edge of a voxel, m.
 const RESOLUTION_M: f64 = 0.2;
@@ -91,7 +91,7 @@ impl Perception {
     /// An empty map of where the mission of this configuration may fly.
     pub fn of_mission(config: &AgentConfig) -> Result<Self, MapError> {
         let mut perception = Self::new(&config.fence, Vector3::from(config.home), heights(config))?;
-        perception.near_m = NEAR_M.max(config.envelope.filter().obstacle_reach_m()).min(MAP_RANGE_M);
+        perception.handle(&config.envelope);
         if config.airspace == Airspace::default() {
             return Ok(perception);
         }
@@ -135,6 +135,11 @@ impl Perception {
             allows_for_m: 0.0,
             far_ray: 0,
         })
+    }
+
+    /// The vehicle is of this envelope from now on.
+    pub fn handle(&mut self, envelope: &Envelope) {
+        self.near_m = NEAR_M.max(envelope.filter().obstacle_reach_m()).min(MAP_RANGE_M);
     }
 
     /// The same of a world in which some places are known to be closed.

@@ -29,6 +29,9 @@ pub struct Kept {
 
 /// Makes a velocity safe.
 pub trait VelocityFilter: std::fmt::Debug + Send {
+    /// The vehicle is of this envelope from now on.
+    fn handle(&mut self, envelope: &Envelope);
+
     /// The velocity nearest to the one desired that keeps all distances, or the way out of where none does. `others`
     /// are the neighbours, and what moves and tells nobody where it is.
     fn keep_apart(
@@ -74,6 +77,10 @@ impl SafetyFilter {
 }
 
 impl VelocityFilter for SafetyFilter {
+    fn handle(&mut self, envelope: &Envelope) {
+        (self.climb_m_s, self.config) = (envelope.climb_m_s, envelope.filter());
+    }
+
     fn keep_apart(
         &mut self,
         now: Duration,

@@ -80,6 +80,13 @@ impl Steering {
         }
     }
 
+    /// The vehicle is of this envelope from now on.
+    pub fn handle(&mut self, envelope: Envelope) {
+        self.envelope = envelope;
+        self.follower.handle(&envelope);
+        self.filter.handle(&envelope);
+    }
+
     /// Somebody else moves the vehicle, or nobody: whatever place it hovered at is not its place any more.
     pub fn rest(&mut self) {
         self.acceleration.forget();

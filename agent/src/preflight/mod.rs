@@ -3,6 +3,7 @@
 
 mod check;
 mod failsafes;
+mod handling;
 mod pad;
 
 use std::time::Duration;
@@ -13,6 +14,7 @@ use skein_planning::airspace::KeepOut;
 use skein_wire::{Check, CheckState};
 
 pub use self::failsafes::Failsafes;
+pub use self::handling::HandlingParameters;
 pub use self::pad::Others;
 use self::{
     check::{fails, passes, waits},
@@ -53,6 +55,8 @@ pub struct Situation<'a> {
     /// Why the battery does not hold the mission, if it does not.
     pub shortfall: Option<&'a str>,
     pub failsafes: &'a Failsafes,
+    /// The check that it is known how the vehicle flies.
+    pub envelope: Check,
     pub look: Option<Look>,
     /// Where nobody may fly.
     pub keep_out: Option<&'a KeepOut>,
@@ -155,6 +159,7 @@ impl Situation<'_> {
             self.airspace(),
             self.battery(),
             self.mission(),
+            self.envelope.clone(),
             self.limits(),
             self.arming(),
         ]);
@@ -407,6 +412,7 @@ mod tests {
                 charge: self.telemetry.battery.map(|battery| battery.value.fraction),
                 shortfall: self.shortfall,
                 failsafes: &self.failsafes,
+                envelope: passes("envelope", "as configured"),
                 look: self.look,
                 keep_out: self.keep_out.as_ref(),
                 neighbours: &[],

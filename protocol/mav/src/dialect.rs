@@ -8,6 +8,7 @@ use mavlink::dialects::common::{COMMAND_LONG_DATA, ESTIMATOR_STATUS_DATA, HEARTB
 
 use crate::command::{Command, CommandResult};
 use crate::failsafe::Failsafe;
+use crate::handling::Handling;
 use crate::mode::FlightMode;
 use crate::parameter::ParameterEncoding;
 use crate::set_point::SetPoint;
@@ -76,6 +77,16 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
     /// The message that tells how good the estimate is.
     fn estimator_message(&self) -> u32 {
         ESTIMATOR_STATUS_DATA::ID
+    }
+
+    /// The parameters on which its handling hangs.
+    fn handling_parameters(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// How it follows velocities, from its parameters, as far as it has them; `None` if nothing is known of that.
+    fn handling(&self, _parameter: &dyn Fn(&str) -> Option<f64>) -> Option<Handling> {
+        None
     }
 
     /// The way integers are written into parameter messages.

@@ -93,7 +93,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             lidar: plan.model.lidar.is_some(),
             fence,
             airspace: scenario.airspace.clone(),
-            envelope: plan.make().handles(Envelope {
+            envelope: Envelope {
                 cruise_m_s: plan.pace * scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
                 climb_m_s: plan.model.max_climb_m_s.min(1.5),
                 airspeed_m_s: plan.model.top_airspeed_m_s(),
@@ -103,7 +103,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
                 hull_m: plan.model.hull_radius_m,
                 separation_m: SEPARATION_HULLS * plan.model.hull_radius_m,
                 ..Envelope::default()
-            }),
+            },
             planners: scenario.planners,
             link_loss: scenario.without_ground,
             scripts: scripts_of(scenario, index + 1),

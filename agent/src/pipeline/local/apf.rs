@@ -37,6 +37,10 @@ impl PathFollower for Apf {
         &self.braking
     }
 
+    fn handle(&mut self, envelope: &Envelope) {
+        self.braking = envelope.braking(envelope.brake_m_s2);
+    }
+
     fn follow(&mut self, place: &Place<'_>, cap_m_s: f64, attraction: f64, map: &ClearanceMap) -> Step {
         self.speed_m_s = braking::ramp(self.speed_m_s, cap_m_s, TICK_S, &self.braking);
         let Place { path, station_m, position } = *place;

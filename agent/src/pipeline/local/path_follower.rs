@@ -8,6 +8,8 @@ use skein_planning::{
     map::ClearanceMap,
 };
 
+use crate::config::Envelope;
+
 /// The set-point loop's period.
 pub const TICK_S: f64 = 0.02;
 
@@ -25,6 +27,9 @@ pub struct Place<'a> {
 pub trait PathFollower: std::fmt::Debug + Send {
     /// The braking and acceleration under this planner.
     fn braking(&self) -> &BrakingConfig;
+
+    /// The vehicle is of this envelope from now on.
+    fn handle(&mut self, envelope: &Envelope);
 
     /// The velocity that follows the path, no faster than `cap_m_s`. `attraction` is 1, and less while a local
     /// minimum is escaped from.

@@ -59,6 +59,10 @@ impl PathFollower for Vfh {
         &self.braking
     }
 
+    fn handle(&mut self, envelope: &Envelope) {
+        *self = Self::new(envelope);
+    }
+
     fn follow(&mut self, place: &Place<'_>, cap_m_s: f64, _attraction: f64, map: &ClearanceMap) -> Step {
         self.follower.follow(place.path, place.station_m, place.position, cap_m_s, map)
     }

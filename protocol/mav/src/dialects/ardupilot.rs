@@ -10,6 +10,7 @@ use crate::command::{Command, CommandResult};
 use crate::dialect::Dialect;
 use crate::ekf_status;
 use crate::failsafe::Failsafe;
+use crate::handling::Handling;
 use crate::mode::FlightMode;
 use crate::parameter::ParameterEncoding;
 use crate::set_point::SetPoint;
@@ -66,6 +67,15 @@ const FAILSAFES: [Failsafe; 5] = [
         required: true,
     },
 ];
+
+/// Parameter: horizontal acceleration, cm/s².
+const ACCELERATION: &str = "WPNAV_ACCEL";
+const STOCK_ACCELERATION_M_S2: f64 = 2.5;
+/// Parameter: change of horizontal acceleration, m/s³.
+const JERK: &str = "PSC_JERK_XY";
+const STOCK_JERK_M_S3: f64 = 5.0;
+/// Time in which it builds a deceleration up, s: with these it stops from 3 m/s in 3.1 m.
+const LATENCY_S: f64 = 0.5;
 
 /// Gain from height error to climb where planar set-points become velocities, 1/s.
 const PLANAR_CLIMB_GAIN: f64 = 1.0;
@@ -144,6 +154,20 @@ impl Dialect for ArduPilot {
             }
             SetPoint::Velocity { velocity, .. } => SetPoint::Velocity { velocity, yaw },
             SetPoint::Position { position, .. } => SetPoint::Position { position, yaw },
+        })
+    }
+
+    fn handling_parameters(&self) -> &'static [&'static str] {
+        &[ACCELERATION, JERK]
+    }
+
+    /// It needs time to build a deceleration up, and longer while it accelerates. Newer releases have other names.
+    fn handling(&self, parameter: &dyn Fn(&str) -> Option<f64>) -> Option<Handling> {
+        let accel_m_s2 = parameter(ACCELERATION).filter(|accel| *accel > 0.0).map(|accel| accel / 100.0);
+        Some(Handling {
+            brake_m_s2: accel_m_s2.unwrap_or(STOCK_ACCELERATION_M_S2).min(STOCK_ACCELERATION_M_S2),
+            latency_s: LATENCY_S,
+            jerk_m_s3: parameter(JERK).filter(|jerk| *jerk > 0.0).or(Some(STOCK_JERK_M_S3)),
         })
     }
 

@@ -5,6 +5,7 @@ use mavlink::dialects::common::{COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot,
 use crate::command::CommandResult;
 use crate::dialect::Dialect;
 use crate::failsafe::Failsafe;
+use crate::handling::Handling;
 use crate::mode::FlightMode;
 use crate::set_point::SetPoint;
 use crate::telemetry::Telemetry;
@@ -16,6 +17,15 @@ pub(crate) const RELEASE: u32 = 0x010d_00ff;
 pub const OFFBOARD_LOSS_TIMEOUT: &str = "COM_OF_LOSS_T";
 /// Parameter: what the vehicle then does, by the numbers of [`OffboardLoss`].
 pub const OFFBOARD_LOSS_ACTION: &str = "COM_OBL_RC_ACT";
+
+/// Parameter: what acceleration an error of velocity asks for, 1/s.
+const VELOCITY_GAIN: &str = "MPC_XY_VEL_P_ACC";
+/// Parameter: horizontal acceleration, m/s².
+const ACCELERATION: &str = "MPC_ACC_HOR";
+/// From an acceleration that is asked for to the tilt that gives it, s: stock, it stops from 3 m/s in 2.1 m.
+const TILT_LAG_S: f64 = 0.15;
+/// Deceleration that crossings in simulation were sure of, m/s².
+const SURE_BRAKE_M_S2: f64 = 2.5;
 
 /// Main and sub-mode of each mode.
 const MODES: [(FlightMode, (u8, u8)); 7] = [
@@ -139,6 +149,22 @@ impl Dialect for Px4 {
 
     fn set_point(&self, wish: SetPoint, _: &Telemetry, _: &mut Option<f64>) -> Option<SetPoint> {
         Some(wish)
+    }
+
+    fn handling_parameters(&self) -> &'static [&'static str] {
+        &[VELOCITY_GAIN, ACCELERATION]
+    }
+
+    /// It follows a velocity like a first-order lag. Skein's built-in autopilot has no such gain, and is as quick as
+    /// configured.
+    fn handling(&self, parameter: &dyn Fn(&str) -> Option<f64>) -> Option<Handling> {
+        let gain = parameter(VELOCITY_GAIN).filter(|gain| *gain > 0.0)?;
+        let brake_m_s2 = parameter(ACCELERATION).filter(|accel| *accel > 0.0).unwrap_or(SURE_BRAKE_M_S2);
+        Some(Handling {
+            brake_m_s2: brake_m_s2.min(SURE_BRAKE_M_S2),
+            latency_s: TILT_LAG_S + 1.0 / gain,
+            jerk_m_s3: None,
+        })
     }
 
     fn failsafes(&self) -> &'static [Failsafe] {

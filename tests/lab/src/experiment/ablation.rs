@@ -9,7 +9,7 @@ use skein_agent::pipeline::layers::Layers;
 use skein_agent::pipeline::local::Apf;
 use skein_agent::pipeline::safety_filter::{Kept, VelocityFilter};
 use skein_agent::pipeline::surroundings::Surroundings;
-use skein_agent::{AgentConfig, GlobalPlanner, Parts, Planners};
+use skein_agent::{AgentConfig, Envelope, GlobalPlanner, Parts, Planners};
 use skein_planning::Path;
 use skein_planning::global::astar::PlanError;
 use skein_planning::local::{apf::ApfConfig, escape::EscapeConfig};
@@ -99,6 +99,8 @@ impl PathFinder for Straight {
 struct Unfiltered;
 
 impl VelocityFilter for Unfiltered {
+    fn handle(&mut self, _: &Envelope) {}
+
     fn keep_apart(&mut self, _: Duration, request: Motion, _: &[Neighbour], _: &Surroundings<'_>) -> Kept {
         Kept { velocity: request.desired, evades: false }
     }
