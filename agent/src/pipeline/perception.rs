@@ -364,7 +364,7 @@ mod tests {
             let mut scan = scan(&pose, 100.0);
             scan.ranges_m[rays].fill(invalid);
             // Of the far rays one in three is followed in each scan.
-            let taken = (0..3).map(|_| perception.take_in(&scan, &pose, &[])).all(|taken| taken);
+            let taken = (0..3).all(|_| perception.take_in(&scan, &pose, &[]));
             let voxels = perception.map().voxels();
             taken.then(|| {
                 [0.0, 1.0].map(|y| voxels.sensed_free_m(&pose.position, &Vector3::new(1.0 - y, y, 0.0), 9.0))

@@ -41,6 +41,8 @@ struct Stopwatch {
 struct Vehicle {
     agent: AgentCore,
     link: Box<dyn Link>,
+    /// Its agent was killed.
+    is_dead: bool,
 }
 
 /// The events and messages of one step, for a recording.
@@ -87,7 +89,11 @@ impl Swarm {
             .map(|(config, link)| {
                 let parts = parts(&config);
                 let store = Box::new(MemoryStore::default());
-                Ok(Vehicle { agent: AgentCore::with_parts(config, parts, Some(store))?, link })
+                Ok(Vehicle {
+                    agent: AgentCore::with_parts(config, parts, Some(store))?,
+                    link,
+                    is_dead: false,
+                })
             })
             .collect::<Result<_, AgentError>>()?;
         Ok(Self {
@@ -113,6 +119,13 @@ impl Swarm {
         seat(&mut self.simulation)
     }
 
+    /// Ends the agent of vehicle `index` as if its process had been killed: it hears and says nothing any more.
+    pub fn kill_agent(&mut self, index: usize) {
+        if let Some(vehicle) = self.vehicles.get_mut(index) {
+            vehicle.is_dead = true;
+        }
+    }
+
     /// Moves world, agents and ground on by one step of 4 ms.
     pub fn step(&mut self) -> Happenings {
         self.simulation.step();
@@ -121,11 +134,13 @@ impl Swarm {
         let mut happenings = Happenings { scans: self.simulation.take_scans(), ..Happenings::default() };
         for (index, vehicle) in self.vehicles.iter_mut().enumerate() {
             let bytes = self.simulation.receive(index);
-            vehicle.agent.receive_mavlink(now, &bytes);
+            if !vehicle.is_dead {
+                vehicle.agent.receive_mavlink(now, &bytes);
+            }
             happenings.mavlink.push(bytes);
         }
         for (index, scan) in &happenings.scans {
-            if let Some(vehicle) = self.vehicles.get_mut(*index) {
+            if let Some(vehicle) = self.vehicles.get_mut(*index).filter(|vehicle| !vehicle.is_dead) {
                 timed(&mut self.stopwatch, || vehicle.agent.sense(now, scan));
             }
         }
@@ -148,7 +163,7 @@ impl Swarm {
         let mut heard = self.ground.take_selections();
         keep_own(&mut heard, self.ground.name());
         selections.append(&mut heard);
-        for (index, vehicle) in self.vehicles.iter_mut().enumerate() {
+        for (index, vehicle) in self.vehicles.iter_mut().enumerate().filter(|(_, vehicle)| !vehicle.is_dead) {
             let began = Instant::now();
             timed(&mut self.stopwatch, || vehicle.agent.tick(now, vehicle.link.as_mut()));
             let mut heard = vehicle.agent.take_selections();
