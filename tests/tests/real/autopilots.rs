@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use skein_dbp::Happened;
+use skein_ground::{Order, Who};
 use skein_mav::messages::{HEARTBEAT_DATA, MavMessage, MavModeFlag};
-use skein_mav::{DIALECTS, FlightMode, FrameReader};
+use skein_mav::{Address, Command, DIALECTS, Dialect, FlightMode, FrameReader, FrameWriter};
 use skein_sim::autopilots::{Autopilots, make::Make};
 use skein_sim::scenario::Scenario;
 use skein_tests::{Lockstep, flight, fly};
@@ -48,60 +49,166 @@ fn arducopters_swap_places_across_a_circle() {
     flies("antipodal", 4, autopilots);
 }
 
-/// Two vehicles on their way; the agent of the first is killed at each of these moments after it began to fly it.
-fn lands_without_its_agent(autopilots: &Autopilots, moments_s: &[f64]) {
-    let _turn = turn();
-    for moment_s in moments_s {
+/// Two vehicles that swap places, of which the first is watched.
+struct Watched {
+    lockstep: Lockstep,
+    reader: FrameReader,
+    /// The newest heartbeat of its autopilot.
+    heartbeat: Option<HEARTBEAT_DATA>,
+    lifted_off: Option<Duration>,
+    airborne: Option<Duration>,
+    _folder: tempfile::TempDir,
+}
+
+impl Watched {
+    fn on(autopilots: &Autopilots) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut scenario = Scenario::built_in("antipodal", Some(2), 1).unwrap();
         autopilots.assign(&mut scenario);
         let mut lockstep = Lockstep::of(scenario.clone());
         lockstep.swarm.seat(|simulation| autopilots.seat(simulation, &scenario, folder.path())).unwrap();
-        let (mut reader, mut heard) = (FrameReader::default(), None);
-        let (mut up, mut killed, mut goes_down) = (None, None, None);
-        let told = loop {
-            let happenings = lockstep.step();
-            let now = lockstep.swarm.now();
-            reader.push(&happenings.mavlink[0]);
-            while let Some(frame) = reader.next_frame() {
-                if let (MavMessage::HEARTBEAT(heartbeat), 1) = (frame.message, frame.sender.component_id) {
-                    heard = Some(heartbeat);
-                }
+        let (reader, heartbeat, lifted_off, airborne) = (FrameReader::default(), None, None, None);
+        Self { lockstep, reader, heartbeat, lifted_off, airborne, _folder: folder }
+    }
+
+    fn step(&mut self) -> Duration {
+        let happenings = self.lockstep.step();
+        let now = self.lockstep.swarm.now();
+        self.reader.push(&happenings.mavlink[0]);
+        while let Some(frame) = self.reader.next_frame() {
+            if let (MavMessage::HEARTBEAT(heartbeat), 1) = (frame.message, frame.sender.component_id) {
+                self.heartbeat = Some(heartbeat);
             }
-            let is_up = lockstep.swarm.simulation().vehicle(0).unwrap().airborne;
-            let is_first = |happened: &Happened| happened.home == lockstep.nodes[0];
-            let mut own = happenings.selections.iter().filter(|happened| is_first(happened));
-            up = up.or(own.any(|happened| Airborne::read(&happened.event).is_some()).then_some(now));
-            if killed.is_none() && up.is_some_and(|up| now >= up + Duration::from_secs_f64(*moment_s)) {
-                lockstep.swarm.kill_agent(0);
-                killed = Some(now);
-            }
-            let since_s = killed.map_or(0.0, |killed| (now - killed).as_secs_f64());
-            let (mode, armed) = heard.as_ref().map_or((FlightMode::default(), false), read);
-            if since_s > 0.0 && matches!(mode, FlightMode::Land | FlightMode::Return) {
-                goes_down.get_or_insert(since_s);
-            }
-            if since_s > 120.0 || (since_s > 0.0 && !armed && !is_up) {
-                break format!(
-                    "{:?}, {moment_s} s: {mode}, {since_s:.0} s later, armed: {armed}",
-                    autopilots.autopilot
-                );
-            }
-            assert!(now < Duration::from_secs(400), "it never took off");
-        };
-        println!("{told}, on its way down after {goes_down:?} s");
-        assert!(goes_down.is_some_and(|after_s| after_s <= 6.0), "{told}: {goes_down:?}");
-        assert!(told.ends_with("armed: false"), "{told}");
-        let truth = lockstep.swarm.truth();
-        assert_eq!((truth.collisions_obstacle, truth.collisions_vehicle), (0, 0), "{told}");
+        }
+        let is_first = |happened: &&Happened| happened.home == self.lockstep.nodes[0];
+        let mut own = happenings.selections.iter().filter(is_first);
+        let is_airborne = own.any(|happened| Airborne::read(&happened.event).is_some());
+        self.airborne = self.airborne.or(is_airborne.then_some(now));
+        self.lifted_off = self.lifted_off.or(self.is_up().then_some(now));
+        assert!(now < Duration::from_secs(400), "it goes on for ever");
+        now
+    }
+
+    fn is_up(&self) -> bool {
+        self.lockstep.swarm.simulation().vehicle(0).unwrap().airborne
+    }
+
+    fn dialect(&self) -> Option<&'static dyn Dialect> {
+        let heartbeat = self.heartbeat.as_ref()?;
+        DIALECTS.into_iter().find(|dialect| dialect.is_spoken_by(heartbeat))
+    }
+
+    fn mode(&self) -> FlightMode {
+        let mode = self.dialect().zip(self.heartbeat.as_ref());
+        mode.map_or(FlightMode::default(), |(dialect, heartbeat)| dialect.mode(heartbeat.custom_mode))
+    }
+
+    fn is_armed(&self) -> bool {
+        let armed = MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED;
+        self.heartbeat.as_ref().is_some_and(|heartbeat| heartbeat.base_mode.contains(armed))
+    }
+
+    /// A pilot's station holds the vehicle.
+    fn hold(&mut self) {
+        let mut message = self.dialect().unwrap().encode(Command::Hold, None).unwrap();
+        (message.target_system, message.target_component) = (1, 1);
+        let mut station = FrameWriter::new(Address { system_id: 255, component_id: 190 });
+        station.write(&message);
+        self.lockstep.swarm.send_mavlink(0, &station.take());
     }
 }
 
-/// The mode of a heartbeat, and whether the motors may turn.
-fn read(heartbeat: &HEARTBEAT_DATA) -> (FlightMode, bool) {
-    let dialect = DIALECTS.into_iter().find(|dialect| dialect.is_spoken_by(heartbeat));
-    let mode = dialect.map_or(FlightMode::default(), |dialect| dialect.mode(heartbeat.custom_mode));
-    (mode, heartbeat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED))
+/// The agent of the first is killed at each of these moments after it began to fly it, s.
+fn lands_without_its_agent(autopilots: &Autopilots, moments_s: &[f64]) {
+    let _turn = turn();
+    for moment_s in moments_s {
+        let mut flight = Watched::on(autopilots);
+        while flight.airborne.is_none_or(|up| flight.lockstep.swarm.now() < up + seconds(*moment_s)) {
+            flight.step();
+        }
+        flight.lockstep.swarm.kill_agent(0);
+        let killed = flight.lockstep.swarm.now();
+        let mut goes_down = None;
+        let down = loop {
+            let since = flight.step() - killed;
+            if matches!(flight.mode(), FlightMode::Land | FlightMode::Return) {
+                goes_down.get_or_insert(since);
+            }
+            if !flight.is_armed() && !flight.is_up() || since > seconds(120.0) {
+                break since;
+            }
+        };
+        let make = autopilots.autopilot;
+        println!(
+            "{make:?} killed after {moment_s} s: comes down after {goes_down:?}, disarmed after {down:?}"
+        );
+        assert!(goes_down.is_some_and(|after| after <= seconds(6.0)), "{make:?}: {goes_down:?}");
+        assert!(down <= seconds(120.0), "{make:?} is still armed, in mode {}", flight.mode());
+        let truth = flight.lockstep.swarm.truth();
+        assert_eq!((truth.collisions_obstacle, truth.collisions_vehicle), (0, 0));
+    }
+}
+
+/// A phase of a flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    Climb,
+    Way,
+    /// After an order to return.
+    Return,
+    Landing,
+}
+
+/// A pilot holds the first vehicle so long after each phase began.
+fn a_pilot_gets_it_at_once(autopilots: &Autopilots) {
+    let _turn = turn();
+    let climb = [0.2, 0.4, 0.6].map(|after_s| (Phase::Climb, after_s));
+    let way = [1.0, 3.0, 5.0].map(|after_s| (Phase::Way, after_s));
+    let home = [0.5, 1.5, 2.5].map(|after_s| (Phase::Return, after_s));
+    let landing = [0.3, 0.8, 1.3].map(|after_s| (Phase::Landing, after_s));
+    for (phase, after_s) in [climb, way, home, landing].concat() {
+        let mut flight = Watched::on(autopilots);
+        let (mut began, mut ordered) = (None, false);
+        while began.is_none_or(|began| flight.lockstep.swarm.now() < began + seconds(after_s)) {
+            let now = flight.step();
+            if phase == Phase::Return && !ordered && flight.airborne.is_some_and(|up| now > up + seconds(4.0))
+            {
+                ordered = true;
+                let home = Order::Return(Who::These(vec![flight.lockstep.nodes[0].clone()]));
+                flight.lockstep.swarm.order(&home).unwrap();
+                began = Some(now);
+            }
+            began = began.or(match phase {
+                Phase::Climb => flight.lifted_off,
+                Phase::Way => flight.airborne,
+                Phase::Return => None,
+                Phase::Landing => (flight.mode() == FlightMode::Land).then_some(now),
+            });
+        }
+        flight.hold();
+        let taken = flight.lockstep.swarm.now();
+        let mut holds_since = None;
+        while flight.lockstep.swarm.now() < taken + seconds(6.0) {
+            let now = flight.step();
+            if flight.mode() == FlightMode::Hold {
+                holds_since.get_or_insert(now - taken);
+            } else {
+                assert_eq!(holds_since, None, "{phase:?}: it is taken back, to {}", flight.mode());
+            }
+        }
+        let agent = flight.lockstep.swarm.agents().next().unwrap();
+        let last = agent.last_set_point().map(|(at, ..)| at.saturating_sub(taken));
+        let make = autopilots.autopilot;
+        println!(
+            "{make:?} {phase:?} {after_s} s: holds after {holds_since:?}, last set-point after {last:?}"
+        );
+        assert!(holds_since.is_some(), "{make:?} {phase:?}: {}", flight.mode());
+        assert!(last.is_none_or(|last| last <= seconds(0.2)), "{make:?} {phase:?}: {last:?}");
+    }
+}
+
+fn seconds(seconds: f64) -> Duration {
+    Duration::from_secs_f64(seconds)
 }
 
 /// At once, on the way, and near the other.
@@ -125,4 +232,27 @@ fn an_arducopter_whose_agent_is_killed_lands() {
     let autopilots =
         Autopilots { autopilot: Some(Make::Ardupilot), ardupilot: Some(ardupilot), ..Autopilots::default() };
     lands_without_its_agent(&autopilots, &MOMENTS_S);
+}
+
+#[test]
+fn a_pilot_gets_a_built_in_autopilot_at_once_in_every_phase() {
+    a_pilot_gets_it_at_once(&Autopilots::default());
+}
+
+#[test]
+fn a_pilot_gets_a_px4_at_once_in_every_phase() {
+    let Some(px4) = program("SKEIN_PX4") else { return };
+    a_pilot_gets_it_at_once(&Autopilots {
+        autopilot: Some(Make::Px4),
+        px4: Some(px4),
+        ..Autopilots::default()
+    });
+}
+
+#[test]
+fn a_pilot_gets_an_arducopter_at_once_in_every_phase() {
+    let Some(ardupilot) = program("SKEIN_ARDUPILOT") else { return };
+    let autopilots =
+        Autopilots { autopilot: Some(Make::Ardupilot), ardupilot: Some(ardupilot), ..Autopilots::default() };
+    a_pilot_gets_it_at_once(&autopilots);
 }

@@ -161,7 +161,7 @@ impl Dialect for ArduPilot {
         &[ACCELERATION, JERK]
     }
 
-    /// It needs time to build a deceleration up, and longer while it accelerates. Newer releases have other names.
+    /// It needs time to build a deceleration up, and longer while it accelerates. One that lacks a parameter counts as stock.
     fn handling(&self, parameter: &dyn Fn(&str) -> Option<f64>) -> Option<Handling> {
         let accel_m_s2 = parameter(ACCELERATION).filter(|accel| *accel > 0.0).map(|accel| accel / 100.0);
         Some(Handling {
