@@ -1,4 +1,5 @@
-//! The bytes between the agent and its autopilot, or a station that shares its line: UDP, TCP or a serial line. Nothing here ever waits.
+//! The bytes between the agent and its autopilot, or a station that shares its line: UDP, TCP or a serial line.
+//! Nothing here ever waits.
 
 use std::fmt;
 use std::io::{self, Read, Write};

@@ -88,8 +88,8 @@ impl AgentCore {
         self
     }
 
-    /// The same agent as the shadow of a pilot: it plans and makes set-points while somebody else flies the vehicle, and
-    /// nothing leaves that the vehicle would obey.
+    /// The same agent as the shadow of a pilot: it plans and makes set-points while somebody else flies the
+    /// vehicle, and nothing leaves that the vehicle would obey.
     #[must_use]
     pub fn shadowing(mut self) -> Self {
         self.control.shadow();

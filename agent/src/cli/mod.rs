@@ -34,8 +34,8 @@ enum Command {
         /// Configuration of the agent; agent/agent.toml explains every field.
         #[arg(long, value_name = "FILE")]
         config: PathBuf,
-        /// Fly along with a pilot: plan, and write set-points to a file beside the state, but send the autopilot none, nor
-        /// any command.
+        /// Fly along with a pilot: plan, and write set-points to a file beside the state, but send the
+        /// autopilot none, nor any command.
         #[arg(long)]
         shadow: bool,
     },

@@ -83,10 +83,10 @@ impl Subscriptions {
         *self = Self::default();
     }
 
-    /// The message that is overdue, and the command that asks for it: of several, the one not asked for the longest, so that
-    /// each gets its turn even if an autopilot never answers about one of them. Streams are all asked for
-    /// once, because the autopilot may already send them at another rate. `estimator_message` is what this make
-    /// sends for `ESTIMATOR_STATUS`.
+    /// The message that is overdue, and the command that asks for it: of several, the one not asked for the
+    /// longest, so that each gets its turn even if an autopilot never answers about one of them. Streams are
+    /// all asked for once, because the autopilot may already send them at another rate. `estimator_message` is
+    /// what this make sends for `ESTIMATOR_STATUS`.
     pub(super) fn next_request(
         &mut self,
         now: Duration,
