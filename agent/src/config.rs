@@ -35,10 +35,10 @@ pub struct Envelope {
     /// Greatest speed through the air, m/s: less the wind, it is what is left over the ground.
     #[serde(deserialize_with = "positive")]
     pub airspeed_m_s: f64,
-    /// How far the vehicle leans when it flies that fast, rad.
+    /// Tilt of the vehicle when it flies that fast, rad.
     #[serde(deserialize_with = "lean_rad")]
     pub tilt_rad: f64,
-    /// How long it hovers on a full battery, s; 0 if that is not known.
+    /// Time in hover on a full battery, s; 0 if that is not known.
     #[serde(deserialize_with = "not_negative")]
     pub endurance_s: f64,
     /// Acceleration the vehicle can brake with, m/s².

@@ -58,7 +58,7 @@ pub struct Control {
     preflight: Preflight,
     failsafes: Failsafes,
     handling: HandlingParameters,
-    /// What others say of their checks.
+    /// The checks of the others, by their own word.
     others: Others,
     look: Option<Look>,
     ground_seen: GroundSeen,

@@ -129,7 +129,7 @@ impl Vehicle {
 }
 
 fn in_json(readiness: &Readiness) -> serde_json::Value {
-    let check = |check: &Check| json!({ "name": check.name, "state": check.state.word(), "value": check.value, "advice": check.advice });
+    let check = |Check { name, state, value, advice }: &Check| json!({ "name": name, "state": state.word(), "value": value, "advice": advice });
     json!({
         "vehicle": readiness.node.as_str(),
         "ready": readiness.is_ready(),

@@ -31,7 +31,7 @@ pub struct Wind {
     pub gust_m_s: f64,
 }
 
-/// What one vehicle has felt of the air in this flight.
+/// The air as one vehicle has felt it in this flight.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Airflow {
     felt: Option<Felt>,

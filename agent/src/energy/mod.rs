@@ -61,7 +61,7 @@ pub struct Energy {
     thought_over: Option<(f64, Option<String>)>,
 }
 
-/// What is measured in one flight.
+/// The measurements of one flight.
 #[derive(Debug)]
 struct Flight {
     began: Duration,
@@ -70,7 +70,7 @@ struct Flight {
     way_home: WayHome,
 }
 
-/// What a way takes: the time, and the time in hover that takes as much energy, s.
+/// The cost of a way: its time, and the time in hover that takes as much energy, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Cost {
     seconds: f64,

@@ -8,7 +8,7 @@ use skein_mav::SetPoint;
 
 use crate::config::Envelope;
 
-/// What a climb or a descent is stopped with, m/s².
+/// Deceleration of a climb or a descent, m/s².
 const BRAKE_M_S2: f64 = 1.5;
 
 /// The newest look of the vehicle's range finders, on the ground too.

@@ -61,7 +61,7 @@ pub struct Pose {
 pub struct Other {
     /// ENU, m.
     pub position: Vector3<f64>,
-    /// How far off it may be, beyond what every margin allows for, m.
+    /// Error beyond what every margin allows for, m.
     pub off_m: f64,
 }
 
@@ -81,7 +81,7 @@ pub struct Perception {
     returns: Vec<Vector3<f64>>,
     ground_m: f64,
     rolls: bool,
-    /// What margins around known places allow for the vehicle's position, m.
+    /// Width that margins around known places have for the vehicle's position, m.
     allows_for_m: f64,
     /// Which of the far rays the newest scan followed.
     far_ray: u32,

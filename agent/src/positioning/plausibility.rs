@@ -18,7 +18,7 @@ const WINDOW: Duration = Duration::from_secs(1);
 /// a share of its standard deviation.
 const TOLERANCE_M: f64 = 1.0;
 const TOLERANCE_OF_SIGMA: f64 = 0.5;
-/// What is not known of the acceleration between two positions, m/s2.
+/// Acceleration between two positions that nothing tells of, m/s2.
 const UNKNOWN_M_S2: f64 = 2.0;
 /// Nothing is said of a gap longer than this.
 const LONGEST_GAP: Duration = Duration::from_secs(2);
@@ -91,9 +91,9 @@ pub struct Plausibility {
     had_gps: bool,
     /// The last jump or restart that is not forgotten yet, and when it was found.
     shock: Option<(Duration, Doubt)>,
-    /// What has been jumped since there was none to remember, together, m.
+    /// The jumps since there was none to remember, together, m.
     jumped: Vector3<f64>,
-    /// What has been jumped since the beginning, together, m.
+    /// All jumps since the beginning, together, m.
     frame: Vector3<f64>,
 }
 
@@ -175,7 +175,7 @@ impl Plausibility {
         })
     }
 
-    /// What is left of the jumps, m.
+    /// The rest of the jumps, m.
     fn faded_m(&self, now: Duration) -> f64 {
         self.shock.map_or(0.0, |(at, _)| {
             let halves = now.saturating_sub(at).as_secs_f64() / HALVES_AFTER.as_secs_f64();
@@ -188,7 +188,7 @@ impl Plausibility {
         self.faded_m(now)
     }
 
-    /// What has been jumped since the beginning, together, m ENU: what was placed by the estimate before is shifted by
+    /// All jumps since the beginning, together, m ENU: what was placed by the estimate before is shifted by
     /// as much.
     pub fn frame(&self) -> Vector3<f64> {
         self.frame

@@ -15,7 +15,7 @@ const READ_EVERY: Duration = Duration::from_secs(3);
 /// of each.
 const LACKING_EVERY: u32 = 10;
 
-/// What is known of the autopilot's failsafe parameters.
+/// The autopilot's failsafe parameters, as far as they are known.
 #[derive(Debug)]
 pub struct Failsafes {
     /// The agent's system id, which some parameters name.
@@ -30,7 +30,7 @@ pub struct Failsafes {
 #[derive(Debug)]
 struct Listed {
     failsafe: Failsafe,
-    /// What the autopilot has told of each of its names.
+    /// The autopilot's answer to each of its names.
     told: Vec<Option<Told>>,
 }
 

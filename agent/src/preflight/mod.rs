@@ -36,7 +36,7 @@ const CHECK_EVERY: Duration = Duration::from_millis(100);
 const FAULTS_LAST: Duration = Duration::from_secs(1);
 /// The column above the start is looked at every so often, m.
 const LAYER_M: f64 = 0.2;
-/// What the autopilot wrote longer ago has nothing to do with its present checks.
+/// A line that the autopilot wrote longer ago has nothing to do with its present checks.
 const WRITTEN_WITHIN: Duration = Duration::from_secs(60);
 
 /// All that the checks are made of.

@@ -17,10 +17,10 @@ use crate::positioning::Motion;
 const ON_THE_PAD_M: f64 = 1.0;
 /// So many standard deviations may a position be off.
 const SIGMAS: f64 = 3.0;
-/// What others said longer ago may not be so any more, s.
+/// The word of others counts for so long, s.
 const HEARD_WITHIN: Duration = Duration::from_secs(5);
 
-/// What others say of their pads and their datum, and when they said it last.
+/// Pads and data of the others by their word, and when they said it last.
 pub type Others = BTreeMap<NodeName, (Duration, Readiness)>;
 
 /// Where a vehicle stands, and who else does. World ENU, metres.
@@ -84,7 +84,7 @@ impl Pad<'_> {
         self.others.iter().filter(move |(_, (at, _))| is_recent(*at)).map(|(node, (_, said))| (node, said))
     }
 
-    /// Whose pad the vehicle stands on, if that is nearer than its own.
+    /// The vehicle on whose pad this one stands, if that is nearer than its own.
     fn other_pad(&self) -> Option<&NodeName> {
         let away_m = |pad: Vector3<f64>| (self.motion.position - pad).xy().norm();
         let nearest = self.heard().map(|(node, said)| (away_m(said.home.into()), node));

@@ -189,7 +189,7 @@ pub(super) fn closeness(me: &Me, other: Option<&NodeName>) -> Part {
     ])
 }
 
-/// What the vehicle knows of its place.
+/// The vehicle's place, as far as it knows.
 pub(super) fn position(me: &Me) -> Part {
     let doubted = PositionDoubted { why: "the position jumped".into(), sigma_m: 8.0 };
     Part::new(vec![

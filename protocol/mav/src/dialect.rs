@@ -84,7 +84,7 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
         &[]
     }
 
-    /// How it follows velocities, from its parameters, as far as it has them; `None` if nothing is known of that.
+    /// Its handling, from its parameters, as far as it has them; `None` if nothing is known of that.
     fn handling(&self, _parameter: &dyn Fn(&str) -> Option<f64>) -> Option<Handling> {
         None
     }

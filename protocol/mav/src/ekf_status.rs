@@ -5,7 +5,7 @@ use mavlink::dialects::common::{ESTIMATOR_STATUS_DATA, EstimatorStatusFlags};
 
 /// Its message id.
 pub(crate) const ID: u32 = 193;
-/// What its checksum begins with beyond the frame.
+/// Seed of its checksum.
 pub(crate) const EXTRA_CRC: u8 = 71;
 /// Bytes of five ratios and the flags.
 const LEN: usize = 22;

@@ -1,4 +1,4 @@
-//! How quickly a vehicle follows the velocities that its companion asks for.
+//! Handling: the delay, deceleration and jerk with which a vehicle follows its companion's velocities.
 
 /// The handling of a vehicle in offboard flight, by its autopilot's make and parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]

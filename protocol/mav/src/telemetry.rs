@@ -125,7 +125,7 @@ pub struct Telemetry {
     pub position_age: Option<Duration>,
     /// Standard deviations of the position by its word, horizontal and vertical, m; `None` while it tells none.
     pub position_sigma_m: Option<Stamped<[f64; 2]>>,
-    /// How often its clock has begun anew while it was listened to.
+    /// Number of times that its clock has begun anew while it was listened to.
     pub restarts: u32,
     /// Whether satellites tell its position; `None` while it has not said.
     pub has_gps_fix: Option<bool>,

@@ -1,4 +1,4 @@
-//! How good a position is, how old, and where it counts from.
+//! The accuracy of a position, its age, and where it counts from.
 
 use std::time::Duration;
 

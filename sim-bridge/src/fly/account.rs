@@ -15,7 +15,7 @@ pub struct Account<'a> {
     pub simulation: &'a Simulation,
     /// The end of each vehicle's mission, by its agent's word.
     pub outcomes: Vec<Option<Outcome>>,
-    /// What keeps each vehicle from moving on, by its agent's word; empty if nothing does.
+    /// The reason why each vehicle does not move on, by its agent's word; empty if there is none.
     pub waiting_for: Vec<String>,
     /// The inputs of each agent's set-points, where they are known.
     pub set_points: Vec<SetPointRecord>,

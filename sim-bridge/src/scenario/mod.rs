@@ -93,7 +93,7 @@ pub struct Scenario {
     pub planners: Planners,
     /// Height above the ground at which a take-off ends.
     pub takeoff_height_m: f64,
-    /// What a vehicle does that has been without the ground station for long.
+    /// The policy of a vehicle that has been without the ground station for long.
     pub without_ground: LinkLossPolicy,
     /// Simulated seconds after which the mission has failed.
     pub time_limit_s: f64,

@@ -37,7 +37,7 @@ pub struct PositionFault {
     pub kind: PositionFaultKind,
 }
 
-/// What goes wrong.
+/// The fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PositionFaultKind {
     /// Fixes and pressure height are this much off, ENU, m, and the estimator takes them over.

@@ -112,7 +112,7 @@ fn under_a_roof_that_its_range_finder_sees_it_does_not_take_off() {
     assert!(!flies && waits_for.contains("overhead: a roof 1.5 m above it"), "{waits_for}");
 }
 
-/// What another station says to change a parameter.
+/// The bytes with which another station changes a parameter.
 fn sets(parameter: &str, value: f32) -> Vec<u8> {
     let mut writer = FrameWriter::new(Address { system_id: 255, component_id: 190 });
     writer.write(&PARAM_SET_DATA {

@@ -16,7 +16,7 @@ struct Vehicle {
 
 const SMALL: Vehicle = Vehicle { tilt_rad: 0.2, capacity_wh: 12.0 };
 
-/// How a flight ended.
+/// The end of a flight.
 #[derive(Debug)]
 struct Flown {
     /// Farthest from home, and where it landed, m.

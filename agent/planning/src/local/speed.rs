@@ -226,7 +226,9 @@ mod tests {
             let speed = unhindered_speed(&place, &Vector3::x(), &obstacles, &config).min(config.cruise_m_s);
             prop_assume!(speed > config.beside_m_s && obstacle.xy().norm() > config.clearance_m);
             let velocity = Vector3::x() * speed;
-            let motion = Motion { position: place, velocity, acceleration: Vector3::zeros(), sigma_m: 0.0, desired: velocity, planar: true };
+            let (acceleration, sigma_m) = (Vector3::zeros(), 0.0);
+            let motion =
+                Motion { position: place, velocity, acceleration, sigma_m, desired: velocity, planar: true };
             let filter_config = FilterConfig {
                 obstacle_clearance_m: config.clearance_m,
                 max_speed_m_s: config.cruise_m_s,

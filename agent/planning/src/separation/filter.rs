@@ -8,7 +8,7 @@ use crate::local::braking::stopping_speed;
 
 /// Violations smaller than this are rounding, m/s.
 const TOLERANCE_M_S: f64 = 1e-9;
-/// What position errors alone make too near is left within about this time, seconds: nobody flees from a number.
+/// A place that position errors alone make too near is left within about this time, seconds: nobody flees a number.
 const UNSURE_S: f64 = 3.0;
 /// A vehicle that needs no time to stop is taken to need this, seconds.
 const LEAST_STOP_S: f64 = 0.05;
@@ -234,7 +234,7 @@ impl Motion {
         stop_s(fastest, config)
     }
 
-    /// How much of a gap in a unit direction is left once the vehicle has ceased to accelerate there, metres; see
+    /// The gap in a unit direction that is left once the vehicle has ceased to accelerate there, metres; see
     /// [`filter`]. `stop` is [`Motion::stop_s`].
     fn left_m(&self, gap_m: f64, normal: &Vector3<f64>, stop: f64, config: &FilterConfig) -> f64 {
         let (speed, accel) = (normal.dot(&self.velocity), normal.dot(&self.acceleration));
@@ -243,7 +243,7 @@ impl Motion {
     }
 }
 
-/// How much further a vehicle that accelerates comes before it stands than one that does not, metres; see [`filter`].
+/// The way that a vehicle that accelerates needs to stop beyond that of one that does not, metres; see [`filter`].
 fn nearer_m(speed_m_s: f64, accel_m_s2: f64, stop: f64, config: &FilterConfig) -> f64 {
     let lasts_s = config.jerk_m_s3.map_or(0.0, |jerk| accel_m_s2 / jerk);
     lasts_s * (speed_m_s + accel_m_s2 * (lasts_s / 3.0 + stop / 2.0))
@@ -291,7 +291,7 @@ pub fn distance_kept_m(sigma_m: f64, neighbour: &Neighbour, config: &FilterConfi
     config.separation_m + error_m(sigma_m, neighbour, config) + swerve + ghost + larger
 }
 
-/// What is kept for the errors of both positions, metres.
+/// The distance kept for the errors of both positions, metres.
 fn error_m(sigma_m: f64, neighbour: &Neighbour, config: &FilterConfig) -> f64 {
     (config.sigmas * sigma_m.hypot(neighbour.sigma_m)).min(config.error_max_m)
 }

@@ -30,7 +30,7 @@ pub(super) enum Stamp {
     Restarted,
 }
 
-/// What an answer told.
+/// The content of an answer.
 #[derive(Debug, Clone, Copy)]
 struct Reading {
     /// Its clock less the companion's, s.

@@ -17,7 +17,7 @@ pub struct Pair {
     pub companion: Companion,
     pub endpoint: Endpoint,
     pub state: VehicleState,
-    /// How late the state is told.
+    /// Delay with which the state is told.
     pub late: Duration,
     /// The state is told with its last time stamp.
     pub is_frozen: bool,

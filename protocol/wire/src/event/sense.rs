@@ -48,9 +48,9 @@ skein_bp::events! {
     }
     /// On the ground the battery was changed, or charged.
     BatteryChanged = "battery_changed", Own {
-        /// What was left before.
+        /// Charge before.
         from_percent: i64 ["%", 0.0..=100.0],
-        /// What is left now.
+        /// Charge now.
         to_percent: i64 ["%", 0.0..=100.0],
     }
     /// The battery is nearly empty.

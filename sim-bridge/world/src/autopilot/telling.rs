@@ -15,7 +15,7 @@ const FALLS_BEHIND: u32 = 2;
 #[derive(Debug, Clone)]
 pub(super) struct Telling {
     faults: Vec<PositionFault>,
-    /// What was told last, as long as it is told again.
+    /// The state told last, as long as it is told again.
     frozen: Option<VehicleState>,
     /// The states of late, oldest first, as far back as the latest of the faults needs them.
     past: VecDeque<VehicleState>,
