@@ -60,6 +60,7 @@ fn geese_keep_their_places_from_their_start_to_their_goals() {
             let place = (0..3).map(|axis| at[0][axis] + plan.start[axis] - vehicles[0].start[axis]);
             let place: Vec<f64> = place.collect();
             let off_m = distance(own, &[place[0], place[1], place[2]]);
+            // The last of a side follows three others, each as far behind the one before as both need to stop.
             assert!(off_m < 1.2, "{off_m} m from its place");
         }
     }
