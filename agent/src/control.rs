@@ -45,6 +45,8 @@ pub struct SetPointRecord {
     pub oldest_input: Duration,
 }
 
+const STOP: SetPoint = SetPoint::Velocity { velocity: Vector3::new(0.0, 0.0, 0.0), yaw: None };
+
 /// One vehicle under control.
 #[derive(Debug)]
 pub struct Control {
@@ -141,6 +143,7 @@ impl Control {
         if shift != Vector3::zeros() {
             self.perception.shift(&shift);
             self.guidance.steering.shift(&shift);
+            self.flight.shift(&shift);
         }
         self.doubt = self.watches.position(&self.estimate, self.config.sigma_limit_m);
         if let Some(motion) = &self.estimate.motion {
@@ -355,7 +358,7 @@ impl Control {
     pub fn carry_out(&mut self, now: Duration, instruction: Instruction) -> Option<Report> {
         if instruction == Instruction::TakeOff {
             let height_m = self.guidance.takeoff_height_m(self.config.takeoff_height_m, self.config.home[2]);
-            self.flight.climb_to(height_m);
+            self.flight.climb_to(height_m, self.motion().map(|motion| motion.position));
         }
         self.flight.carry_out(now, instruction, &mut self.companion);
         match instruction {
@@ -409,6 +412,7 @@ impl Control {
         self.settle(now);
         if !self.flight.sends_set_points() {
             self.guidance.steering.rest();
+            self.climb(now);
             return;
         }
         let Some(motion) = self.motion() else { return };
@@ -432,9 +436,19 @@ impl Control {
             KeepAlive::Stop => {
                 self.set_points.stops += 1;
                 self.guidance.steering.rest();
-                self.send(now, SetPoint::Velocity { velocity: Vector3::zeros(), yaw: None });
+                self.send(now, STOP);
             }
             KeepAlive::Silence => self.guidance.steering.rest(),
+        }
+    }
+
+    /// Climbs to where flight begins. From the ground there is little to see, so that hangs on the position alone.
+    fn climb(&mut self, now: Duration) {
+        let Some(set_point) = self.flight.climb(&self.companion) else { return };
+        match keep_alive(now, &self.estimate.stamps()) {
+            KeepAlive::Command => self.send(now, set_point),
+            KeepAlive::Stop => self.send(now, STOP),
+            KeepAlive::Silence => {}
         }
     }
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_mav::{Command, CommandResult, Companion, FlightMode, Landed, MavEvent, Telemetry};
+use skein_mav::{Command, CommandResult, Companion, FlightMode, Landed, MavEvent, SetPoint, Telemetry};
 
 use crate::instruction::Instruction;
 use crate::report::Report;
@@ -16,8 +16,6 @@ const SETTLES_FOR: Duration = Duration::from_secs(15);
 const LAUNCH_AGAIN: Duration = Duration::from_secs(1);
 /// It is rejected for good once it has been rejected for so long.
 const REJECTED_FOR: Duration = Duration::from_secs(10);
-/// An autopilot whose take-off ends in *hold* may end it so far below the height asked for, m.
-const TAKEOFF_ENDS_BELOW_M: f64 = 1.0;
 /// A failsafe that the autopilot wrote about so long before a change of mode is its reason.
 const FAILSAFE_TOLD_WITHIN: Duration = Duration::from_secs(3);
 /// Take-off is over this far below the height asked for.
@@ -28,9 +26,9 @@ const TAKEOFF_TOLERANCE_M: f64 = 0.3;
 pub enum FlightPhase {
     /// On the ground, or not heard of yet.
     Grounded,
-    /// The commands before the climb are under way.
+    /// Set-points flow, and the commands before the climb are under way.
     Arming,
-    /// The autopilot climbs to the take-off height.
+    /// The last of them is given; the vehicle climbs to the take-off height.
     Climbing,
     /// Set-points flow; offboard mode is being asked for.
     Engaging {
@@ -58,18 +56,20 @@ pub enum FlightPhase {
 #[derive(Debug)]
 pub struct Flight {
     takeoff_height_m: f64,
+    /// Where the vehicle stood before it took off, m ENU.
+    stand: Option<Vector3<f64>>,
     /// A pilot flies the vehicle, and the agent as if it did.
     is_shadow: bool,
     phase: FlightPhase,
     heard_of: bool,
     /// Whether the autopilot has shown, since the last command, that it is off the ground.
     left_ground: bool,
-    /// Whether it is so high that the autopilot's take-off may be over.
-    is_nearly_up: bool,
-    /// The launch command that was rejected for now, and since when it has been.
-    rejected: Option<(Command, Duration)>,
-    /// When it is given again.
-    launch_again: Duration,
+    /// Whether its motors have run since.
+    was_armed: bool,
+    /// The launch command that waits until it is given, and when that is.
+    next: Option<(Command, Duration)>,
+    /// Since when a launch command has been rejected for now.
+    rejected_since: Option<Duration>,
     /// When the command to land is repeated, if the autopilot does not land.
     land_again: Duration,
 }
@@ -80,13 +80,14 @@ impl Flight {
     pub fn new(takeoff_height_m: f64) -> Self {
         Self {
             takeoff_height_m,
+            stand: None,
             is_shadow: false,
             phase: FlightPhase::Grounded,
             heard_of: false,
             left_ground: false,
-            is_nearly_up: false,
-            rejected: None,
-            launch_again: Duration::ZERO,
+            was_armed: false,
+            next: None,
+            rejected_since: None,
             land_again: Duration::ZERO,
         }
     }
@@ -96,9 +97,25 @@ impl Flight {
         self.is_shadow = true;
     }
 
-    /// Takes off to this height above home from now on, m.
-    pub fn climb_to(&mut self, takeoff_height_m: f64) {
-        self.takeoff_height_m = takeoff_height_m;
+    /// Takes off to this height above home, m, and from where the vehicle stands, m ENU, from now on.
+    pub fn climb_to(&mut self, takeoff_height_m: f64, stand: Option<Vector3<f64>>) {
+        (self.takeoff_height_m, self.stand) = (takeoff_height_m, stand);
+    }
+
+    /// The frame of positions has moved by `shift`, m ENU.
+    pub fn shift(&mut self, shift: &Vector3<f64>) {
+        self.stand = self.stand.map(|stand| stand + shift);
+    }
+
+    /// The set-point by which the vehicle climbs, for an autopilot that set-points lift off. They flow from before it
+    /// is armed: so the autopilot lands it if its agent dies, at whatever height.
+    #[must_use]
+    pub fn climb(&self, companion: &Companion) -> Option<SetPoint> {
+        let lifts_by_command = |command: &Command| matches!(command, Command::Takeoff { .. });
+        let launch = companion.dialect().launch(self.takeoff_height_m);
+        let height_m = companion.telemetry().home?.z + self.takeoff_height_m;
+        let place = self.stand.filter(|_| self.is_taking_off() && !launch.iter().any(lifts_by_command))?;
+        Some(SetPoint::Position { position: place.xy().push(height_m), yaw: None })
     }
 
     /// Where the vehicle is between two stands on the ground.
@@ -139,9 +156,10 @@ impl Flight {
         match (instruction, self.phase) {
             (Instruction::TakeOff, FlightPhase::Grounded) => {
                 self.phase = FlightPhase::Arming;
-                self.left_ground = false;
-                self.rejected = None;
-                self.launch(now, None, companion);
+                (self.left_ground, self.was_armed, self.rejected_since) = (false, false, None);
+                let dialect = companion.dialect();
+                let first = dialect.launch(self.takeoff_height_m).into_iter().next();
+                self.next = first.map(|command| (command, now + dialect.set_points_before_offboard()));
             }
             // Where, is seen before the tick is over: see `touch_down`.
             (Instruction::Land, FlightPhase::Flying) => {
@@ -159,19 +177,13 @@ impl Flight {
         }
     }
 
-    /// Gives the command that follows `done` on the way from the ground to the climb, in the order of the autopilot.
-    fn launch(&mut self, now: Duration, done: Option<Command>, companion: &mut Companion) {
-        let commands = companion.dialect().launch(self.takeoff_height_m);
-        let next = match done {
-            None => commands.first(),
-            Some(done) => commands.iter().skip_while(|command| **command != done).nth(1),
-        };
-        if let Some(next) = next {
-            if matches!(next, Command::Takeoff { .. }) {
-                self.phase = FlightPhase::Climbing;
-            }
-            companion.command(now, *next);
+    /// Gives a command on the way from the ground to the climb.
+    fn launch(&mut self, now: Duration, command: Command, companion: &mut Companion) {
+        self.next = None;
+        if companion.dialect().launch(self.takeoff_height_m).last() == Some(&command) {
+            self.phase = FlightPhase::Climbing;
         }
+        companion.command(now, command);
     }
 
     /// Has the autopilot land the vehicle where it is.
@@ -206,9 +218,11 @@ impl Flight {
     pub fn hear(&mut self, now: Duration, event: &MavEvent, companion: &mut Companion) -> Option<Report> {
         match event {
             MavEvent::CommandAcked { command, result: CommandResult::Accepted } => {
-                self.rejected = None;
-                if self.phase == FlightPhase::Arming {
-                    self.launch(now, Some(*command), companion);
+                self.rejected_since = None;
+                let launch = companion.dialect().launch(self.takeoff_height_m);
+                let following = launch.into_iter().skip_while(|given| given != command).nth(1);
+                if let Some(following) = following.filter(|_| self.phase == FlightPhase::Arming) {
+                    self.launch(now, following, companion);
                 }
                 None
             }
@@ -232,17 +246,15 @@ impl Flight {
 
     /// Whether this agent did not ask for a change of mode.
     fn is_foreign(&self, from: FlightMode, to: FlightMode, companion: &Companion) -> bool {
-        let (telemetry, dialect) = (companion.telemetry(), companion.dialect());
+        let telemetry = companion.telemetry();
         match self.phase {
             _ if self.is_shadow => false,
-            FlightPhase::Flying | FlightPhase::Settling { .. } => to != FlightMode::Offboard,
+            FlightPhase::Climbing | FlightPhase::Flying | FlightPhase::Settling { .. } => {
+                to != FlightMode::Offboard
+            }
             FlightPhase::Engaging { .. } => match to {
                 FlightMode::Hold => from == FlightMode::Offboard,
-                _ => !matches!(to, FlightMode::Offboard | FlightMode::Takeoff),
-            },
-            FlightPhase::Climbing => match to {
-                FlightMode::Hold => !(self.is_nearly_up && dialect.takes_off_into_hold()),
-                _ => !matches!(to, FlightMode::Offboard | FlightMode::Takeoff),
+                _ => to != FlightMode::Offboard,
             },
             // On the ground the autopilot leaves its landing by itself.
             FlightPhase::Landing if !telemetry.armed || telemetry.landed == Landed::OnGround => false,
@@ -262,9 +274,8 @@ impl Flight {
         if !(self.is_taking_off() && !self.left_ground && is_for_now) {
             return false;
         }
-        let (_, since) = *self.rejected.get_or_insert((command, now));
-        self.launch_again = now + LAUNCH_AGAIN;
-        now < since + REJECTED_FOR
+        self.next = Some((command, now + LAUNCH_AGAIN));
+        now < *self.rejected_since.get_or_insert(now) + REJECTED_FOR
     }
 
     /// On the ground a refused command ends the flight, and the motors stop; in the air it is tried again.
@@ -278,7 +289,7 @@ impl Flight {
         match self.phase {
             FlightPhase::Arming | FlightPhase::Climbing if !self.left_ground => {
                 self.phase = FlightPhase::Grounded;
-                self.rejected = None;
+                self.next = None;
                 if companion.telemetry().armed {
                     companion.command(now, Command::Disarm);
                 }
@@ -339,25 +350,28 @@ impl Flight {
         }
         self.heard_of |= landed != Landed::Unknown;
         self.left_ground |= !matches!(landed, Landed::OnGround | Landed::Unknown);
-        self.is_nearly_up = height_m >= self.takeoff_height_m - TAKEOFF_ENDS_BELOW_M;
+        let stopped = std::mem::replace(&mut self.was_armed, armed) && !armed;
         match self.phase {
             FlightPhase::Arming | FlightPhase::Climbing
-                if let Some((command, _)) = self.rejected
-                    && now >= self.launch_again =>
+                if let Some((command, at)) = self.next
+                    && now >= at =>
             {
                 if !is_ready {
-                    return self.command_failed(
-                        now,
-                        command,
-                        "rejected for now, and not ready any more",
-                        companion,
-                    );
+                    return self.command_failed(now, command, "not ready any more", companion);
                 }
-                self.launch_again = now + LAUNCH_AGAIN;
-                companion.command(now, command);
+                self.launch(now, command, companion);
+            }
+            FlightPhase::Climbing if stopped && !self.left_ground => {
+                return self.command_failed(
+                    now,
+                    Command::Arm,
+                    "disarmed again before it left the ground",
+                    companion,
+                );
             }
             FlightPhase::Climbing if height_m >= self.takeoff_height_m - TAKEOFF_TOLERANCE_M => {
-                self.engage(now)
+                self.phase = FlightPhase::Flying;
+                return Some(Report::Airborne);
             }
             FlightPhase::Engaging { since, asked: false }
                 if now >= since + companion.dialect().set_points_before_offboard() =>
@@ -369,12 +383,15 @@ impl Flight {
                 self.phase = FlightPhase::Flying;
                 return Some(Report::Airborne);
             }
-            FlightPhase::Settling { .. }
+            FlightPhase::Climbing
+            | FlightPhase::Settling { .. }
             | FlightPhase::Landing
             | FlightPhase::Taken
             | FlightPhase::Flying
             | FlightPhase::Adopted
-                if landed == Landed::OnGround && !armed =>
+                if landed == Landed::OnGround
+                    && !armed
+                    && (self.left_ground || self.phase != FlightPhase::Climbing) =>
             {
                 self.phase = FlightPhase::Grounded;
                 return Some(Report::Landed);
@@ -408,10 +425,10 @@ mod tests {
 
     use super::*;
 
-    const TAKEOFF: u32 = 4 << 16 | 2 << 24;
     const HOLD: u32 = 4 << 16 | 3 << 24;
     const LAND: u32 = 4 << 16 | 6 << 24;
     const OFFBOARD: u32 = 6 << 16;
+    const GUIDED: u32 = 4;
 
     fn taken(by: &str) -> Report {
         Report::Taken { mode: FlightMode::Hold, by: by.to_owned() }
@@ -425,6 +442,7 @@ mod tests {
         reader: FrameReader,
         now: Duration,
         height_m: f64,
+        make: MavAutopilot,
         is_ready: bool,
         reports: Vec<Report>,
     }
@@ -439,6 +457,7 @@ mod tests {
                 reader: FrameReader::default(),
                 now: Duration::ZERO,
                 height_m: 0.0,
+                make: MavAutopilot::MAV_AUTOPILOT_PX4,
                 is_ready: true,
                 reports: Vec::new(),
             };
@@ -453,16 +472,20 @@ mod tests {
             stand
         }
 
+        fn autopilot_is_ardupilot(&mut self) {
+            self.make = MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA;
+            self.beats(GUIDED, false);
+        }
+
         fn is(&mut self, landed_state: MavLandedState) {
             self.autopilot.write(&EXTENDED_SYS_STATE_DATA { landed_state, ..Default::default() });
         }
 
         fn beats(&mut self, custom_mode: u32, armed: bool) {
             let armed = if armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
-            let autopilot = MavAutopilot::MAV_AUTOPILOT_PX4;
             self.autopilot.write(&HEARTBEAT_DATA {
                 custom_mode,
-                autopilot,
+                autopilot: self.make,
                 base_mode: armed,
                 ..Default::default()
             });
@@ -499,17 +522,25 @@ mod tests {
                 .collect()
         }
 
-        fn takes_off(&mut self) {
+        /// Is told to take off; returns what it asks for once set-points have flown long enough.
+        fn is_told_to_take_off(&mut self) -> Vec<(MavCmd, f32)> {
             self.flight.carry_out(self.now, Instruction::TakeOff, &mut self.companion);
+            self.goes_on(300)
+        }
+
+        fn takes_off(&mut self) {
+            self.is_told_to_take_off();
+            self.acks(MavCmd::MAV_CMD_DO_SET_MODE, MavResult::MAV_RESULT_ACCEPTED);
             self.acks(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, MavResult::MAV_RESULT_ACCEPTED);
-            self.beats(TAKEOFF, true);
-            self.is(MavLandedState::MAV_LANDED_STATE_TAKEOFF);
+            self.beats(OFFBOARD, true);
+            self.is(MavLandedState::MAV_LANDED_STATE_IN_AIR);
         }
 
         fn lands(&mut self) {
             self.height_m = 3.0;
             self.is(MavLandedState::MAV_LANDED_STATE_IN_AIR);
             self.beats(OFFBOARD, true);
+            assert_eq!(self.reports.drain(..).collect::<Vec<_>>(), [Report::Airborne]);
             self.flight.touch_down(self.now, &mut self.companion);
         }
     }
@@ -517,8 +548,9 @@ mod tests {
     #[test]
     fn an_arm_command_that_is_rejected_for_now_is_given_again_for_ten_seconds() {
         let mut stand = Stand::new();
-        let arm = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
-        stand.flight.carry_out(stand.now, Instruction::TakeOff, &mut stand.companion);
+        let (arm, mode) = (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, MavCmd::MAV_CMD_DO_SET_MODE);
+        assert_eq!(stand.is_told_to_take_off(), [(mode, 1.0)]);
+        assert_eq!(stand.acks(mode, MavResult::MAV_RESULT_ACCEPTED), [(arm, 1.0)]);
         for second in 0..10 {
             stand.acks(arm, MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
             assert_eq!(stand.goes_on(1000), [(arm, 1.0)], "at {second} s");
@@ -530,13 +562,14 @@ mod tests {
         );
         assert_eq!(stand.goes_on(5000), []);
         // Nor is it given to a vehicle that is not ready any more.
-        stand.flight.carry_out(stand.now, Instruction::TakeOff, &mut stand.companion);
-        stand.acks(arm, MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
+        stand.is_told_to_take_off();
+        stand.acks(mode, MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
         stand.is_ready = false;
         assert_eq!((stand.goes_on(1000), stand.flight.phase()), (vec![], FlightPhase::Grounded));
         stand.is_ready = true;
         // Once accepted, it climbs.
-        stand.flight.carry_out(stand.now, Instruction::TakeOff, &mut stand.companion);
+        stand.is_told_to_take_off();
+        stand.acks(mode, MavResult::MAV_RESULT_ACCEPTED);
         stand.acks(arm, MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
         stand.goes_on(1000);
         stand.acks(arm, MavResult::MAV_RESULT_ACCEPTED);
@@ -547,12 +580,55 @@ mod tests {
     #[test]
     fn a_vehicle_whose_take_off_is_denied_is_disarmed() {
         let mut stand = Stand::new();
-        stand.flight.carry_out(stand.now, Instruction::TakeOff, &mut stand.companion);
+        stand.autopilot_is_ardupilot();
+        stand.is_told_to_take_off();
+        stand.acks(MavCmd::MAV_CMD_DO_SET_MODE, MavResult::MAV_RESULT_ACCEPTED);
         stand.acks(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, MavResult::MAV_RESULT_ACCEPTED);
-        stand.beats(HOLD, true);
+        stand.beats(GUIDED, true);
         let disarm = (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0.0);
         assert_eq!(stand.acks(MavCmd::MAV_CMD_NAV_TAKEOFF, MavResult::MAV_RESULT_DENIED), [disarm]);
         assert!(matches!(&stand.reports[..], [Report::CommandFailed(_)]));
+        assert_eq!(stand.flight.phase(), FlightPhase::Grounded);
+    }
+
+    #[test]
+    fn set_points_lift_a_px4_off_from_before_it_is_armed_and_no_ardupilot() {
+        let mut stand = Stand::new();
+        stand.flight.climb_to(3.0, Some(Vector3::new(4.0, 5.0, 0.1)));
+        assert_eq!(stand.flight.climb(&stand.companion), None);
+        stand.flight.carry_out(stand.now, Instruction::TakeOff, &mut stand.companion);
+        stand.flight.shift(&Vector3::new(1.0, 0.0, 0.5));
+        let position = Vector3::new(5.0, 5.0, 3.0);
+        let climb = Some(SetPoint::Position { position, yaw: None });
+        assert_eq!(stand.flight.climb(&stand.companion), climb);
+        stand.takes_off();
+        assert_eq!(
+            (stand.flight.phase(), stand.flight.climb(&stand.companion)),
+            (FlightPhase::Climbing, climb)
+        );
+        stand.height_m = 2.8;
+        stand.goes_on(20);
+        assert_eq!(
+            (stand.flight.climb(&stand.companion), &stand.reports[..]),
+            (None, &[Report::Airborne][..])
+        );
+
+        let mut stand = Stand::new();
+        stand.autopilot_is_ardupilot();
+        stand.flight.climb_to(3.0, Some(Vector3::zeros()));
+        stand.is_told_to_take_off();
+        assert_eq!((stand.flight.phase(), stand.flight.climb(&stand.companion)), (FlightPhase::Arming, None));
+    }
+
+    #[test]
+    fn a_vehicle_that_disarms_itself_before_it_has_left_the_ground_has_failed_to_take_off() {
+        let mut stand = Stand::new();
+        stand.is_told_to_take_off();
+        stand.acks(MavCmd::MAV_CMD_DO_SET_MODE, MavResult::MAV_RESULT_ACCEPTED);
+        stand.acks(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, MavResult::MAV_RESULT_ACCEPTED);
+        stand.beats(OFFBOARD, true);
+        stand.beats(OFFBOARD, false);
+        assert!(matches!(&stand.reports[..], [Report::CommandFailed(why)] if why.contains("disarmed")));
         assert_eq!(stand.flight.phase(), FlightPhase::Grounded);
     }
 
@@ -607,7 +683,7 @@ mod tests {
         let mut stand = Stand::new();
         stand.companion.only_listen();
         stand.flight.shadow();
-        stand.flight.carry_out(stand.now, Instruction::TakeOff, &mut stand.companion);
+        stand.is_told_to_take_off();
         assert_eq!(stand.goes_on(60_000), [], "until the pilot takes off");
         assert_eq!(stand.flight.phase(), FlightPhase::Climbing);
         const POSCTL: u32 = 3 << 16;
@@ -627,13 +703,9 @@ mod tests {
     }
 
     #[test]
-    fn the_hold_that_ends_a_take_off_and_the_one_before_a_landing_are_no_pilots() {
+    fn the_hold_before_a_landing_is_no_pilots() {
         let mut stand = Stand::new();
         stand.takes_off();
-        stand.height_m = 2.2;
-        stand.goes_on(20);
-        stand.beats(HOLD, true);
-        assert_eq!(stand.flight.phase(), FlightPhase::Climbing);
         stand.lands();
         stand.beats(HOLD, true);
         assert_eq!(stand.flight.phase(), FlightPhase::Landing);

@@ -40,7 +40,7 @@ impl Progress {
     }
 
     pub fn begin_path(&mut self) {
-        self.escape.reset();
+        self.escape.begin_path();
     }
 
     /// The flight is over.
@@ -67,7 +67,7 @@ impl Progress {
         reports.extend(self.check_arrival(course, (allowed, headroom), motion, neighbours));
         reports.extend(check_path(course, allowed, motion, map));
         reports.extend(self.check_passage(course, motion, map));
-        reports.extend(self.check_progress(moves_at, course));
+        reports.extend(self.check_progress(moves_at, course, motion));
         reports
     }
 
@@ -115,14 +115,19 @@ impl Progress {
         Some(Report::Passage(passage.centre))
     }
 
-    fn check_progress(&mut self, moves_at: Option<Duration>, course: &Course) -> Option<Report> {
-        let is_bound = course.waypoint.is_some() && !course.has_arrived;
-        let following = course.following.as_ref().filter(|_| is_bound);
-        let Some((now, following)) = moves_at.zip(following) else {
+    fn check_progress(
+        &mut self,
+        moves_at: Option<Duration>,
+        course: &Course,
+        motion: &Motion,
+    ) -> Option<Report> {
+        if course.waypoint.is_none() || course.has_arrived {
             self.escape.reset();
             return None;
-        };
-        (self.escape.update(now, following.station_m) == Verdict::Stuck).then_some(Report::Stuck)
+        }
+        let (now, following) = moves_at.zip(course.following.as_ref())?;
+        let verdict = self.escape.update(now, following.station_m, &motion.position);
+        (verdict == Verdict::Stuck).then_some(Report::Stuck)
     }
 }
 

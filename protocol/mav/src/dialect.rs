@@ -47,15 +47,10 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
         Err(CommandResult::NoAutopilot)
     }
 
-    /// The commands that bring a vehicle from the ground to its climb, in order. Each is given once the one
-    /// before is acknowledged.
-    fn launch(&self, height_m: f64) -> Vec<Command> {
-        vec![Command::Arm, Command::Takeoff { height_m }]
-    }
-
-    /// Whether the autopilot holds the vehicle after a take-off: else it stays in the mode it took off in.
-    fn takes_off_into_hold(&self) -> bool {
-        self.mode_numbers(FlightMode::Takeoff).is_some()
+    /// The commands that bring a vehicle from the ground to its climb in offboard mode, in order. Each is given once
+    /// the one before is acknowledged. Where none is to take off, set-points lift the vehicle.
+    fn launch(&self, _height_m: f64) -> Vec<Command> {
+        vec![Command::Offboard, Command::Arm]
     }
 
     /// The time for which set-points must arrive before [`Command::Offboard`] is given.

@@ -92,12 +92,12 @@ fn a_joint_launch_waits_for_a_vehicle_that_is_out_of_reach() {
 
 #[test]
 fn a_joint_abort_lands_everyone_and_who_was_away_when_he_is_back() {
-    let mut lockstep = with_orders(&format!("{LAUNCH}[[order]]\nat_s = 24.0\norder = \"abort\"\n"));
+    let mut lockstep = with_orders(&format!("{LAUNCH}[[order]]\nat_s = 23.0\norder = \"abort\"\n"));
     // The last word of a vehicle counts for a while, so that this is decided just after it was cut off.
-    lockstep.run_until(seconds(23.9));
+    lockstep.run_until(seconds(22.9));
     let away = lockstep.nodes[2].clone();
     lockstep.network.partition(&[&[away]]);
-    lockstep.run_until(seconds(27.0));
+    lockstep.run_until(seconds(26.0));
     let landing = |lockstep: &Lockstep, index: usize| {
         lockstep.swarm.simulation().vehicle(index).unwrap().motion.velocity.xy().norm() < 0.5
     };
@@ -239,7 +239,7 @@ fn cut_one_off_at_the_window(seed: u64, cut: Duration, apart: Duration) -> (bool
 fn a_vehicle_that_is_cut_off_shares_no_passage_and_closes_none() {
     let mut without_claim = 0;
     for seed in 1..=8 {
-        let cut = seconds(4.0 + 2.3 * seed as f64);
+        let cut = seconds(3.0 + 2.3 * seed as f64);
         let (had_claim, passed) = cut_one_off_at_the_window(seed, cut, seconds(60.0));
         // One that was about to enter, or inside, is waited for.
         assert!(had_claim || passed > 0, "seed {seed}: one that is cut off stops all the others");

@@ -130,10 +130,14 @@ fn a_goal_that_cannot_be_reached_is_given_up_and_the_vehicle_lands() {
     );
     let file = folder.path().join("cell.toml");
     std::fs::write(&file, text).unwrap();
-    let summary = fly(flight(&file.to_string_lossy(), 1));
-    assert!(!summary.succeeded);
-    let reason = summary.reason.unwrap_or_default();
-    assert!(reason.contains("uav/1") && reason.contains("no path"), "{reason}");
-    assert_eq!(summary.collisions.obstacle, 0);
-    assert!(summary.per_vehicle[0].flight_time_s > 1.0, "it flew, and landed");
+    for seed in 1..=4 {
+        let summary = fly(flight(&file.to_string_lossy(), seed));
+        assert!(!summary.succeeded);
+        // It sees a hole in a corner now and then, and another path through it, without getting any further.
+        let reason = summary.reason.unwrap_or_default();
+        let is_said = reason.contains("no path") || reason.contains("stuck");
+        assert!(reason.contains("uav/1") && is_said, "seed {seed}: {reason}");
+        assert_eq!(summary.collisions.obstacle, 0);
+        assert!(summary.per_vehicle[0].flight_time_s > 1.0, "it flew, and landed");
+    }
 }

@@ -118,23 +118,26 @@ impl Watched {
     }
 }
 
-/// The agent of the first is killed at each of these moments after it began to fly it, s.
+/// The agent of the first is killed at each of these moments after its motors began to run, s.
 fn lands_without_its_agent(autopilots: &Autopilots, moments_s: &[f64]) {
     let _turn = turn();
     for moment_s in moments_s {
         let mut flight = Watched::on(autopilots);
-        while flight.airborne.is_none_or(|up| flight.lockstep.swarm.now() < up + seconds(*moment_s)) {
-            flight.step();
+        let mut armed = None;
+        while armed.is_none_or(|armed| flight.lockstep.swarm.now() < armed + seconds(*moment_s)) {
+            let now = flight.step();
+            armed = armed.or(flight.is_armed().then_some(now));
         }
         flight.lockstep.swarm.kill_agent(0);
         let killed = flight.lockstep.swarm.now();
         let mut goes_down = None;
         let down = loop {
             let since = flight.step() - killed;
-            if matches!(flight.mode(), FlightMode::Land | FlightMode::Return) {
+            let is_down = !flight.is_armed() && !flight.is_up();
+            if is_down || matches!(flight.mode(), FlightMode::Land | FlightMode::Return) {
                 goes_down.get_or_insert(since);
             }
-            if !flight.is_armed() && !flight.is_up() || since > seconds(120.0) {
+            if is_down || since > seconds(120.0) {
                 break since;
             }
         };
@@ -211,8 +214,8 @@ fn seconds(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds)
 }
 
-/// At once, on the way, and near the other.
-const MOMENTS_S: [f64; 5] = [0.1, 3.0, 5.0, 7.0, 9.0];
+/// Before it has left the ground, in the climb, on the way, and near the other.
+const MOMENTS_S: [f64; 8] = [0.2, 1.0, 2.0, 3.0, 6.0, 8.0, 10.0, 12.0];
 
 #[test]
 fn a_built_in_autopilot_whose_agent_is_killed_lands() {

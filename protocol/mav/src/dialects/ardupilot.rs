@@ -125,7 +125,8 @@ impl Dialect for ArduPilot {
         })
     }
 
-    /// GUIDED first: NAV_TAKEOFF is refused in every other mode, and the vehicle then stands armed.
+    /// GUIDED first: NAV_TAKEOFF is refused in every other mode, and the vehicle then stands armed. Set-points alone
+    /// do not lift it.
     fn launch(&self, height_m: f64) -> Vec<Command> {
         vec![Command::Offboard, Command::Arm, Command::Takeoff { height_m }]
     }
