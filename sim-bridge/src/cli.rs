@@ -125,6 +125,8 @@ pub struct Configure {
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     #[command(flatten)]
+    pub autopilots: Autopilots,
+    #[command(flatten)]
     pub setup: Setup,
 }
 
@@ -161,6 +163,8 @@ pub struct Serve {
     /// Factor over real time.
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = positive)]
     pub speed: f64,
+    #[command(flatten)]
+    pub autopilots: Autopilots,
     /// Configuration of the world's network; sim-bridge/world.toml explains it.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,

@@ -20,6 +20,7 @@ use skein_zenoh::{Mode, NetworkSettings};
 
 use crate::cli::{self, Network, Setup};
 use crate::fly::{FLEET, agent_configs, ground_config};
+use crate::mavlink_ports::COMPANION;
 use crate::scenario::Scenario;
 use crate::world_host::{WORLD, WorldConfig};
 
@@ -28,8 +29,6 @@ const WORLD_PORT: u16 = 7446;
 const GROUND_PORT: u16 = 7447;
 const FIRST_VEHICLE_PORT: u16 = 7450;
 const CONSOLE_PORT: u16 = 8700;
-/// The port of vehicle 0's agent for its autopilot.
-const COMPANION_PORT: u16 = 14540;
 
 const WORLD_EXAMPLE: &str = include_str!("../world.toml");
 
@@ -67,7 +66,7 @@ pub fn run(args: &cli::Configure, known: &Behaviours, as_json: bool) -> anyhow::
 
 fn instructions(args: &cli::Configure, files: &Files) -> String {
     let mut text = String::from("Start each in a terminal of its own, in any order:\n\n");
-    let cli::Configure { world: cli::WorldArgs { scenario, overrides, seed }, setup, .. } = args;
+    let cli::Configure { world: cli::WorldArgs { scenario, overrides, seed }, setup, autopilots, .. } = args;
     if setup.network == Network::Zenohd {
         let port = router_port(setup.port_offset);
         let _ = writeln!(text, "  zenohd --listen tcp/127.0.0.1:{port} --no-multicast-scouting");
@@ -81,6 +80,7 @@ fn instructions(args: &cli::Configure, files: &Files) -> String {
             let _ = write!(world, " {option} {}", file.display());
         }
     }
+    world.push_str(&autopilots.options());
     if setup.port_offset > 0 {
         let _ = write!(world, " --port-offset {}", setup.port_offset);
     }
@@ -157,7 +157,7 @@ impl Setup {
         let vehicles = (0..index).map(|index| FIRST_VEHICLE_PORT + index);
         let network =
             self.join(FIRST_VEHICLE_PORT + index, [WORLD_PORT, GROUND_PORT].into_iter().chain(vehicles));
-        let companion = (Ipv4Addr::LOCALHOST, COMPANION_PORT + index + self.port_offset).into();
+        let companion = (Ipv4Addr::LOCALHOST, COMPANION.1 + index + self.port_offset).into();
         AgentFile::of(agent, Address::UdpIn(companion), WORLD, network)
     }
 }

@@ -13,7 +13,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 
-const COMPANION: (u16, u16) = (14580, 14540);
+/// Of vehicle 0's companion link, the port that it listens on and the one that it sends to.
+pub const COMPANION: (u16, u16) = (14580, 14540);
 const GROUND: (u16, u16) = (18570, 14550);
 /// Silence after which nothing is sent to a client any more.
 const SILENT_AFTER: Duration = Duration::from_secs(10);
@@ -28,6 +29,7 @@ const MOST_CLIENTS: usize = 16;
 pub struct MavlinkPorts {
     /// None for vehicles that have ports of their own.
     vehicles: Vec<Option<[Port; 2]>>,
+    offset: u16,
 }
 
 impl MavlinkPorts {
@@ -44,7 +46,8 @@ impl MavlinkPorts {
             let companion = Port::open(COMPANION.0 + index, COMPANION.1 + index, false)?;
             Ok(Some([companion, Port::open(GROUND.0 + index, GROUND.1 + offset, true)?]))
         };
-        Ok(Self { vehicles: served.into_iter().enumerate().map(open).collect::<anyhow::Result<_>>()? })
+        let vehicles = served.into_iter().enumerate().map(open).collect::<anyhow::Result<_>>()?;
+        Ok(Self { vehicles, offset })
     }
 
     /// Hands on whatever has come, each for the autopilot of a vehicle.
@@ -68,16 +71,17 @@ impl MavlinkPorts {
         self.vehicles.iter().flatten().next().map(|[_, ground]| ground.audience)
     }
 
-    /// The port of the companion link of vehicle `index`.
-    pub fn companion_port(&self, index: usize) -> Option<u16> {
-        self.vehicles.get(index)?.as_ref().map(|[companion, _]| companion.listens_on)
+    /// The ports of the companion link of each vehicle, its own where it has one: that it listens on, and that it
+    /// sends to until somebody speaks.
+    pub fn companion_ports(&self) -> impl Iterator<Item = (u16, u16)> + '_ {
+        let (listens_on, sends_to) = (COMPANION.0 + self.offset, COMPANION.1 + self.offset);
+        (0..).take(self.vehicles.len()).map(move |index| (listens_on + index, sends_to + index))
     }
 }
 
 /// One UDP port, with whoever talks to it.
 struct Port {
     socket: UdpSocket,
-    listens_on: u16,
     /// The address that is spoken to unasked.
     audience: SocketAddr,
     /// It is spoken to even while others speak.
@@ -94,7 +98,7 @@ impl Port {
         })?;
         socket.set_nonblocking(true)?;
         let audience = SocketAddr::from((Ipv4Addr::LOCALHOST, sends_to));
-        Ok(Self { socket, listens_on, audience, always, clients: Vec::new() })
+        Ok(Self { socket, audience, always, clients: Vec::new() })
     }
 
     /// Hands on every datagram that has come, and remembers who sent it.

@@ -12,6 +12,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use skein_dbp::NodeName;
 
+use crate::autopilots::Autopilots;
 use crate::cli::{Network, Setup};
 use crate::configure::{self, Files};
 use crate::fly::{GROUND, vehicle_name};
@@ -65,13 +66,18 @@ impl Drop for Double {
 impl Processes {
     /// Writes their configurations into `folder`, where their logs and the recording go too, and starts them all.
     pub fn start(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result<Self> {
-        let mut processes = Self::prepare(scenario, folder, setup)?;
+        let mut processes = Self::prepare(scenario, folder, setup, &Autopilots::default())?;
         processes.start_all()?;
         Ok(processes)
     }
 
     /// The same, but starts nothing but the world and, where there is one, the router.
-    pub fn prepare(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result<Self> {
+    pub fn prepare(
+        scenario: &Scenario,
+        folder: &Path,
+        setup: Setup,
+        autopilots: &Autopilots,
+    ) -> anyhow::Result<Self> {
         let Setup { network, port_offset, .. } = setup;
         let files = configure::write(scenario, folder, setup)?;
         let logs = folder.join("logs");
@@ -80,7 +86,8 @@ impl Processes {
             Network::Zenohd => Some(start_zenohd(&logs, configure::router_port(port_offset))?),
             Network::Peer | Network::Router => None,
         };
-        let world = WorldHost::open(scenario, WorldConfig::read(&files.world)?, 1.0, port_offset)?;
+        let config = WorldConfig::read(&files.world)?;
+        let world = WorldHost::open(scenario, config, 1.0, port_offset, (autopilots, folder))?;
         let nodes = BTreeMap::new();
         let folder = folder.to_owned();
         Ok(Self { world, files, folder, logs, nodes, router, port_offset, programs: Programs::default() })

@@ -7,8 +7,8 @@ use serde_json::json;
 use skein_bp::behaviour::Behaviours;
 
 use crate::cli;
-use crate::fly::account;
 use crate::fly::call_off::interruptions;
+use crate::fly::{account, default_folder};
 use crate::summary::Summary;
 use crate::world_host::{WorldConfig, WorldHost};
 
@@ -17,11 +17,14 @@ use crate::world_host::{WorldConfig, WorldHost};
 /// # Errors
 /// A fault in the scenario or the configuration; a port that is taken.
 pub fn run(args: &cli::Serve, known: &Behaviours, as_json: bool) -> anyhow::Result<Summary> {
-    let scenario = args.world.open(known)?;
+    let mut scenario = args.world.open(known)?;
+    args.autopilots.assign(&mut scenario);
+    let folder = args.out.clone().unwrap_or_else(|| default_folder(&scenario));
     let config = args.config.as_deref().map_or_else(|| Ok(WorldConfig::default()), WorldConfig::read)?;
-    let mut world = WorldHost::open(&scenario, config, args.speed, args.port_offset)?;
+    let autopilots = (&args.autopilots, folder.as_path());
+    let mut world = WorldHost::open(&scenario, config, args.speed, args.port_offset, autopilots)?;
     let began = Instant::now();
-    announce(&world, scenario.vehicles.len(), as_json);
+    announce(&world, as_json);
     while interruptions() == 0 {
         world.step();
     }
@@ -35,18 +38,15 @@ pub fn run(args: &cli::Serve, known: &Behaviours, as_json: bool) -> anyhow::Resu
 }
 
 /// On standard error with `--json`: standard output is the summary's.
-fn announce(world: &WorldHost, vehicles: usize, as_json: bool) {
-    let ports: Vec<u16> = (0..vehicles).filter_map(|index| world.ports().companion_port(index)).collect();
+fn announce(world: &WorldHost, as_json: bool) {
     if as_json {
+        let ports: Vec<u16> = world.ports().companion_ports().map(|(port, _)| port).collect();
         eprintln!("{}", json!({ "zenoh": world.locators(), "mavlink_udp": ports }));
         return;
     }
     println!("The world is up. Zenoh on {}; Ctrl-C ends it.", world.locators().join(", "));
-    for (number, port) in (1..).zip(&ports) {
-        println!(
-            "uav/{number}: MAVLink on udp 127.0.0.1:{port}, to 127.0.0.1:{} until somebody speaks",
-            port - 40
-        );
+    for (number, (port, to)) in (1..).zip(world.ports().companion_ports()) {
+        println!("uav/{number}: MAVLink on udp 127.0.0.1:{port}, to 127.0.0.1:{to} until somebody speaks");
     }
     if let Some(audience) = world.ports().audience() {
         println!("From all vehicles to udp {audience}, for QGroundControl.");

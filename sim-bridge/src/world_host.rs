@@ -14,10 +14,11 @@ use skein_world::{STEP, Simulation};
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
 
 use crate::autopilots::make::Make;
+use crate::autopilots::{Autopilots, Companions};
 use crate::fly::account::Account;
 use crate::fly::{FLEET, simulation_config, vehicle_name};
 use crate::mavlink_ports::MavlinkPorts;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, VehiclePlan};
 use crate::scene_view;
 use crate::summary::{EventCounts, Traffic};
 
@@ -84,28 +85,29 @@ impl WorldHost {
     /// A world that nobody has joined yet.
     ///
     /// # Errors
-    /// A port that is taken; an endpoint that cannot be used.
+    /// A port that is taken; an endpoint that cannot be used; an autopilot that does not start.
     pub fn open(
         scenario: &Scenario,
         config: WorldConfig,
         speed: f64,
         port_offset: u16,
+        (autopilots, folder): (&Autopilots, &Path),
     ) -> anyhow::Result<Self> {
         let fleet = Fleet::new(&config.fleet)?;
         let node = NodeName::new(&config.node)?;
-        for (number, plan) in (1..).zip(&scenario.vehicles) {
-            anyhow::ensure!(
-                plan.make() == Make::BuiltIn,
-                "vehicle {number}: a world for other processes has built-in autopilots alone; leave `autopilot` out, or \
-                 fly in one process, without --processes"
-            );
-        }
-        let ports = MavlinkPorts::open(scenario.vehicles.iter().map(|_| true), port_offset)?;
+        let is_px4 = |plan: &VehiclePlan| plan.make() == Make::Px4;
+        anyhow::ensure!(
+            port_offset == 0 || !scenario.vehicles.iter().any(is_px4),
+            "--port-offset {port_offset}: PX4 has ports of its own, which cannot be moved; leave it out"
+        );
+        let ports = MavlinkPorts::open(scenario.vehicles.iter().map(|plan| !is_px4(plan)), port_offset)?;
+        let mut simulation = Simulation::new(simulation_config(scenario));
+        autopilots.seat(&mut simulation, scenario, folder, Companions::Elsewhere)?;
         let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
         let occurrences = Key::pattern::<Occurrence>(&fleet);
         let scan_key = |index| Key::to_one::<Scan>(&fleet, node.clone(), vehicle_name(index));
         Ok(Self {
-            simulation: Simulation::new(simulation_config(scenario)),
+            simulation,
             ports,
             link: session.listen(vec![Key::pattern::<State>(&fleet), occurrences])?,
             locators: session.locators().to_vec(),

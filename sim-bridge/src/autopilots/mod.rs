@@ -2,6 +2,7 @@
 //! process and a folder of its own. World, physics and instruments are Skein's; time is the world's, in lockstep.
 
 mod ardupilot;
+mod companions;
 mod instance;
 mod legs;
 mod magnetism;
@@ -11,10 +12,11 @@ mod px4;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
-use clap::Args;
+use clap::{Args, ValueEnum as _};
 use skein_world::{PositionErrors, PositionFaultKind, Simulation};
 
 use self::ardupilot::ArduPilot;
+pub use self::companions::Companions;
 use self::make::Make;
 use self::px4::Px4;
 use crate::scenario::Scenario;
@@ -50,6 +52,22 @@ impl Autopilots {
         }
     }
 
+    /// The options of the command line that say the same, each after a space.
+    pub fn options(&self) -> String {
+        let make = self
+            .autopilot
+            .and_then(|make| Some(format!(" --autopilot {}", make.to_possible_value()?.get_name())));
+        let files = [
+            ("--px4", &self.px4),
+            ("--ardupilot", &self.ardupilot),
+            ("--ardupilot-defaults", &self.ardupilot_defaults),
+        ];
+        let files = files
+            .into_iter()
+            .filter_map(|(option, path)| Some(format!(" {option} {}", path.as_ref()?.display())));
+        make.into_iter().chain(files).collect()
+    }
+
     /// Seats the autopilots that the scenario's vehicles have in the simulation. Their files and logs go into folders
     /// in `folder`. They end with the simulation.
     ///
@@ -60,6 +78,7 @@ impl Autopilots {
         simulation: &mut Simulation,
         scenario: &Scenario,
         folder: &Path,
+        companions: Companions,
     ) -> anyhow::Result<()> {
         let datum = *scenario.scene.datum();
         for (index, plan) in scenario.vehicles.iter().enumerate() {
@@ -69,7 +88,8 @@ impl Autopilots {
             match plan.make() {
                 Make::BuiltIn => {}
                 Make::Px4 => {
-                    let px4 = Px4::start(index, datum, &plan.model, self.px4.as_deref(), &folder)?;
+                    let px4 =
+                        Px4::start(index, datum, &plan.model, self.px4.as_deref(), &folder, companions)?;
                     simulation.seat(index, Box::new(px4));
                 }
                 Make::Ardupilot => {

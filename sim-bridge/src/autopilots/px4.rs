@@ -12,14 +12,14 @@ use skein_mav::Datum;
 use skein_mav::simulator::{Instruments, Px4Link};
 use skein_world::{MotorCommands, Pilot, Quadrotor, SensorReadings, VehicleModel};
 
+use super::companions::Companions;
 use super::instance::{Instance, fresh};
 use super::legs::Legs;
 use super::magnetism;
+use crate::mavlink_ports::COMPANION;
 
 /// The simulator's port of instance 0.
 const SIMULATOR_PORT: u16 = 4560;
-/// Of instance 0, the port that hears a companion and the one that it speaks to.
-const COMPANION_PORTS: [u16; 2] = [14_580, 14_540];
 /// Instances from here on all speak to one port.
 const MOST_INSTANCES: usize = 10;
 /// Patience with a PX4 until it connects.
@@ -29,6 +29,22 @@ const FIRST_ANSWER: Duration = Duration::from_millis(5);
 /// Patience with an answer from then on: a PX4 that was stopped for so long may go on later.
 const ANSWER: Duration = Duration::from_secs(2);
 
+/// The companion's end of its MAVLink, and the port that it hears on.
+struct Companion {
+    socket: UdpSocket,
+    hears_on: u16,
+}
+
+impl Companion {
+    fn of(index: usize) -> anyhow::Result<Self> {
+        let [hears_on, speaks_to] = [COMPANION.0, COMPANION.1].map(|base| base + index as u16);
+        let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, speaks_to))
+            .with_context(|| format!("UDP port {speaks_to}: is taken; does another companion run?"))?;
+        socket.set_nonblocking(true)?;
+        Ok(Self { socket, hears_on })
+    }
+}
+
 /// A vehicle flown by PX4.
 pub(super) struct Px4 {
     /// None of one that somebody else has started.
@@ -36,8 +52,8 @@ pub(super) struct Px4 {
     name: String,
     stream: Option<TcpStream>,
     link: Px4Link,
-    companion: UdpSocket,
-    hears_on: u16,
+    /// None where companions in other processes speak to its own ports.
+    companion: Option<Companion>,
     field: Vector3<f64>,
     legs: Legs,
     now: Duration,
@@ -56,6 +72,7 @@ impl Px4 {
         model: &VehicleModel,
         program: Option<&Path>,
         folder: &Path,
+        companions: Companions,
     ) -> anyhow::Result<Self> {
         let name = format!("PX4 of uav/{}", index + 1);
         anyhow::ensure!(
@@ -66,10 +83,10 @@ impl Px4 {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port(SIMULATOR_PORT))).with_context(|| {
             format!("TCP port {}: is taken; does another simulator run?", port(SIMULATOR_PORT))
         })?;
-        let [hears_on, speaks_to] = COMPANION_PORTS.map(port);
-        let companion = UdpSocket::bind((Ipv4Addr::LOCALHOST, speaks_to))
-            .with_context(|| format!("UDP port {speaks_to}: is taken; does another companion run?"))?;
-        companion.set_nonblocking(true)?;
+        let companion = match companions {
+            Companions::Here => Some(Companion::of(index)?),
+            Companions::Elsewhere => None,
+        };
         let mut instance = program.map(|program| launch(index, model, program, folder)).transpose()?;
         let stream = accept(&listener, |waited| {
             if let Some(instance) = &mut instance {
@@ -86,7 +103,6 @@ impl Px4 {
             stream: Some(stream),
             link: Px4Link::new(datum),
             companion,
-            hears_on,
             field: magnetism::field(&datum)?,
             legs: Legs::default(),
             now: Duration::ZERO,
@@ -175,16 +191,17 @@ impl Pilot for Px4 {
     }
 
     fn receive(&mut self, bytes: &[u8]) {
-        if !bytes.is_empty() {
+        if let Some(Companion { socket, hears_on }) = self.companion.as_ref().filter(|_| !bytes.is_empty()) {
             // One that does not listen yet is spoken to again.
-            let _ = self.companion.send_to(bytes, (Ipv4Addr::LOCALHOST, self.hears_on));
+            let _ = socket.send_to(bytes, (Ipv4Addr::LOCALHOST, *hears_on));
         }
     }
 
     fn take_output(&mut self) -> Vec<u8> {
         let (mut output, mut datagram) = (Vec::new(), [0; 2048]);
+        let Some(Companion { socket, .. }) = &self.companion else { return output };
         loop {
-            match self.companion.recv(&mut datagram) {
+            match socket.recv(&mut datagram) {
                 Ok(length) => output.extend_from_slice(&datagram[..length]),
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return output,
                 // Nobody listened to the last datagram.

@@ -25,7 +25,7 @@ pub fn fly(
 ) -> anyhow::Result<Summary> {
     let setup = Setup { network: args.network, port_offset: args.port_offset, launch_on_order: false };
     let programs = Programs { agent: args.agent.clone(), ground: args.ground.clone() };
-    let mut swarm = Processes::prepare(scenario, out, setup)?.running(programs);
+    let mut swarm = Processes::prepare(scenario, out, setup, &args.autopilots)?.running(programs);
     swarm.start_all()?;
     table.note(&format!("console: http://{}", swarm.console()))?;
     let mut table = (!args.headless).then_some(table);

@@ -31,7 +31,7 @@ pub use self::{
     trial::{Flown, Trial},
 };
 use crate::{
-    autopilots::{Autopilots, make::Make},
+    autopilots::{Autopilots, Companions, make::Make},
     cli::{self, Clock},
     scenario::Scenario,
     summary::{Summary, Traffic},
@@ -100,7 +100,7 @@ fn in_lockstep(
 }
 
 /// `out/<scenario>-<seed>`, under the current folder.
-fn default_folder(scenario: &Scenario) -> PathBuf {
+pub(crate) fn default_folder(scenario: &Scenario) -> PathBuf {
     Path::new("out").join(format!("{}-{}", scenario.name, scenario.seed))
 }
 
@@ -198,7 +198,8 @@ impl<'a> Flight<'a> {
     /// Lets the autopilots fly that the scenario's vehicles have.
     fn seat(&mut self, autopilots: &Autopilots, out: &Path) -> anyhow::Result<()> {
         if self.scenario.vehicles.iter().any(|plan| plan.make() != Make::BuiltIn) {
-            self.swarm.seat(|simulation| autopilots.seat(simulation, self.scenario, out))?;
+            self.swarm
+                .seat(|simulation| autopilots.seat(simulation, self.scenario, out, Companions::Here))?;
             self.began = Instant::now();
         }
         Ok(())

@@ -3,11 +3,14 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use skein_agent::Outcome;
 use skein_dbp::Happened;
 use skein_ground::{Order, Who};
 use skein_mav::messages::{HEARTBEAT_DATA, MavMessage, MavModeFlag};
 use skein_mav::{Address, Command, DIALECTS, Dialect, FlightMode, FrameReader, FrameWriter};
-use skein_sim::autopilots::{Autopilots, make::Make};
+use skein_sim::autopilots::{Autopilots, Companions, make::Make};
+use skein_sim::cli::{Network, Setup};
+use skein_sim::processes::Processes;
 use skein_sim::scenario::Scenario;
 use skein_tests::{Lockstep, flight, fly};
 use skein_wire::event::{Airborne, Declared as _};
@@ -49,6 +52,44 @@ fn arducopters_swap_places_across_a_circle() {
     flies("antipodal", 4, autopilots);
 }
 
+/// The world here, and each node in a process of its own, in real time.
+fn flies_as_processes(autopilots: &Autopilots, port_offset: u16) {
+    let _turn = turn();
+    let folder = tempfile::tempdir().unwrap();
+    let mut scenario = Scenario::built_in("antipodal", Some(2), 1).unwrap();
+    autopilots.assign(&mut scenario);
+    let setup = Setup { network: Network::Peer, launch_on_order: false, port_offset };
+    let mut swarm = Processes::prepare(&scenario, folder.path(), setup, autopilots).unwrap();
+    swarm.start_all().unwrap();
+    while !swarm.world().is_over() {
+        swarm.step();
+        assert_eq!(swarm.ended(), None);
+        let world = swarm.world();
+        let is_late = world.simulation().now() > seconds(scenario.time_limit_s);
+        assert!(!is_late, "{:?}", [0, 1].map(|index| world.heard(index)));
+    }
+    let account = swarm.world().account();
+    assert!(account.outcomes.iter().all(|outcome| *outcome == Some(Outcome::Complete)));
+    let truth = swarm.world().simulation().truth();
+    assert_eq!((truth.collisions_obstacle, truth.collisions_vehicle), (0, 0));
+    swarm.end();
+}
+
+#[test]
+fn px4s_fly_with_agents_in_processes_of_their_own() {
+    let Some(px4) = program("SKEIN_PX4") else { return };
+    let autopilots = Autopilots { autopilot: Some(Make::Px4), px4: Some(px4), ..Autopilots::default() };
+    flies_as_processes(&autopilots, 0);
+}
+
+#[test]
+fn arducopters_fly_with_agents_in_processes_of_their_own() {
+    let Some(ardupilot) = program("SKEIN_ARDUPILOT") else { return };
+    let autopilots =
+        Autopilots { autopilot: Some(Make::Ardupilot), ardupilot: Some(ardupilot), ..Autopilots::default() };
+    flies_as_processes(&autopilots, 4900);
+}
+
 /// Two vehicles that swap places, of which the first is watched.
 struct Watched {
     lockstep: Lockstep,
@@ -66,7 +107,10 @@ impl Watched {
         let mut scenario = Scenario::built_in("antipodal", Some(2), 1).unwrap();
         autopilots.assign(&mut scenario);
         let mut lockstep = Lockstep::of(scenario.clone());
-        lockstep.swarm.seat(|simulation| autopilots.seat(simulation, &scenario, folder.path())).unwrap();
+        lockstep
+            .swarm
+            .seat(|simulation| autopilots.seat(simulation, &scenario, folder.path(), Companions::Here))
+            .unwrap();
         let (reader, heartbeat, lifted_off, airborne) = (FrameReader::default(), None, None, None);
         Self { lockstep, reader, heartbeat, lifted_off, airborne, _folder: folder }
     }

@@ -11,6 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 use skein_agent::Outcome;
 use skein_dbp::{BidRecord, NodeName, Occurrence, Presence};
+use skein_sim::autopilots::Autopilots;
 use skein_sim::cli::{Network, Setup};
 use skein_sim::configure;
 use skein_sim::fly::{FLEET, GROUND, vehicle_name};
@@ -133,7 +134,7 @@ pub fn run(
     let setup = Setup { network, port_offset, launch_on_order: false };
     let cable =
         (fault == Fault::NodeCut).then(|| Cable::lay(configure::router_port(port_offset))).transpose()?;
-    let mut swarm = Processes::prepare(&scenario, folder, setup)?;
+    let mut swarm = Processes::prepare(&scenario, folder, setup, &Autopilots::default())?;
     if let Some(cable) = &cable {
         // The victim's way to the router leads through it.
         swarm.reroute(victim, configure::router_port(port_offset), cable.port())?;
