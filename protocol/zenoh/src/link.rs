@@ -1,9 +1,10 @@
 //! One node's link over Zenoh.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use skein_wire::{Key, Link};
+use skein_wire::{Key, Link, NodeName, Owner};
 
 use crate::bell::Bell;
 use crate::inbox::Inbox;
@@ -45,10 +46,16 @@ impl ZenohLink {
         self.inbox.is_empty()
     }
 
+    /// The messages dropped because the node did not take them in time, by sender; under no name those of all who are not
+    /// of the roster.
+    pub fn dropped(&self) -> BTreeMap<Owner, u64> {
+        self.inbox.dropped()
+    }
+
     pub fn stats(&self) -> ZenohLinkStats {
         ZenohLinkStats {
             received: self.inbox.received.load(Ordering::Relaxed),
-            dropped: self.inbox.dropped.load(Ordering::Relaxed),
+            dropped: self.inbox.dropped().values().sum(),
             misnamed: self.inbox.misnamed.load(Ordering::Relaxed),
             oversized: self.inbox.oversized.load(Ordering::Relaxed),
         }
@@ -56,6 +63,10 @@ impl ZenohLink {
 }
 
 impl Link for ZenohLink {
+    fn meet(&mut self, members: &[NodeName]) {
+        self.inbox.meet(members);
+    }
+
     fn put(&mut self, key: &Key, payload: Vec<u8>) {
         self.session.put(self.port, key, payload);
     }
