@@ -130,7 +130,7 @@ bounds! {
         "Where there is one, its members alone are heard. First come, first kept; one silent for 45 s makes room.";
     RadiusMetres = "radius_m", 5, "m, the radius that a neighbour is believed",
         "The largest multicopters span 4 m. Who claims more is kept away from as if it were so large.";
-    SigmaMetres = "sigma_m", 20, "m, the standard deviation of a position that a neighbour is believed",
+    SigmaMetres = "sigma_m", 10, "m, the standard deviation of a position that a neighbour is believed",
         "Who knows less of its place lands; the separation widens by 4 m at most anyway.";
     SpeedMetresPerSecond = "speed_m_s", 50, "m/s, the speed that a neighbour is believed",
         "Twice what multicopters fly.";
@@ -246,6 +246,26 @@ pub(crate) fn count_node() {
 #[cfg(test)]
 mod tests {
     use super::Bound;
+
+    const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/security-bounds.md");
+
+    #[test]
+    fn the_page_states_all_bounds_as_they_are() {
+        let row = |bound: &Bound| {
+            format!("| `{}` | {} | {} | {} |", bound.word(), bound.stated(), bound.unit(), bound.reason())
+        };
+        let rows: Vec<String> = Bound::ALL.iter().map(row).collect();
+        let table = format!("| bound | most | of | why |\n|---|---|---|---|\n{}\n", rows.join("\n"));
+        let page = std::fs::read_to_string(PAGE).unwrap();
+        let (before, rest) = page.split_once("<!-- bounds -->\n").unwrap();
+        let (stated, after) = rest.split_once("<!-- end of bounds -->").unwrap();
+        if std::env::var_os("SKEIN_WRITE_GENERATED").is_some() {
+            let page = format!("{before}<!-- bounds -->\n{table}<!-- end of bounds -->{after}");
+            std::fs::write(PAGE, page).unwrap();
+        } else {
+            assert_eq!(stated, table, "SKEIN_WRITE_GENERATED=1 writes it anew");
+        }
+    }
 
     #[test]
     fn an_error_names_the_bound() {

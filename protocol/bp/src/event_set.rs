@@ -291,11 +291,28 @@ impl EventSet {
         narrowest.unwrap_or(Level::Any)
     }
 
+    /// Lets through what a set from outside may be.
+    ///
+    /// # Errors
+    /// [`Exceeded`], which names the bound.
+    pub fn check_bounds(&self) -> Result<(), Exceeded> {
+        self.extent().check()?;
+        self.check_all_names()
+    }
+
+    fn check_all_names(&self) -> Result<(), Exceeded> {
+        match self {
+            Self::Not(set) => set.check_all_names(),
+            Self::And(sets) | Self::Or(sets) => sets.iter().try_for_each(Self::check_all_names),
+            set => set.check_names(),
+        }
+    }
+
     /// Lets through the names that a set from outside may have; looks at no set inside it.
     ///
     /// # Errors
     /// [`Exceeded`] when a name is too long, or there are too many data.
-    pub fn check_names(&self) -> Result<(), Exceeded> {
+    pub(crate) fn check_names(&self) -> Result<(), Exceeded> {
         match self {
             Self::Exactly(event) => event.check_bounds(),
             Self::Named(pattern) => check_name(pattern.as_str()),

@@ -225,6 +225,24 @@ fn no_walk_takes_longer_for_each_level_than_for_the_one_before() {
     }
 }
 
+/// What a campaign counts, and sees when a bound is taken away.
+#[cfg(feature = "mutants")]
+#[test]
+fn the_sets_looked_at_are_in_proportion_unless_the_bound_is_taken_away() {
+    use skein_bp::bound::mutants::nodes;
+    let set = nested(14, &EventSet::from("uav/*/advance"), |set| EventSet::And(vec![set, "uav/**".into()]));
+    let looked_at = || {
+        let before = nodes();
+        assert!(set.could_match_home("uav/3"));
+        nodes() - before
+    };
+    assert!(looked_at() <= 2 * set.extent().nodes as u64);
+    let removed = Bound::SetWalk.remove();
+    assert!(looked_at() > 10_000);
+    drop(removed);
+    assert!(looked_at() <= 2 * set.extent().nodes as u64);
+}
+
 #[test]
 fn two_sets_that_are_hard_to_compare_are_not_within_one_another() {
     let leaf = |text: &str| EventSet::from(text);

@@ -226,7 +226,7 @@ fn shorten_event(event: &mut Event) -> bool {
 
 /// Leaves out the alternatives that there is no room for.
 fn shorten_set(set: &mut EventSet) -> bool {
-    if set.extent().check().is_err() {
+    if set.check_bounds().is_err() {
         *set = EventSet::None;
         return true;
     }

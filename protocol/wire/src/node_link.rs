@@ -51,6 +51,8 @@ pub struct NodeLink {
     /// What each member, and all others together, have sent.
     senders: BTreeMap<Owner, SenderStats>,
     has_met: bool,
+    /// Whether there are other members, so that all others are strangers.
+    has_roster: bool,
 }
 
 /// Counts of what has come from one member, or from all outside the roster together, since the start.
@@ -68,6 +70,10 @@ pub struct SenderStats {
     pub undecodable: u64,
     /// Messages whose content claims another sender, receiver or kind than their key.
     pub forged: u64,
+    /// Messages of nodes outside the roster, where there is one: nobody reads them.
+    pub strange: u64,
+    /// States whose numbers were brought to what is believed.
+    pub implausible: u64,
     /// What it has made the node do and keep beside.
     pub caused: Caused,
     /// Event sets looked at while its messages were taken in.
@@ -79,6 +85,8 @@ impl SenderStats {
     /// The messages that came to nothing, for whatever reason, and the facts that were not told.
     pub fn passed_over(&self) -> u64 {
         self.dropped
+            + self.strange
+            + self.implausible
             + self.oversized
             + self.undecodable
             + self.forged
@@ -101,6 +109,10 @@ pub struct NodeLinkStats {
     pub oversized: u64,
     /// Messages that had to go because more had come from their sender than may wait.
     pub dropped: u64,
+    /// Messages of nodes outside the roster.
+    pub strange: u64,
+    /// States whose numbers were brought to what is believed.
+    pub implausible: u64,
     /// Own messages that were not put, because no other node would take in one so long.
     pub unsendable: u64,
     /// Times that the store did not take what must be kept; what it bears on was not sent.
@@ -126,6 +138,7 @@ impl NodeLink {
             shares: Shares::default(),
             senders: BTreeMap::new(),
             has_met: false,
+            has_roster: false,
         }
     }
 
@@ -229,11 +242,18 @@ impl NodeLink {
         if !std::mem::replace(&mut self.has_met, true) {
             let members: Vec<NodeName> = self.node.peers().map(|(name, _)| name.clone()).collect();
             link.meet(&members);
+            self.has_roster = !members.is_empty();
             self.mailbox.meet(members);
         }
         for (key, payload) in std::iter::from_fn(|| link.poll()).take(MOST_PER_PUMP) {
             self.stats.received += 1;
             if self.boards.is_none() && key.is_of::<Board>() {
+                continue;
+            }
+            if self.has_roster && self.node.member(key.sender()).is_none() && key.sender() != self.node.name()
+            {
+                self.stats.strange += 1;
+                self.sender(key.sender()).strange += 1;
                 continue;
             }
             if payload.len() > key.most_bytes() {
@@ -260,7 +280,7 @@ impl NodeLink {
             Err(_) => self.stats.undecodable += 1,
             Ok(payload) if !key.fits(&payload) => self.stats.forged += 1,
             Ok(Payload::State(state)) if state.node == *self.node.name() => {}
-            Ok(Payload::State(state)) => self.states.push(state),
+            Ok(Payload::State(state)) => self.note_state(state),
             Ok(Payload::Readiness(readiness)) if readiness.node == *self.node.name() => {}
             Ok(Payload::Readiness(readiness)) => self.readiness.push(readiness),
             Ok(Payload::Board(board)) => self.note_board(board),
@@ -274,6 +294,7 @@ impl NodeLink {
         sender.bytes += bytes.len() as u64;
         sender.undecodable += after.undecodable - before.undecodable;
         sender.forged += after.forged - before.forged;
+        sender.implausible += after.implausible - before.implausible;
         #[cfg(feature = "mutants")]
         {
             sender.nodes += skein_bp::bound::mutants::nodes() - nodes;
@@ -298,6 +319,12 @@ impl NodeLink {
     /// The nodes whose messages this build cannot read, each with the version it speaks.
     pub fn skewed(&self) -> impl Iterator<Item = (&NodeName, u32)> {
         self.skewed.iter().map(|(node, version)| (node, *version))
+    }
+
+    /// Whoever says that it is huge is kept away from, but not as far as it likes.
+    fn note_state(&mut self, mut state: State) {
+        self.stats.implausible += u64::from(state.bring_to_what_is_believed());
+        self.states.push(state);
     }
 
     fn note_board(&mut self, board: Board) {

@@ -14,7 +14,7 @@ const PERIOD: Duration = Duration::from_secs(1);
 /// Looks at what a node could not use, and says so when there is more of it.
 #[derive(Debug, Default)]
 pub struct Complaints {
-    told: [u64; 9],
+    told: [u64; 11],
     told_versions: BTreeMap<NodeName, u32>,
     due: Duration,
 }
@@ -38,6 +38,8 @@ impl Complaints {
             arrived.dropped,
             heard.dropped,
             heard.unsendable,
+            heard.strange,
+            heard.implausible,
             caused(|stats| stats.caused.facts_withheld),
             caused(|stats| stats.caused.lives_refused),
         ];
@@ -54,6 +56,8 @@ impl Complaints {
             "dropped because the node was too slow",
             "dropped because their sender sends more than its share",
             "of this node's own not sent because they are too long",
+            "of nodes outside the roster",
+            "states with a radius, speed or position error that nobody has",
             "facts not told because one member caused too many",
             "lives of members that began too often",
         ];

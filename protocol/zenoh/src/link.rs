@@ -42,6 +42,11 @@ impl ZenohLink {
         self.inbox.bell.clone()
     }
 
+    /// The messages that wait.
+    pub fn waiting(&self) -> usize {
+        self.inbox.len()
+    }
+
     pub fn is_empty(&self) -> bool {
         self.inbox.is_empty()
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use skein_bp::{EventSet, Exceeded, Pattern, Real, Value};
+use skein_bp::{EventSet, Pattern, Real, Value};
 
 use super::field::{Result, required};
 use crate::decode_error::DecodeError;
@@ -43,13 +43,9 @@ impl TryFrom<proto::EventSet> for EventSet {
 
     fn try_from(set: proto::EventSet) -> Result<Self> {
         let set = read(set)?;
-        set.extent().check().map_err(too_much)?;
+        set.check_bounds().map_err(|source| DecodeError::Bound { field: "EventSet", source })?;
         Ok(set)
     }
-}
-
-fn too_much(source: Exceeded) -> DecodeError {
-    DecodeError::Bound { field: "EventSet", source }
 }
 
 /// Ends for any input: the decoder has bounded the tree's depth.
@@ -57,7 +53,7 @@ fn read(set: proto::EventSet) -> Result<EventSet> {
     use event_set::Form;
     let list = |list: event_set::List| list.sets.into_iter().map(read).collect::<Result<Vec<_>>>();
     let corner = |corner: proto::Vec3| [corner.x, corner.y, corner.z].map(Real::from);
-    let set = match required("EventSet.form", set.form)? {
+    Ok(match required("EventSet.form", set.form)? {
         Form::None(_) => EventSet::None,
         Form::All(_) => EventSet::All,
         Form::Exactly(event) => EventSet::Exactly(event.try_into()?),
@@ -81,7 +77,5 @@ fn read(set: proto::EventSet) -> Result<EventSet> {
         Form::Not(set) => EventSet::Not(Box::new(read(*set)?)),
         Form::And(sets) => EventSet::And(list(sets)?),
         Form::Or(sets) => EventSet::Or(list(sets)?),
-    };
-    set.check_names().map_err(too_much)?;
-    Ok(set)
+    })
 }
