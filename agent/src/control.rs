@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use nalgebra::Vector3;
+use skein_bp::Bound;
 use skein_dbp::NodeName;
 use skein_mav::{Companion, CompanionConfig, Landed, MavEvent, SetPoint, Station, Telemetry, Text};
 use skein_planning::map::MapError;
@@ -112,7 +113,7 @@ impl Control {
             estimate: Estimate::default(),
             doubt: None,
             perception: Perception::of_mission(&config)?,
-            neighbours: Neighbours::new(name.clone(), config.incarnation),
+            neighbours: Neighbours::new(name.clone(), config.incarnation, config.roster.len()),
             watches: Watches::default(),
             energy: Energy::new(config.clone()),
             guidance: Guidance::new(config.envelope, layers),
@@ -204,7 +205,12 @@ impl Control {
 
     /// Takes in what other vehicles say of their checks before take-off.
     pub fn hear_readiness(&mut self, now: Duration, readiness: Vec<Readiness>) {
-        self.others.extend(readiness.into_iter().map(|said| (said.node.clone(), (now, said))));
+        let most = self.config.roster.len().max(Bound::Strangers.most());
+        for said in readiness {
+            if self.others.len() < most || self.others.contains_key(&said.node) {
+                self.others.insert(said.node.clone(), (now, said));
+            }
+        }
     }
 
     /// The agent has not run for `pause`: if it flew the vehicle, it does not any more.

@@ -8,6 +8,7 @@
 use std::{collections::BTreeMap, time::Duration};
 
 use nalgebra::Vector3;
+use skein_bp::Bound;
 use skein_dbp::NodeName;
 use skein_planning::separation;
 use skein_wire::{Echo, State};
@@ -39,6 +40,8 @@ pub struct Neighbours {
     me: NodeName,
     incarnation: u64,
     last: BTreeMap<NodeName, Heard>,
+    /// So many are remembered.
+    most: usize,
     /// Whom the newest echo was for.
     echoed: Option<NodeName>,
     /// Everybody as of the last look around.
@@ -94,9 +97,11 @@ impl Neighbour {
 }
 
 impl Neighbours {
-    /// Nobody has been heard of yet by `me` in this incarnation.
-    pub fn new(me: NodeName, incarnation: u64) -> Self {
-        Self { me, incarnation, last: BTreeMap::new(), echoed: None, around: Vec::new() }
+    /// Nobody has been heard of yet by `me` in this incarnation. In a fleet of so many `members` no more are remembered,
+    /// nor, where nobody is known to be one, than [`Bound::Strangers`].
+    pub fn new(me: NodeName, incarnation: u64, members: usize) -> Self {
+        let most = members.max(Bound::Strangers.most());
+        Self { me, incarnation, last: BTreeMap::new(), most, echoed: None, around: Vec::new() }
     }
 
     /// Takes in a state message that arrived at `now`; one older than the last is dropped.
@@ -104,12 +109,22 @@ impl Neighbours {
         let last = self.last.get(&state.node);
         let newest = last
             .is_none_or(|last| (state.incarnation, state.time) > (last.state.incarnation, last.state.time));
-        if newest {
-            let known =
-                last.filter(|last| last.state.incarnation == state.incarnation).and_then(|last| last.clock);
+        let known =
+            last.filter(|last| last.state.incarnation == state.incarnation).and_then(|last| last.clock);
+        if newest && self.makes_room(now, &state.node) {
             let clock = better(now, known, self.clock_of(now, &state));
             self.last.insert(state.node.clone(), Heard { state, at: now, clock });
         }
+    }
+
+    /// Whether there is room for `node`: first come, first kept, but for one that is silent and surely down by now.
+    fn makes_room(&mut self, now: Duration, node: &NodeName) -> bool {
+        if self.last.len() < self.most || self.last.contains_key(node) {
+            return true;
+        }
+        let is_down = |heard: &Heard| now.saturating_sub(heard.at).as_secs_f64() > SURELY_DOWN_S;
+        let down = self.last.iter().find(|(_, heard)| is_down(heard)).map(|(node, _)| node.clone());
+        down.is_some_and(|down| self.last.remove(&down).is_some())
     }
 
     /// The sender's clock, from the echo in a state that arrives at `now`.
@@ -218,7 +233,7 @@ mod tests {
     /// `back` the other.
     fn converse(there: Duration, back: Duration) -> (Neighbours, Duration) {
         let apart = ms(70_000);
-        let (mut one, mut other) = (Neighbours::new(name(1), 1), Neighbours::new(name(2), 1));
+        let (mut one, mut other) = (Neighbours::new(name(1), 1, 4), Neighbours::new(name(2), 1, 4));
         for start in [ms(1000), ms(2000), ms(3000)] {
             let said = State { incarnation: 1, time: start, echo: one.echo(start), ..State::new(name(1)) };
             other.hear(start + there + apart, said);
@@ -256,7 +271,7 @@ mod tests {
 
     #[test]
     fn echoes_for_others_or_for_a_former_life_tell_nothing() {
-        let mut one = Neighbours::new(name(1), 2);
+        let mut one = Neighbours::new(name(1), 2, 4);
         for echo in [
             Echo { node: name(3), incarnation: 2, time: ms(500), held: ms(0) },
             Echo { node: name(1), incarnation: 1, time: ms(500), held: ms(0) },
@@ -270,7 +285,7 @@ mod tests {
 
     #[test]
     fn everybody_gets_an_echo_in_turn() {
-        let mut one = Neighbours::new(name(1), 1);
+        let mut one = Neighbours::new(name(1), 1, 4);
         for number in [2, 3, 4] {
             one.hear(ms(100), State { time: ms(50), ..State::new(name(number)) });
         }
@@ -280,8 +295,25 @@ mod tests {
     }
 
     #[test]
+    fn ever_new_vehicles_displace_nobody_who_was_heard() {
+        let mut one = Neighbours::new(name(1), 1, 2);
+        let hear = |one: &mut Neighbours, at, number| {
+            one.hear(at, State { time: at, ..State::new(name(number)) });
+        };
+        hear(&mut one, ms(1), 2);
+        (1000..31_000).for_each(|number| hear(&mut one, ms(2), number));
+        assert_eq!(one.at(ms(3)).count(), Bound::Strangers.stated());
+        assert!(one.at(ms(3)).any(|neighbour| neighbour.node == name(2)));
+        hear(&mut one, ms(60_000), 3);
+        assert!(one.at(ms(60_000)).any(|neighbour| neighbour.node == name(3)), "who is down makes room");
+        let mut large = Neighbours::new(name(1), 1, 200);
+        (2..200).for_each(|number| hear(&mut large, ms(1), number));
+        assert_eq!(large.at(ms(3)).count(), 198, "members are all heard");
+    }
+
+    #[test]
     fn one_that_is_silent_is_not_relied_on() {
-        let mut one = Neighbours::new(name(1), 1);
+        let mut one = Neighbours::new(name(1), 1, 4);
         one.hear(ms(0), State { time: ms(0), ..State::new(name(2)) });
         let relied_on = |now| one.at(now).next().unwrap().track.cooperative;
         assert!(relied_on(ms(1000)) && !relied_on(ms(1001)));

@@ -8,6 +8,8 @@ use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
 
 /// A scan from further in the future comes from a clock that is wrong.
 const CLOCK_TOLERANCE: Duration = Duration::from_millis(50);
+/// Of more scans that wait, only the newest are read: a lidar turns ten or twenty times a second.
+const MOST_WAITING: usize = 4;
 
 /// Where the scans come in; what is no scan, or from the future, is counted and told now and then.
 pub struct LidarScans {
@@ -32,6 +34,9 @@ impl LidarScans {
 
     /// Takes the next scan that has come, if there is one; `now` is this program's clock.
     pub fn poll(&mut self, now: Duration) -> Option<Scan> {
+        while self.link.waiting() > MOST_WAITING && self.link.poll().is_some() {
+            self.complain("scans were not read because more came than a lidar sends");
+        }
         while let Some((_, payload)) = self.link.poll() {
             let Ok(Payload::Scan(scan)) = Payload::decode(&payload) else {
                 self.complain("messages under the lidar's key are no scans");

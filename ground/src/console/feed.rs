@@ -13,7 +13,7 @@ use skein_bp::Value;
 use skein_bp::script::ScriptFile;
 use skein_dbp::{Happened, NodeName, Peer};
 use skein_wire::event::{Advance, Declared as _, Homeward};
-use skein_wire::{Check, Form, MissionState, Scene, State};
+use skein_wire::{Check, Form, MissionState, Scene, SenderStats, State};
 
 use super::subscription::{Broadcast, Subscription, Text};
 use crate::core::GroundCore;
@@ -294,6 +294,7 @@ fn is_about_leave(happened: &Happened) -> bool {
 fn fleet(now: Duration, station: &GroundCore) -> Message<'_> {
     let peers: BTreeMap<&NodeName, &Peer> = station.node().node().peers().collect();
     let skewed: BTreeMap<&NodeName, u32> = station.node().skewed().collect();
+    let senders: BTreeMap<Option<&NodeName>, SenderStats> = station.node().senders().collect();
     let view = |(name, state)| {
         let peer = peers.get(name);
         let note = |version: &u32| {
@@ -302,10 +303,17 @@ fn fleet(now: Duration, station: &GroundCore) -> Message<'_> {
                 skein_wire::VERSION
             )
         };
+        let passed_over = senders.get(&Some(name)).and_then(passed_over);
         let checks = station.readiness(name).map_or(&[][..], |said| &said.checks);
         VehicleView {
             checks: checks.iter().map(check_view).collect(),
-            ..vehicle_view(now, name, state, peer.copied(), skewed.get(name).map(note))
+            ..vehicle_view(
+                now,
+                name,
+                state,
+                peer.copied(),
+                skewed.get(name).map(note).into_iter().chain(passed_over),
+            )
         }
     };
     let outcome = station.finished().map(|outcome| OutcomeView {
@@ -320,17 +328,36 @@ fn vehicle_view<'a>(
     name: &'a NodeName,
     state: Option<&'a State>,
     peer: Option<&Peer>,
-    note: Option<String>,
+    notes: impl Iterator<Item = String>,
 ) -> VehicleView<'a> {
     let age_ms = peer.and_then(|peer| peer.age(now)).map(|age| age.as_secs_f64() * 1000.0);
     VehicleView {
         name: name.as_str(),
         heard: state.is_some(),
         link: LinkView { alive: peer.is_some_and(|peer| peer.alive), age_ms },
-        notes: note.into_iter().collect(),
+        notes: notes.collect(),
         checks: Vec::new(),
         state: state.map(state_view),
     }
+}
+
+/// What of a vehicle's messages this station has passed over, in words.
+fn passed_over(stats: &SenderStats) -> Option<String> {
+    let counts = [
+        (stats.dropped, "more than may wait"),
+        (stats.oversized, "too long"),
+        (stats.undecodable, "not understood, or beyond a bound"),
+        (stats.forged, "under another's key"),
+        (stats.implausible, "of a radius, speed or position error that nobody has"),
+        (stats.caused.facts_withheld, "facts too many"),
+        (stats.caused.lives_refused, "lives too many"),
+    ];
+    let told: Vec<String> = counts
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| format!("{count} {what}"))
+        .collect();
+    (!told.is_empty()).then(|| format!("passed over of what it sends: {}", told.join(", ")))
 }
 
 fn check_view(check: &Check) -> CheckView<'_> {

@@ -5,6 +5,7 @@ use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::{Arc, LazyLock};
 
+use crate::bound::{Bound, Exceeded};
 use crate::scope::{NameKeys, leading_chunks};
 use crate::value::Value;
 
@@ -106,6 +107,15 @@ impl Event {
         self.0.data.iter().map(|(key, value)| (&**key, value))
     }
 
+    /// Lets through what an event from outside may be.
+    ///
+    /// # Errors
+    /// [`Exceeded`] when it is too long, or has too many data.
+    pub fn check_bounds(&self) -> Result<(), Exceeded> {
+        check_name(self.name())?;
+        check_data(self.data())
+    }
+
     pub(crate) fn keys(&self) -> &NameKeys {
         &self.0.keys
     }
@@ -114,6 +124,25 @@ impl Event {
     pub(crate) fn cmp_by_key(&self, other: &Self) -> Ordering {
         self.0.keys.name.cmp(&other.0.keys.name).then_with(|| self.cmp(other))
     }
+}
+
+/// Lets through what a name or a pattern from outside may be.
+pub(crate) fn check_name(name: &str) -> Result<(), Exceeded> {
+    Bound::NameBytes.check(name.len())?;
+    Bound::NameChunks.check(name.split('/').count())
+}
+
+/// Lets through what data from outside may be.
+pub(crate) fn check_data<'a>(
+    data: impl ExactSizeIterator<Item = (&'a str, &'a Value)>,
+) -> Result<(), Exceeded> {
+    Bound::EventFields.check(data.len())?;
+    let mut bytes = 0;
+    for (key, value) in data {
+        Bound::NameBytes.check(key.len())?;
+        bytes += key.len() + value.as_text().map_or(size_of::<Value>(), |text| text.len());
+    }
+    Bound::EventBytes.check(bytes)
 }
 
 impl From<&str> for Event {

@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use crate::event::Event;
+use smallvec::SmallVec;
+
+use crate::bound::{Bound, Exceeded, count_node};
+use crate::event::{Event, check_data, check_name};
 use crate::pattern::Pattern;
 use crate::scope::{Level, Scope};
 use crate::value::{Real, Value};
@@ -141,6 +144,7 @@ impl EventSet {
     }
 
     fn holds(&self, event: &Event) -> bool {
+        count_node();
         match self {
             Self::None => false,
             Self::All => true,
@@ -173,14 +177,14 @@ impl EventSet {
 
     /// Whether the two sets may share an event, judged by names alone. Errs towards yes.
     pub fn may_overlap(&self, other: &EventSet) -> bool {
-        let mut overlap = false;
-        other.visit_scopes(&mut |scope| overlap |= self.may_reach(&scope));
-        overlap
+        let own = self.scopes();
+        other.scopes().iter().any(|scope| own.iter().any(|own| own.overlaps(scope)))
     }
 
     /// Whether the set may hold an event of this name, with whatever data. Errs towards yes, only where what data it
     /// needs contradicts itself.
     pub fn may_hold_named(&self, name: &str) -> bool {
+        count_node();
         match self {
             Self::None => false,
             Self::All | Self::FieldRange { .. } | Self::FieldIs(_) | Self::Region { .. } => true,
@@ -195,6 +199,7 @@ impl EventSet {
 
     /// Whether the set surely holds every event of this name, whatever its data. Errs towards no.
     pub fn holds_all_named(&self, name: &str) -> bool {
+        count_node();
         match self {
             Self::All => true,
             Self::None | Self::Exactly(_) | Self::FieldRange { .. } | Self::Region { .. } => false,
@@ -207,26 +212,10 @@ impl EventSet {
         }
     }
 
-    /// Whether every event of this set is surely in `other`. Errs towards no.
+    /// Whether every event of this set is surely in `other`. Errs towards no, also where it is too much to compare
+    /// ([`Bound::SetSteps`]).
     pub fn is_within(&self, other: &EventSet) -> bool {
-        match (self, other) {
-            (_, Self::All) => true,
-            (inner, outer) if inner == outer || inner.is_none() => true,
-            (Self::Exactly(event), outer) => outer.contains(event),
-            (Self::Or(sets), outer) => sets.iter().all(|set| set.is_within(outer)),
-            (inner, Self::And(sets)) => sets.iter().all(|set| inner.is_within(set)),
-            (inner, Self::Or(sets)) if sets.iter().any(|set| inner.is_within(set)) => true,
-            (Self::And(sets), outer) if sets.iter().any(|set| set.is_within(outer)) => true,
-            (inner, Self::Not(set)) => inner.is_apart_from(set),
-            (Self::Named(inner), Self::Named(outer)) => inner.is_within(outer),
-            (Self::Named(inner), Self::Prefix(outer)) => inner.fixed_start().starts_with(&**outer),
-            (Self::Prefix(inner), Self::Prefix(outer)) => inner.starts_with(&**outer),
-            (Self::Prefix(inner), Self::Named(outer)) => {
-                let start = outer.fixed_start();
-                outer.as_str().strip_suffix("**") == Some(start) && inner.starts_with(start)
-            }
-            _ => false,
-        }
+        self == other || Comparison { steps: Bound::SetSteps.most() }.is_within(self, other)
     }
 
     /// The set without those alternatives that surely hold nothing of `other`, judged by names alone.
@@ -239,50 +228,196 @@ impl EventSet {
         }
     }
 
+    fn may_reach(&self, scope: &Scope<'_>) -> bool {
+        self.scopes().iter().any(|own| own.overlaps(scope))
+    }
+
+    /// Scopes that together hold every event of the set; each once, and if one is that of any event, that alone.
+    pub(crate) fn scopes(&self) -> Scopes<'_> {
+        let mut scopes = Scopes::new();
+        let widest = self.add_scopes(&mut scopes);
+        if widest == Level::Any && !scopes.is_empty() {
+            scopes.clear();
+            scopes.push(Scope::ANY);
+        } else if scopes.len() > 1 {
+            scopes.sort_unstable_by_key(|scope| (scope.level, scope.key));
+            scopes.dedup();
+        }
+        scopes
+    }
+
+    /// Adds the set's scopes, and gives the widest level among them; a set without scopes, which is empty, counts as the
+    /// narrowest. Looks at each set inside once.
+    fn add_scopes<'a>(&'a self, scopes: &mut Scopes<'a>) -> Level {
+        count_node();
+        let scope = match self {
+            Self::None => return Level::Name,
+            Self::Or(sets) => {
+                return sets.iter().fold(Level::Name, |widest, set| widest.min(set.add_scopes(scopes)));
+            }
+            Self::And(sets) if !sets.is_empty() => return Self::add_narrowest(sets, scopes),
+            Self::Exactly(event) => Scope::name(event.name(), event.keys()),
+            Self::Named(pattern) => pattern.scope(),
+            Self::Prefix(prefix) => Scope::starting_with(prefix),
+            Self::And(_)
+            | Self::All
+            | Self::Not(_)
+            | Self::FieldRange { .. }
+            | Self::FieldIs(_)
+            | Self::Region { .. } => Scope::ANY,
+        };
+        scopes.push(scope);
+        scope.level
+    }
+
+    /// Any member bounds the whole of an intersection, so the narrowest one does best.
+    fn add_narrowest<'a>(sets: &'a [EventSet], scopes: &mut Scopes<'a>) -> Level {
+        let start = scopes.len();
+        let mut narrowest = None;
+        for set in sets {
+            #[cfg(feature = "mutants")]
+            if Bound::SetWalk.most() == usize::MAX {
+                set.add_scopes(&mut Scopes::new());
+            }
+            let at = scopes.len();
+            let level = set.add_scopes(scopes);
+            if narrowest.is_none_or(|narrowest| level >= narrowest) {
+                narrowest = Some(level);
+                scopes.drain(start..at);
+            } else {
+                scopes.truncate(at);
+            }
+        }
+        narrowest.unwrap_or(Level::Any)
+    }
+
+    /// Lets through what a set from outside may be.
+    ///
+    /// # Errors
+    /// [`Exceeded`], which names the bound.
+    pub fn check_bounds(&self) -> Result<(), Exceeded> {
+        self.extent().check()?;
+        self.check_all_names()
+    }
+
+    fn check_all_names(&self) -> Result<(), Exceeded> {
+        match self {
+            Self::Not(set) => set.check_all_names(),
+            Self::And(sets) | Self::Or(sets) => sets.iter().try_for_each(Self::check_all_names),
+            set => set.check_names(),
+        }
+    }
+
+    /// Lets through the names that a set from outside may have; looks at no set inside it.
+    ///
+    /// # Errors
+    /// [`Exceeded`] when a name is too long, or there are too many data.
+    pub(crate) fn check_names(&self) -> Result<(), Exceeded> {
+        match self {
+            Self::Exactly(event) => event.check_bounds(),
+            Self::Named(pattern) => check_name(pattern.as_str()),
+            Self::Prefix(prefix) => check_name(prefix),
+            Self::FieldRange { key, .. } => Bound::NameBytes.check(key.len()),
+            Self::FieldIs(fields) => check_data(fields.iter().map(|(key, value)| (&**key, value))),
+            _ => Ok(()),
+        }
+    }
+
+    /// How much of a set it is.
+    pub fn extent(&self) -> Extent {
+        match self {
+            Self::Not(set) => Extent::around([set.extent()]),
+            Self::And(sets) | Self::Or(sets) => Extent::around(sets.iter().map(Self::extent)),
+            Self::FieldIs(fields) => Extent { nodes: 1 + fields.len(), depth: 1 },
+            Self::Exactly(event) => Extent { nodes: 1 + event.data().len(), depth: 1 },
+            _ => Extent { nodes: 1, depth: 1 },
+        }
+    }
+}
+
+/// The size of a set.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Extent {
+    /// Sets inside it, itself and the data they ask for included.
+    pub nodes: usize,
+    /// Levels of sets inside one another, at least 1.
+    pub depth: usize,
+}
+
+impl Extent {
+    /// That of a set which is made of others.
+    pub(crate) fn around(inside: impl IntoIterator<Item = Extent>) -> Self {
+        inside.into_iter().fold(Self { nodes: 1, depth: 1 }, |all, one| Self {
+            nodes: all.nodes.saturating_add(one.nodes),
+            depth: all.depth.max(one.depth + 1),
+        })
+    }
+
+    /// Lets through what a set from outside may be.
+    ///
+    /// # Errors
+    /// [`Exceeded`] for [`Bound::SetDepth`] or [`Bound::SetNodes`].
+    pub fn check(self) -> Result<Self, Exceeded> {
+        Bound::SetDepth.check(self.depth)?;
+        Bound::SetNodes.check(self.nodes)?;
+        Ok(self)
+    }
+}
+
+/// Most sets have one.
+pub(crate) type Scopes<'a> = SmallVec<[Scope<'a>; 2]>;
+
+/// The comparison of two sets: when it has taken too many steps, every answer is no.
+struct Comparison {
+    steps: usize,
+}
+
+impl Comparison {
+    fn is_over(&mut self) -> bool {
+        count_node();
+        let over = self.steps == 0;
+        self.steps = self.steps.saturating_sub(1);
+        over
+    }
+
+    /// Whether every event of `inner` is surely in `outer`.
+    fn is_within(&mut self, inner: &EventSet, outer: &EventSet) -> bool {
+        use EventSet::{All, And, Exactly, Named, None, Not, Or, Prefix};
+        if self.is_over() {
+            return false;
+        }
+        match (inner, outer) {
+            (None, _) | (_, All) => true,
+            (Or(sets), outer) => sets.iter().all(|set| self.is_within(set, outer)),
+            (inner, And(sets)) => sets.iter().all(|set| self.is_within(inner, set)),
+            (inner, Or(sets)) if sets.iter().any(|set| self.is_within(inner, set)) => true,
+            (And(sets), outer) if sets.iter().any(|set| self.is_within(set, outer)) => true,
+            (Exactly(event), outer) => outer.contains(event),
+            (inner, outer) if inner == outer => true,
+            (inner, Not(set)) => self.is_apart(inner, set),
+            (Named(inner), Named(outer)) => inner.is_within(outer),
+            (Named(inner), Prefix(outer)) => inner.fixed_start().starts_with(&**outer),
+            (Prefix(inner), Prefix(outer)) => inner.starts_with(&**outer),
+            (Prefix(inner), Named(outer)) => {
+                let start = outer.fixed_start();
+                outer.as_str().strip_suffix("**") == Some(start) && inner.starts_with(start)
+            }
+            _ => false,
+        }
+    }
+
     /// Whether the two sets surely share no event.
-    fn is_apart_from(&self, other: &EventSet) -> bool {
-        match (self, other) {
-            (Self::Or(sets), other) | (other, Self::Or(sets)) => {
-                sets.iter().all(|set| set.is_apart_from(other))
-            }
-            (Self::And(sets), other) | (other, Self::And(sets)) => {
-                sets.iter().any(|set| set.is_apart_from(other))
-            }
-            (Self::Named(a), Self::Named(b)) => a.is_apart_from(b),
+    fn is_apart(&mut self, a: &EventSet, b: &EventSet) -> bool {
+        use EventSet::{And, Named, Or};
+        if self.is_over() {
+            return false;
+        }
+        match (a, b) {
+            (Or(sets), other) | (other, Or(sets)) => sets.iter().all(|set| self.is_apart(set, other)),
+            (And(sets), other) | (other, And(sets)) => sets.iter().any(|set| self.is_apart(set, other)),
+            (Named(a), Named(b)) => a.is_apart_from(b),
             (a, b) => !a.may_overlap(b),
         }
-    }
-
-    fn may_reach(&self, scope: &Scope<'_>) -> bool {
-        let mut reach = false;
-        self.visit_scopes(&mut |own| reach |= own.overlaps(scope));
-        reach
-    }
-
-    /// Calls `visit` with scopes that together hold every event of the set.
-    pub(crate) fn visit_scopes<'a>(&'a self, visit: &mut impl FnMut(Scope<'a>)) {
-        match self {
-            Self::None => {}
-            Self::Exactly(event) => visit(Scope::name(event.name(), event.keys())),
-            Self::Named(pattern) => visit(pattern.scope()),
-            Self::Prefix(prefix) => visit(Scope::starting_with(prefix)),
-            Self::Or(sets) => sets.iter().for_each(|set| set.visit_scopes(visit)),
-            // Any member bounds the whole, so the narrowest one does best.
-            Self::And(sets) => match sets.iter().max_by_key(|set| set.narrowness()) {
-                Some(set) => set.visit_scopes(visit),
-                None => visit(Scope::ANY),
-            },
-            Self::All | Self::Not(_) | Self::FieldRange { .. } | Self::FieldIs(_) | Self::Region { .. } => {
-                visit(Scope::ANY)
-            }
-        }
-    }
-
-    /// The widest level among the set's scopes; a set without scopes, which is empty, counts as the narrowest.
-    fn narrowness(&self) -> Level {
-        let mut level = Level::Name;
-        self.visit_scopes(&mut |scope| level = level.min(scope.level));
-        level
     }
 }
 

@@ -28,11 +28,11 @@ pub(crate) struct Index {
 
 impl Index {
     pub(crate) fn file(&mut self, set: &EventSet, place: Place) {
-        set.visit_scopes(&mut |scope| self.file_scope(scope, place));
+        set.scopes().into_iter().for_each(|scope| self.file_scope(scope, place));
     }
 
     pub(crate) fn unfile(&mut self, set: &EventSet, place: Place) {
-        set.visit_scopes(&mut |scope| self.unfile_scope(scope, place));
+        set.scopes().into_iter().for_each(|scope| self.unfile_scope(scope, place));
         self.sweep();
     }
 

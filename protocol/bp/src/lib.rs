@@ -34,6 +34,7 @@
 pub mod behaviour;
 mod bid;
 mod board;
+pub mod bound;
 mod bthread;
 pub mod catalogue;
 pub mod configuration;
@@ -52,9 +53,10 @@ mod value;
 pub mod verify;
 
 pub use bid::Bid;
+pub use bound::{Bound, Exceeded};
 pub use bthread::{BThread, Context, DEFAULT_BTHREAD_PRIORITY};
 pub use event::Event;
-pub use event_set::EventSet;
+pub use event_set::{EventSet, Extent};
 pub use explain::Explanation;
 pub use pattern::Pattern;
 pub use program::{PASSED_OVER_LIMIT, Program, ProgramConfig, ProgramError, Strategy};

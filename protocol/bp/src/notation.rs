@@ -25,7 +25,7 @@ use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::event::Event;
-use crate::event_set::EventSet;
+use crate::event_set::{EventSet, Extent};
 use crate::pattern::Pattern;
 use crate::value::{Real, Value};
 
@@ -75,7 +75,7 @@ impl<'de> Visitor<'de> for EventVisitor {
     }
 
     fn visit_str<E: Error>(self, name: &str) -> Result<Event, E> {
-        Ok(Event::new(name))
+        checked(Event::new(name))
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Event, A::Error> {
@@ -87,6 +87,11 @@ impl<'de> Visitor<'de> for EventVisitor {
         }
         parts.into_event()?.ok_or_else(|| Error::missing_field("name"))
     }
+}
+
+fn checked<E: Error>(event: Event) -> Result<Event, E> {
+    event.check_bounds().map_err(E::custom)?;
+    Ok(event)
 }
 
 /// An event in object form, as far as it has been read.
@@ -113,9 +118,9 @@ impl EventParts {
             (None, Some(_)) => Err(E::missing_field("name")),
             (Some(name), data) => {
                 let data = data.unwrap_or_default();
-                Ok(Some(
-                    data.into_iter().fold(Event::new(name), |event, (key, value)| event.with(key, value)),
-                ))
+                let event =
+                    data.into_iter().fold(Event::new(name), |event, (key, value)| event.with(key, value));
+                checked(event).map(Some)
             }
         }
     }
@@ -177,6 +182,36 @@ fn keyed<S: Serializer, T: Serialize + ?Sized>(
 
 impl<'de> Deserialize<'de> for EventSet {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Measured::deserialize(deserializer).map(|measured| measured.set)
+    }
+}
+
+/// A set and how much of one it is, so that it is refused as soon as it is too much.
+struct Measured {
+    set: EventSet,
+    extent: Extent,
+}
+
+impl Measured {
+    fn leaf<E: Error>(set: EventSet) -> Result<Self, E> {
+        set.check_names().map_err(E::custom)?;
+        let extent = set.extent();
+        Self::checked(set, extent)
+    }
+
+    fn list<E: Error>(sets: Vec<Self>, of: impl FnOnce(Vec<EventSet>) -> EventSet) -> Result<Self, E> {
+        let extent = Extent::around(sets.iter().map(|measured| measured.extent));
+        Self::checked(of(sets.into_iter().map(|measured| measured.set).collect()), extent)
+    }
+
+    fn checked<E: Error>(set: EventSet, extent: Extent) -> Result<Self, E> {
+        let extent = extent.check().map_err(E::custom)?;
+        Ok(Self { set, extent })
+    }
+}
+
+impl<'de> Deserialize<'de> for Measured {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(EventSetVisitor)
     }
 }
@@ -184,29 +219,29 @@ impl<'de> Deserialize<'de> for EventSet {
 struct EventSetVisitor;
 
 impl<'de> Visitor<'de> for EventSetVisitor {
-    type Value = EventSet;
+    type Value = Measured;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "an event set: an event, a list of sets, or an object with keys of {SET_KEYS:?}")
     }
 
-    fn visit_str<E: Error>(self, name: &str) -> Result<EventSet, E> {
-        Ok(EventSet::Exactly(Event::new(name)))
+    fn visit_str<E: Error>(self, name: &str) -> Result<Measured, E> {
+        Measured::leaf(EventSet::Exactly(Event::new(name)))
     }
 
-    fn visit_unit<E: Error>(self) -> Result<EventSet, E> {
-        Ok(EventSet::None)
+    fn visit_unit<E: Error>(self) -> Result<Measured, E> {
+        Measured::leaf(EventSet::None)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<EventSet, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Measured, A::Error> {
         let mut sets = Vec::new();
         while let Some(set) = seq.next_element()? {
             sets.push(set);
         }
-        Ok(EventSet::Or(sets))
+        Measured::list(sets, EventSet::Or)
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<EventSet, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Measured, A::Error> {
         let mut event = EventParts::default();
         let mut sets = Vec::new();
         while let Some(key) = map.next_key::<String>()? {
@@ -214,20 +249,22 @@ impl<'de> Visitor<'de> for EventSetVisitor {
                 sets.push(read_keyed(&key, &mut map)?);
             }
         }
-        sets.extend(event.into_event()?.map(EventSet::Exactly));
+        if let Some(event) = event.into_event()? {
+            sets.push(Measured::leaf(EventSet::Exactly(event))?);
+        }
         match (sets.pop(), sets.is_empty()) {
             (None, _) => Err(Error::custom(format_args!("an event set needs one of the keys {SET_KEYS:?}"))),
             (Some(only), true) => Ok(only),
             (Some(last), false) => {
                 sets.push(last);
-                Ok(EventSet::And(sets))
+                Measured::list(sets, EventSet::And)
             }
         }
     }
 }
 
-fn read_keyed<'de, A: MapAccess<'de>>(key: &str, map: &mut A) -> Result<EventSet, A::Error> {
-    Ok(match key {
+fn read_keyed<'de, A: MapAccess<'de>>(key: &str, map: &mut A) -> Result<Measured, A::Error> {
+    Measured::leaf(match key {
         "all" if map.next_value()? => EventSet::All,
         "all" => EventSet::None,
         "any_data" => EventSet::Named(Pattern::literal(map.next_value::<Arc<str>>()?)),
@@ -245,9 +282,12 @@ fn read_keyed<'de, A: MapAccess<'de>>(key: &str, map: &mut A) -> Result<EventSet
                 max.map(|x| x.unwrap_or(f64::INFINITY)),
             )
         }
-        "not" => EventSet::Not(map.next_value()?),
-        "and" => EventSet::And(map.next_value()?),
-        "or" => EventSet::Or(map.next_value()?),
+        "not" => {
+            let Measured { set, extent } = map.next_value()?;
+            return Measured::checked(EventSet::Not(Box::new(set)), Extent::around([extent]));
+        }
+        "and" => return Measured::list(map.next_value()?, EventSet::And),
+        "or" => return Measured::list(map.next_value()?, EventSet::Or),
         _ => {
             map.next_value::<IgnoredAny>()?;
             return Err(Error::unknown_field(key, SET_KEYS));

@@ -63,7 +63,7 @@ impl Pattern {
         if !self.0.wild {
             return *self.0.text == *name;
         }
-        chunks_match(Some(&self.0.text), Some(name))
+        chunks_match(&self.0.text, name)
     }
 
     /// Whether every name that fits this pattern surely fits `other` too.
@@ -71,7 +71,7 @@ impl Pattern {
         match (self.0.wild, other.0.wild) {
             (false, _) => other.matches(&self.0.text),
             (true, false) => false,
-            (true, true) => chunks_within(Some(&self.0.text), Some(&other.0.text)),
+            (true, true) => chunks_within(&self.0.text, &other.0.text),
         }
     }
 
@@ -127,23 +127,43 @@ fn fixed_part(pattern: &str) -> Scope<'_> {
     }
 }
 
-/// Both sides lose chunks from the left; `None` is a side that has none left.
-fn chunks_match(pattern: Option<&str>, name: Option<&str>) -> bool {
-    let Some(pattern) = pattern else { return name.is_none() };
-    let (chunk, pattern_rest) = split_chunk(pattern);
-    if chunk == "**" {
-        let mut rest = name;
-        loop {
-            if chunks_match(pattern_rest, rest) {
-                return true;
+fn chunks_match(pattern: &str, name: &str) -> bool {
+    covers(pattern, name, |wide, chunk| wide == "*" || wide == chunk)
+}
+
+/// Whether all names of the pattern `inner` are names of `outer`.
+fn chunks_within(inner: &str, outer: &str) -> bool {
+    covers(outer, inner, |wide, narrow| narrow != "**" && (wide == "*" || wide == narrow))
+}
+
+/// Whether the chunks of `text` are those of `pattern`, one `fits` one, and any number of them each `**`.
+///
+/// Of several ways to share out chunks among the `**`, the one that gives each as few as it can do with is as good as
+/// any: so only the last one is ever given more, and no more is tried than the product of both.
+fn covers(pattern: &str, text: &str, fits: impl Fn(&str, &str) -> bool) -> bool {
+    let (mut pattern, mut text) = (Some(pattern), Some(text));
+    // What comes behind the last `**`, and the text that it has not been given yet.
+    let mut last: Option<(Option<&str>, Option<&str>)> = None;
+    loop {
+        let wide = pattern.map(split_chunk);
+        match (wide, text.map(split_chunk)) {
+            (Some(("**", rest)), _) => {
+                pattern = rest;
+                last = Some((rest, text));
+                continue;
             }
-            let Some(name) = rest else { return false };
-            rest = split_chunk(name).1;
+            (Some((wide, wide_rest)), Some((chunk, rest))) if fits(wide, chunk) => {
+                (pattern, text) = (wide_rest, rest);
+                continue;
+            }
+            (None, None) => return true,
+            _ => {}
         }
+        let Some((behind, Some(left))) = last else { return false };
+        let left = split_chunk(left).1;
+        last = Some((behind, left));
+        (pattern, text) = (behind, left);
     }
-    let Some(name) = name else { return false };
-    let (name_chunk, name_rest) = split_chunk(name);
-    (chunk == "*" || chunk == name_chunk) && chunks_match(pattern_rest, name_rest)
 }
 
 /// Whether some name may fit both patterns; both sides lose chunks from the left.
@@ -157,26 +177,6 @@ fn chunks_meet(a: Option<&str>, b: Option<&str>) -> bool {
         return true;
     }
     (left == "*" || right == "*" || left == right) && chunks_meet(left_rest, right_rest)
-}
-
-/// Whether all names of the pattern `inner` are names of `outer`; both sides lose chunks from the left.
-fn chunks_within(inner: Option<&str>, outer: Option<&str>) -> bool {
-    let Some(outer) = outer else { return inner.is_none() };
-    let (wide, outer_rest) = split_chunk(outer);
-    if wide == "**" {
-        let mut rest = inner;
-        loop {
-            if chunks_within(rest, outer_rest) {
-                return true;
-            }
-            let Some(inner) = rest else { return false };
-            rest = split_chunk(inner).1;
-        }
-    }
-    let Some(inner) = inner else { return false };
-    let (narrow, inner_rest) = split_chunk(inner);
-    let fits = narrow != "**" && (wide == "*" || wide == narrow);
-    fits && chunks_within(inner_rest, outer_rest)
 }
 
 fn split_chunk(text: &str) -> (&str, Option<&str>) {
@@ -233,6 +233,15 @@ mod tests {
         assert!(fits("a/**/z", "a/z"));
         assert!(!fits("a/**/z", "a/b/y"));
         assert!(!fits("*", "a/b"));
+    }
+
+    #[test]
+    fn many_stars_are_matched_in_no_time() {
+        let (stars, name) = ("**/a/".repeat(60) + "**/b", "a/".repeat(200) + "c");
+        assert!(!Pattern::new(&*stars).matches(&name));
+        assert!(Pattern::new(&*stars).matches(&(name + "/b")));
+        assert!(!Pattern::new("a/".repeat(200) + "c").is_within(&Pattern::new(&*stars)));
+        assert!(!Pattern::new("**/a/".repeat(60) + "c").is_within(&Pattern::new(stars)));
     }
 
     #[test]

@@ -2,9 +2,10 @@
 
 mod asking;
 mod config;
+mod ended;
 mod parts;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -18,6 +19,7 @@ use crate::selection::{Names, Origin, Rival, Selection};
 use crate::tie::TieBreak;
 
 pub use config::{PASSED_OVER_LIMIT, ProgramConfig, Strategy};
+use ended::Ended;
 pub(crate) use parts::Rest;
 
 /// Spawns in one selection, or rounds of deadlines in one step, after which they count as endless.
@@ -51,8 +53,7 @@ pub struct Program {
     occurrences: VecDeque<Event>,
     /// Internal selections since an external event last had its turn.
     internal_in_a_row: u32,
-    /// Synchronisation points that the names of ended b-threads saw.
-    ended: BTreeMap<Arc<str>, u64>,
+    ended: Ended,
     failure: Option<(Arc<str>, String)>,
     daemon: bool,
     revision: u64,
@@ -74,7 +75,7 @@ impl Program {
             externals: VecDeque::new(),
             occurrences: VecDeque::new(),
             internal_in_a_row: 0,
-            ended: BTreeMap::new(),
+            ended: Ended::default(),
             failure: None,
             daemon: false,
             revision: 0,
@@ -416,7 +417,7 @@ impl Program {
     fn end(&mut self, place: Place) -> Option<Arc<str>> {
         let entry = self.board.remove(place)?;
         self.forget_ties(&entry.bid);
-        self.ended.insert(entry.name.clone(), entry.sync);
+        self.ended.note(entry.name.clone(), entry.sync);
         self.revision += 1;
         Some(entry.name)
     }
@@ -444,7 +445,7 @@ impl Program {
 
     fn add_boxed(&mut self, name: Arc<str>, bthread: Box<dyn AnyBThread>) -> Arc<str> {
         let name = self.free_name(name);
-        let sync = self.ended.remove(&name).unwrap_or(0);
+        let sync = self.ended.take(&name);
         let place = self.board.add(name.clone(), Owner::BThread(bthread), sync);
         self.unstarted.push_back(place);
         name

@@ -1,10 +1,12 @@
 //! Event sets: what they hold, and how they are written.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use proptest::prelude::*;
 use serde_json::json;
-use skein_bp::{Event, EventSet, Pattern, Value};
+use skein_bp::script::{Op, Script};
+use skein_bp::{Bid, Bound, Event, EventSet, Pattern, Program, ProgramConfig, Value};
 
 fn goto(x: f64, y: f64) -> Event {
     Event::new("uav/3/goto").with("x", x).with("y", y)
@@ -185,6 +187,98 @@ fn what_is_surely_within_a_set_is_known() {
     assert!(EventSet::prefix("uav/3/go").is_within(&set("uav/3/**")));
     assert!(EventSet::from(goto(1.0, 2.0)).is_within(&EventSet::field_range("x", 0.0, 2.0)));
     assert!(!EventSet::All.is_within(&set("**").and(EventSet::field_range("x", 0.0, 2.0))));
+}
+
+/// `leaf` inside so many sets of a kind.
+fn nested(levels: usize, leaf: &EventSet, around: impl Fn(EventSet) -> EventSet) -> EventSet {
+    (0..levels).fold(leaf.clone(), |set, _| around(set))
+}
+
+/// Sets whose walk must not take longer for each level than for the one before.
+fn deep_sets() -> Vec<EventSet> {
+    let leaf = EventSet::from("uav/*/advance");
+    let more = || EventSet::from("uav/**");
+    vec![
+        nested(200, &leaf, |set| EventSet::And(vec![set])),
+        nested(200, &leaf, |set| EventSet::And(vec![more(), set, more()])),
+        nested(200, &leaf, |set| EventSet::Or(vec![EventSet::And(vec![set, more()])])),
+        nested(200, &leaf, |set| EventSet::Not(Box::new(EventSet::And(vec![set, more()])))),
+    ]
+}
+
+#[test]
+fn no_walk_takes_longer_for_each_level_than_for_the_one_before() {
+    let event = Event::new("uav/3/advance");
+    for set in deep_sets() {
+        assert!(set.contains(&event), "{set}");
+        assert!(set.could_match_home("uav/3") && set.may_overlap(&EventSet::All));
+        assert!(set.may_hold_named("uav/3/advance") && !set.is_none());
+        assert!(set.about(&EventSet::prefix("uav/3/")).contains(&event));
+        let mut program = Program::new(ProgramConfig::default());
+        program.put_proxy("hostile", &Bid::new().block(set.clone()));
+        program.add("advance", Script::new(&[Op::Sync(Bid::new().request(event.clone()))]).unwrap());
+        assert_eq!(program.superstep(Duration::ZERO).unwrap(), []);
+        assert_eq!(program.explain("uav/3/advance").blocked.len(), 1);
+        assert_eq!(program.explain("uav/3/other").blocked.len(), 1);
+        program.remove_proxy("hostile");
+        assert_eq!(program.superstep(Duration::ZERO).unwrap().len(), 1);
+    }
+}
+
+/// What a campaign counts, and sees when a bound is taken away.
+#[cfg(feature = "mutants")]
+#[test]
+fn the_sets_looked_at_are_in_proportion_unless_the_bound_is_taken_away() {
+    use skein_bp::bound::mutants::nodes;
+    let set = nested(14, &EventSet::from("uav/*/advance"), |set| EventSet::And(vec![set, "uav/**".into()]));
+    let looked_at = || {
+        let before = nodes();
+        assert!(set.could_match_home("uav/3"));
+        nodes() - before
+    };
+    assert!(looked_at() <= 2 * set.extent().nodes as u64);
+    let removed = Bound::SetWalk.remove();
+    assert!(looked_at() > 10_000);
+    drop(removed);
+    assert!(looked_at() <= 2 * set.extent().nodes as u64);
+}
+
+#[test]
+fn two_sets_that_are_hard_to_compare_are_not_within_one_another() {
+    let leaf = |text: &str| EventSet::from(text);
+    let inner = nested(100, &leaf("a"), |set| EventSet::And(vec![set, leaf("c")]));
+    let outer = nested(100, &leaf("b"), |set| EventSet::Or(vec![set, leaf("d")]));
+    assert!(!inner.is_within(&outer) && !outer.is_within(&inner));
+    assert!(inner.is_within(&inner.clone()), "it is itself");
+}
+
+#[test]
+fn a_set_of_one_name_many_times_is_one_candidate() {
+    // A thousand times the same blocker, asked for a thousand times, would take a million steps an event.
+    let many = |set: &EventSet| EventSet::Or(vec![set.clone(); 1000]);
+    let mut program = Program::new(ProgramConfig::default());
+    let miss = EventSet::field_range("x", 5.0, 6.0);
+    program.put_proxy("hostile", &Bid::new().block(many(&miss)));
+    let tap = Bid::new().request("uav/3/tap");
+    program.add("tap", Script::new(&[Op::repeat(2000, [Op::Sync(tap)])]).unwrap());
+    assert_eq!(program.superstep(Duration::ZERO).unwrap().len(), 2000);
+}
+
+#[test]
+fn files_say_which_limit_a_set_exceeds() {
+    let read = |text: &str| serde_json::from_str::<EventSet>(text).map_err(|error| error.to_string());
+    let wrap = |levels: usize| format!("{}\"a\"{}", "{\"and\": [".repeat(levels), "]}".repeat(levels));
+    assert!(read(&wrap(Bound::SetDepth.stated() - 1)).is_ok());
+    let deep = read(&wrap(46)).unwrap_err();
+    assert!(deep.contains("17 levels") && deep.contains("at most 16 (bound `set_depth`)"), "{deep}");
+    let wide = read(&format!("[{}]", vec!["\"a\""; 1024].join(", "))).unwrap_err();
+    assert!(wide.contains("1025 sets") && wide.contains("bound `set_nodes`"), "{wide}");
+    let long = read(&format!("{{\"prefix\": \"{}\"}}", "x".repeat(257))).unwrap_err();
+    assert!(long.contains("257 bytes of a name") && long.contains("bound `name_bytes`"), "{long}");
+    let stars = read(&format!("{{\"named\": \"{}\"}}", vec!["**"; 17].join("/"))).unwrap_err();
+    assert!(stars.contains("bound `name_chunks`"), "{stars}");
+    let event = serde_json::from_str::<Event>(&format!("\"{}\"", "x".repeat(257))).unwrap_err();
+    assert!(event.to_string().contains("bound `name_bytes`"), "{event}");
 }
 
 proptest! {

@@ -446,3 +446,40 @@ fn the_schema_refuses_what_it_can_tell() {
         assert!(ScriptFile::parse("a.json", &wrong.to_string()).is_err(), "{wrong}");
     }
 }
+
+#[test]
+fn a_script_that_is_too_much_is_refused_with_the_limit_s_name() {
+    let refusal = |body: &str, parameters: &str| {
+        let text = format!("name = \"x\"\nabout = \"x\"\nbody = [{body}]\n{parameters}");
+        ScriptFile::parse("x.toml", &text).unwrap_err().to_string()
+    };
+    let nested = format!("{}\"uav/1/advance\"{}", "{\"and\": [".repeat(46), "]}".repeat(46));
+    let body = format!("{{\"sync\": {{\"block\": {nested}, \"wait\": \"uav/1/ready\"}}}}");
+    let json = format!("{{\"name\": \"x\", \"about\": \"x\", \"body\": [{body}]}}");
+    let deep = ScriptFile::parse("x.json", &json).unwrap_err().to_string();
+    assert!(deep.contains("bound `set_depth`"), "{deep}");
+    // Each `until` counts again at each `sync` inside it.
+    let wide = format!("[{}]", vec!["\"uav/1/ready\""; 300].join(", "));
+    let syncs = vec!["{ sync = { wait = \"uav/1/ready\" } }"; 20].join(", ");
+    let wide = refusal(&format!("{{ until = {wide}, do = [{syncs}] }}"), "");
+    assert!(wide.contains("bound `script_nodes`"), "{wide}");
+    let points = vec!["[1.0, 2.0]"; 200].join(", ");
+    let route = format!("[parameters.r]\nabout = \"x\"\ntype = \"route\"\ndefault = [{points}]");
+    let long = refusal(&format!("{{ sync = {{ request = \"{}\" }} }}", "{r}".repeat(2000)), &route);
+    assert!(long.contains("bound `script_bytes`"), "{long}");
+}
+
+#[test]
+fn a_trial_takes_no_longer_than_its_states_and_events_allow() {
+    let field = |at: usize| {
+        format!("{{ any_data = \"uav/1/x{at}\", field_range = {{ key = \"k{at}\", min = 0.0, max = 1.0 }} }}")
+    };
+    let fields: Vec<String> = (0..150).map(field).collect();
+    let sync = format!("{{ sync = {{ wait = [{}] }} }}", fields.join(", "));
+    let text = format!("name = \"x\"\nabout = \"x\"\nbody = [{sync}, {{ stop = true }}]\n");
+    let file = ScriptFile::parse("x.toml", &text).unwrap();
+    let script = file.bind("uav/1", None, &BTreeMap::new()).unwrap();
+    assert!(script.bthread.listened_to().len() < 150);
+    let trial = script.bthread.try_out(200).unwrap();
+    assert!(trial.states > 0 && !trial.is_complete, "what it was not tried with might matter");
+}

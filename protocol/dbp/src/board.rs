@@ -181,16 +181,21 @@ fn truncate<T>(list: &mut Vec<T>) -> bool {
 
 /// Cuts a text that is too long; says whether it was.
 pub(crate) fn shorten(text: &mut String) -> bool {
-    let long = text.len() > Board::MAX_TEXT;
+    shorten_to(text, Board::MAX_TEXT)
+}
+
+/// Cuts a text that is longer than so many bytes; says whether it was.
+pub(crate) fn shorten_to(text: &mut String, most: usize) -> bool {
+    let long = text.len() > most;
     if long {
-        *text = shortened(text);
+        *text = shortened(text, most);
     }
     long
 }
 
 /// The beginning of a text that is too long, and a mark that it is.
-fn shortened(text: &str) -> String {
-    let end = (0..=Board::MAX_TEXT - '…'.len_utf8()).rev().find(|end| text.is_char_boundary(*end));
+pub fn shortened(text: &str, most: usize) -> String {
+    let end = (0..=most.saturating_sub('…'.len_utf8())).rev().find(|end| text.is_char_boundary(*end));
     format!("{}…", text.get(..end.unwrap_or_default()).unwrap_or_default())
 }
 
@@ -210,7 +215,9 @@ fn shorten_event(event: &mut Event) -> bool {
         let mut key = key.to_owned();
         shorten(&mut key);
         match value {
-            Value::Text(text) if text.len() > Board::MAX_TEXT => short.with(key, shortened(text)),
+            Value::Text(text) if text.len() > Board::MAX_TEXT => {
+                short.with(key, shortened(text, Board::MAX_TEXT))
+            }
             value => short.with(key, value.clone()),
         }
     });
@@ -219,6 +226,10 @@ fn shorten_event(event: &mut Event) -> bool {
 
 /// Leaves out the alternatives that there is no room for.
 fn shorten_set(set: &mut EventSet) -> bool {
+    if set.check_bounds().is_err() {
+        *set = EventSet::None;
+        return true;
+    }
     if size_of_set(set) <= Board::MAX_SET {
         return false;
     }
@@ -243,7 +254,7 @@ fn plain(set: &EventSet) -> EventSet {
 }
 
 /// About how many bytes a set is on the wire.
-fn size_of_set(set: &EventSet) -> usize {
+pub(crate) fn size_of_set(set: &EventSet) -> usize {
     const FORM: usize = 4;
     FORM + match set {
         EventSet::None | EventSet::All => 0,
@@ -258,7 +269,7 @@ fn size_of_set(set: &EventSet) -> usize {
     }
 }
 
-fn size_of_event(event: &Event) -> usize {
+pub(crate) fn size_of_event(event: &Event) -> usize {
     event.name().len() + event.data().map(|(key, value)| size_of_datum(key, value)).sum::<usize>()
 }
 

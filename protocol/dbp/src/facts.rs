@@ -40,6 +40,8 @@ skein_bp::events! {
         node: NodeName,
         bthread: Arc<str>,
         reason: RefusalReason,
+        /// The number of others that came with it and are not told one by one; none if it was alone.
+        more: Option<u64>,
     }
     /// The home has restarted, or is coordinator no more, while a b-thread requested an event there. The event may have
     /// occurred or not, and is not asked for again before the b-thread's next synchronisation point (G4).

@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use skein_bp::Bound;
+
 use crate::channel::stream::REPAIR_CHUNK;
 use crate::message::Occurrence;
 
@@ -9,13 +11,27 @@ use crate::message::Occurrence;
 #[derive(Clone, Debug)]
 pub(crate) struct History {
     kept: VecDeque<Occurrence>,
+    /// What they weigh.
+    bytes: usize,
     capacity: usize,
     latest_seq: u64,
+    /// Whether all are kept, and whoever adds one sees to it that they are not too many.
+    whole: bool,
 }
 
 impl History {
     pub(crate) fn new(capacity: usize) -> Self {
-        Self { kept: VecDeque::new(), capacity: capacity.max(1), latest_seq: 0 }
+        Self { kept: VecDeque::new(), bytes: 0, capacity: capacity.max(1), latest_seq: 0, whole: false }
+    }
+
+    /// One that keeps all; see [`is_full`](Self::is_full).
+    pub(crate) fn whole(capacity: usize) -> Self {
+        Self { whole: true, ..Self::new(capacity) }
+    }
+
+    /// Whether there is no room for another one.
+    pub(crate) fn is_full(&self) -> bool {
+        self.kept.len() >= self.capacity || self.bytes > Bound::HistoryBytes.most()
     }
 
     /// The number of the latest occurrence, 0 before the first.
@@ -35,8 +51,12 @@ impl History {
 
     pub(crate) fn push(&mut self, occurrence: Occurrence) {
         self.latest_seq = occurrence.seq;
-        if self.kept.len() == self.capacity {
-            self.kept.pop_front();
+        self.bytes += occurrence.weight();
+        while !self.whole
+            && (self.kept.len() >= self.capacity || self.bytes > Bound::HistoryBytes.most())
+            && let Some(oldest) = self.kept.pop_front()
+        {
+            self.bytes -= oldest.weight();
         }
         self.kept.push_back(occurrence);
     }

@@ -44,6 +44,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod allowance;
 mod board;
 mod channel;
 mod clock;
@@ -65,7 +66,7 @@ mod rule;
 mod run;
 pub mod verify;
 
-pub use board::{Board, BoardLease, BoardRequest, BoardRow};
+pub use board::{Board, BoardLease, BoardRequest, BoardRow, shortened};
 pub use channel::peers::Peer;
 pub use config::NodeConfig;
 pub use error::NodeError;
@@ -80,6 +81,6 @@ pub use message::{
 #[cfg(feature = "mutants")]
 pub use mutant::Mutant;
 pub use name::{NodeName, NodeNameError, first_two_chunks, is_chunk};
-pub use node::{Node, NodeExplanation, NodeStats};
+pub use node::{Caused, Node, NodeExplanation, NodeStats};
 pub use rule::{Lift, NewRoster, RULES};
 pub use run::{BoardChange, ChannelMove, Happened};

@@ -6,8 +6,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use skein_bp::{Event, EventSet};
+use skein_bp::{Bound, Event, EventSet, Exceeded};
 
+use crate::board::size_of_event;
 use crate::name::NodeName;
 
 /// Whom a message is for.
@@ -92,15 +93,32 @@ pub struct RemoteBid {
     pub on_loss: OnLoss,
 }
 
-impl RemoteBid {
-    /// The most bids of one node at a home.
-    const MOST_BIDS: usize = 256;
-    /// The most events that one bid may request.
-    const MOST_REQUESTS: usize = 64;
+impl BidRecord {
+    /// Lets through what a record from another node may be. One that is too much does not count at all, so that its
+    /// sender may rely on nothing in it.
+    ///
+    /// # Errors
+    /// [`Exceeded`], which names the bound.
+    pub fn check_bounds(&self) -> Result<(), Exceeded> {
+        Bound::RecordBids.check(self.bids.len())?;
+        let (mut requests, mut nodes) = (0, 0);
+        for bid in &self.bids {
+            Bound::NameBytes.check(bid.bthread.len())?;
+            let extent = bid.block.extent();
+            Bound::AskedDepth.check(extent.depth)?;
+            requests += bid.requests.len();
+            // A bid that blocks nothing has a set too.
+            nodes += if bid.block == EventSet::None { 0 } else { extent.nodes };
+        }
+        Bound::RecordRequests.check(requests)?;
+        Bound::RecordNodes.check(nodes)
+    }
+}
 
+impl RemoteBid {
     /// Whether a home takes it in at this place, counted from 0, among its sender's bids there.
     pub fn is_within_quota(&self, place: usize) -> bool {
-        place < Self::MOST_BIDS && self.requests.len() <= Self::MOST_REQUESTS
+        place < Bound::HonouredBids.most() && self.requests.len() <= Bound::BidRequests.most()
     }
 }
 
@@ -213,6 +231,16 @@ pub struct Occurrence {
     pub choice: Option<Arc<str>>,
     /// When, on the home's clock; for display only.
     pub at: Duration,
+}
+
+impl Occurrence {
+    /// About how many bytes it takes to keep.
+    pub(crate) fn weight(&self) -> usize {
+        let served =
+            self.requests_served.iter().map(|request| size_of::<ServedRequest>() + request.bthread.len());
+        let names = self.requested_by.iter().map(|name| size_of::<Arc<str>>() + name.len());
+        size_of::<Self>() + size_of_event(&self.event) + served.chain(names).sum::<usize>()
+    }
 }
 
 /// A wish to hear some occurrences again.

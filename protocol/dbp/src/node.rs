@@ -10,7 +10,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use skein_bp::{Event, EventSet, Explanation, Program, ProgramError, Selection};
+use skein_bp::{Bound, Event, EventSet, Explanation, Program, ProgramError, Selection};
 
 use crate::board::{Board, BoardLease, BoardRow};
 use crate::channel::Channel;
@@ -63,6 +63,21 @@ pub struct Node {
     stats: NodeStats,
 }
 
+/// What one member has made a node do since the start, and keep at present.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Caused {
+    /// Facts that were told to all.
+    pub facts_told: u64,
+    /// Facts beyond its share, which were not told.
+    pub facts_withheld: u64,
+    /// Lives that it has begun more often than a process can.
+    pub lives_refused: u64,
+    /// Bids, refusals and served requests that are kept of it, and its occurrences that wait behind a hole.
+    pub entries: usize,
+    /// About how many bytes these are.
+    pub entry_bytes: usize,
+}
+
 /// Takes the next step of a program that has been told all: selects an event, or finds that there is none to select.
 pub(crate) type Select<'a> =
     dyn FnMut(&mut Program, Duration) -> Result<Option<Selection>, ProgramError> + 'a;
@@ -111,6 +126,7 @@ impl Node {
     /// Takes in a message. What comes of it shows at the next [`step`](Self::step).
     pub fn handle(&mut self, now: Duration, message: Message) {
         self.clock.set(now);
+        self.run.now = self.clock.now();
         self.stats.ignored += u64::from(!self.take_in(message));
     }
 
@@ -215,6 +231,25 @@ impl Node {
         self.stats
     }
 
+    /// Another member of this name, if it is one.
+    pub fn member(&self, name: &NodeName) -> Option<&NodeName> {
+        self.channel.peers.name(name.as_str())
+    }
+
+    /// What a member has made this node do and keep.
+    pub fn caused_by(&self, member: &NodeName) -> Caused {
+        let telling = self.run.telling(member);
+        let (entries, entry_bytes) = self.home.table.entries_of(member);
+        let (waiting, waiting_bytes) = self.channel.waiting_of(member);
+        Caused {
+            facts_told: telling.told,
+            facts_withheld: telling.withheld,
+            lives_refused: self.channel.peers.lives_refused(member),
+            entries: entries + waiting,
+            entry_bytes: entry_bytes + waiting_bytes,
+        }
+    }
+
     /// The other homes that the present block of `bthread` concerns, each with whether it surely keeps the block now.
     pub fn kept_by(&self, bthread: &str) -> impl Iterator<Item = (&NodeName, bool)> {
         self.guest.kept_by(bthread, self.clock.now(), self.config.lease)
@@ -236,11 +271,23 @@ impl Node {
     pub fn board(&self) -> Board {
         let (program, now) = (&self.run.program, self.clock.now());
         let blockers = |event: &Event| match self.routes().of(event) {
-            Route::Here | Route::Local => program.blockers(event).map(Into::into).collect(),
+            // One more than there is room for shows that there is no room.
+            Route::Here | Route::Local => {
+                program.blockers(event).take(Board::MAX_REQUESTS + 1).map(Into::into).collect()
+            }
             Route::Elsewhere(_) | Route::Unroutable => Vec::new(),
         };
         let own = program.bids().map(|(bthread, bid, _)| BoardRow::new(bthread, bid, blockers));
-        let remote = program.proxies().map(|(name, bid)| {
+        let mut of_one = (None, 0);
+        let mut left_out = 0;
+        let shown = program.proxies().filter(|(name, _)| {
+            let node = name.split_once('#').map(|(node, _)| node);
+            of_one = (node, if of_one.0 == node { of_one.1 + 1 } else { 1 });
+            let is_shown = of_one.1 <= Bound::BoardRows.most();
+            left_out += u32::from(!is_shown);
+            is_shown
+        });
+        let remote = shown.map(|(name, bid)| {
             let mut row = BoardRow::new(name, bid, blockers);
             if let Some(party) = self.home.table.party(name, now) {
                 row.blocks = self.home.table.asked_block(name).cloned().unwrap_or_default();
@@ -249,7 +296,9 @@ impl Node {
             row
         });
         let rows = own.chain(remote.filter(|row| !(row.requests.is_empty() && row.blocks.is_none())));
-        Board::new(self.config.name.clone(), self.config.incarnation, now, rows.collect())
+        let rows = rows.collect();
+        let board = Board::new(self.config.name.clone(), self.config.incarnation, now, rows);
+        Board { left_out: board.left_out.saturating_add(left_out), ..board }
     }
 
     fn routes(&self) -> Routes<'_> {

@@ -1,12 +1,13 @@
 //! The run of a node's b-program: what the program is told, and what happens in it.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
 use skein_bp::catalogue::Declared;
-use skein_bp::{Bid, Event, Origin, Program};
+use skein_bp::{Bid, Bound, Event, Origin, Program};
 
+use crate::allowance::Allowance;
 use crate::channel::stream::Heard;
 use crate::facts::{BlockLapsed, Confirmed, Gap};
 use crate::guest::held_blocks::BlockNews;
@@ -93,6 +94,18 @@ pub(crate) struct Run {
     pub(crate) channel_moves: Option<Vec<ChannelMove>>,
     /// Whether bids have changed since it was last looked which requests are stalled.
     pub(crate) bids_changed: bool,
+    pub(crate) now: Duration,
+    /// The facts that were told because of each other member.
+    tellings: BTreeMap<NodeName, Telling>,
+}
+
+/// The facts because of one other member.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Telling {
+    allowance: Allowance,
+    pub(crate) told: u64,
+    /// Those that it has caused beyond its share.
+    pub(crate) withheld: u64,
 }
 
 impl Run {
@@ -104,12 +117,32 @@ impl Run {
             selections: Vec::new(),
             channel_moves: None,
             bids_changed: true,
+            now: Duration::ZERO,
+            tellings: BTreeMap::new(),
         }
     }
 
     /// Tells a fact about the fleet.
     pub(crate) fn fact(&mut self, fact: impl Declared) {
         self.news.push_back(Delivery::Fact(fact.at(&self.node)));
+    }
+
+    /// Tells a fact that `member` has caused, unless it has caused too many: each is told to all.
+    pub(crate) fn fact_because_of(&mut self, member: &NodeName, fact: impl Declared) {
+        if !self.tellings.contains_key(member) {
+            self.tellings.insert(member.clone(), Telling::default());
+        }
+        let Some(telling) = self.tellings.get_mut(member) else { return };
+        if telling.allowance.take(self.now, Bound::FactsAtOnce, Bound::FactsPerSecond) {
+            telling.told += 1;
+            self.fact(fact);
+        } else {
+            telling.withheld += 1;
+        }
+    }
+
+    pub(crate) fn telling(&self, member: &NodeName) -> Telling {
+        self.tellings.get(member).copied().unwrap_or_default()
     }
 
     /// Delivers the occurrences and gaps that `listen` hears of the stream of `home`.
@@ -119,7 +152,7 @@ impl Run {
         for heard in heard {
             match heard {
                 Heard::Occurrence(occurrence) => self.news.push_back(Delivery::Occurrence(occurrence)),
-                Heard::Gap { from, to } => self.fact(Gap { home: home.clone(), from, to }),
+                Heard::Gap { from, to } => self.fact_because_of(home, Gap { home: home.clone(), from, to }),
             }
         }
     }

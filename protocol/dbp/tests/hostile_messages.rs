@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use proptest::prelude::*;
 use skein_bp::script::{Op, Script};
-use skein_bp::{Bid, Event, EventSet, Program, ProgramConfig};
+use skein_bp::{Bid, Bound, Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{
     BidAck, BidRecord, JointWord, Message, Node, NodeConfig, NodeName, Occurrence, OnLoss, Presence,
     Recipient, RemoteBid, Repair, Roster, ServedRequest,
@@ -174,6 +174,203 @@ fn a_record_that_asks_for_too_much_is_cut_down_and_the_rest_is_told() {
     assert_eq!(reasons[..3], [("b0", "safety"), ("b1", "not_home"), ("b2", "hold_unsupported")]);
     assert_eq!(reasons.len(), 3 + 300 - 256);
     assert!(reasons[3..].iter().all(|(_, reason)| *reason == "quota"));
+    let denied = facts(&mut node, "denied");
+    assert_eq!(denied.len(), 1, "the acknowledgement lists all; the fleet is told once");
+    assert_eq!(denied[0].int("more"), Some(2 + 300 - 256));
+}
+
+/// The facts of a kind that are told from now to the end of a step.
+fn facts(node: &mut Node, kind: &str) -> Vec<Event> {
+    node.step(Duration::from_millis(20)).unwrap();
+    let events = node.take_selections().into_iter().map(|happened| happened.event);
+    events.filter(|event| event.kind() == kind).collect()
+}
+
+fn record(incarnation: u64, epoch: u64, bids: Vec<RemoteBid>) -> Message {
+    Message::Bid(BidRecord {
+        node: name("uav/2"),
+        incarnation,
+        home: name("uav/1"),
+        home_incarnation: Some(3),
+        epoch,
+        sent_at: Duration::ZERO,
+        applied: 0,
+        term: 0,
+        decided: 0,
+        lease_ms: 1000,
+        bids,
+    })
+}
+
+fn bid(bthread: &str, requests: Vec<Event>, block: EventSet) -> RemoteBid {
+    let on_loss = OnLoss::Release;
+    RemoteBid { bthread: bthread.into(), sync: 1, requests, block, block_since: 1, priority: None, on_loss }
+}
+
+#[test]
+fn facts_that_one_member_causes_are_told_up_to_its_share() {
+    let most = Bound::FactsAtOnce.stated();
+    // Records that are refused each for something else.
+    let mut node = node();
+    for epoch in 1..500 {
+        node.handle(
+            Duration::ZERO,
+            record(1, epoch, vec![bid(&format!("b{epoch}"), vec!["uav/1/land".into()], EventSet::None)]),
+        );
+    }
+    assert_eq!(facts(&mut node, "denied").len(), most);
+    assert_eq!(node.caused_by(&name("uav/2")).facts_withheld, 499 - most as u64);
+
+    // An occurrence that claims to have served what was never asked.
+    let mut node = self::node();
+    node.handle(Duration::ZERO, presence("uav/2", 0));
+    let served =
+        |n: u64| ServedRequest { node: name("uav/1"), incarnation: 3, bthread: format!("b{n}"), sync: 1 };
+    let Message::Occurrence(lie) = occurrence("uav/2", 1, "uav/2/x") else { unreachable!() };
+    node.handle(
+        Duration::ZERO,
+        Message::Occurrence(Occurrence { requests_served: (0..1000).map(served).collect(), ..lie }),
+    );
+    assert_eq!(facts(&mut node, "orphan").len(), most);
+
+    // A stream that is nothing but holes.
+    let mut node = self::node();
+    node.handle(Duration::ZERO, presence("uav/2", 0));
+    (1..500).for_each(|n| node.handle(Duration::ZERO, occurrence("uav/2", 2 * n, "uav/2/x")));
+    let Message::Presence(forgets) = presence("uav/2", 1000) else { unreachable!() };
+    node.handle(Duration::ZERO, Message::Presence(Presence { oldest_seq: 1001, ..forgets }));
+    assert_eq!(facts(&mut node, "gap").len(), most);
+
+    // Blocks of what it requests itself, by ever other b-threads.
+    let mut node = self::node();
+    for epoch in 1..50 {
+        let blockers = (0..100).map(|n| bid(&format!("b{epoch}.{n}"), vec![], "uav/1/x".into()));
+        let asks = bid("asks", vec!["uav/1/x".into()], EventSet::None);
+        node.handle(Duration::ZERO, record(1, epoch, blockers.chain([asks]).collect()));
+        assert!(facts(&mut node, "stalled").len() <= Bound::StallsNoted.stated());
+    }
+    assert_eq!(node.caused_by(&name("uav/2")).facts_told, most as u64);
+}
+
+#[test]
+fn a_member_begins_no_more_lives_than_a_process_can() {
+    let mut node = node();
+    let live = |incarnation: u64| {
+        let Message::Presence(presence) = presence("uav/2", 0) else { unreachable!() };
+        Message::Presence(Presence { incarnation, ..presence })
+    };
+    (1..1000).for_each(|incarnation| node.handle(Duration::ZERO, live(incarnation)));
+    assert_eq!(facts(&mut node, "peer_joined").len(), Bound::LivesPerSecond.stated());
+    assert_eq!(node.caused_by(&name("uav/2")).lives_refused, 999 - Bound::LivesPerSecond.stated() as u64);
+    node.handle(Duration::from_secs(2), live(u64::MAX));
+    let (_, peer) = node.peers().find(|(peer, _)| **peer == name("uav/2")).unwrap();
+    assert_eq!(peer.incarnation, Some(u64::MAX));
+}
+
+#[test]
+fn a_home_has_a_say_about_what_is_asked_of_it_and_nothing_else() {
+    let mut node = node();
+    node.handle(Duration::ZERO, presence("uav/2", 0));
+    node.step(Duration::from_millis(20)).unwrap();
+    let refusal = |n: u64| skein_dbp::Refusal {
+        bthread: format!("b{n}"),
+        sync: 1,
+        reason: skein_dbp::RefusalReason::Quota,
+    };
+    node.handle(
+        Duration::from_millis(40),
+        Message::Ack(BidAck {
+            home: name("uav/2"),
+            home_incarnation: 1,
+            node: name("uav/1"),
+            incarnation: 3,
+            epoch: 2,
+            sent_at: Duration::from_millis(20),
+            latest_seq: 0,
+            refused: (0..1000).map(refusal).collect(),
+        }),
+    );
+    assert_eq!(facts(&mut node, "refused").len(), 0);
+}
+
+#[test]
+fn wishes_for_repair_bring_no_more_than_may_be_repeated() {
+    let mut program = Program::new(ProgramConfig::vehicle(1));
+    let tap = Op::Sync(Bid::new().request("uav/1/x"));
+    program.add("tap", Script::new(&[Op::repeat(900, [tap])]).unwrap());
+    let mut node = Node::new(NodeConfig::new(name("uav/1"), 3, vec![name("uav/2")]), program);
+    node.handle(Duration::ZERO, presence("uav/2", 0));
+    node.step(Duration::ZERO).unwrap();
+    node.take_outgoing();
+    let wish = Repair {
+        home: name("uav/1"),
+        incarnation: 3,
+        from_seq: 1,
+        to_seq: 64,
+        term: 0,
+        requester: name("uav/2"),
+    };
+    (0..10_000).for_each(|_| node.handle(Duration::ZERO, Message::Repair(wish.clone())));
+    assert_eq!(node.take_outgoing().len(), Bound::RepeatsAtOnce.stated());
+}
+
+#[test]
+fn long_events_do_not_fill_the_memory() {
+    let long = |n: u64| Event::new("uav/1/x").with("text", "x".repeat(30_000)).with("n", n as i64);
+    let mut program = Program::new(ProgramConfig::vehicle(1));
+    let taps = (0..500).map(|n| Op::Sync(Bid::new().request(long(n))));
+    program.add("tap", Script::new(&taps.collect::<Vec<_>>()).unwrap());
+    let mut node = Node::new(NodeConfig::new(name("uav/1"), 3, vec![name("uav/2")]), program);
+    node.step(Duration::ZERO).unwrap();
+    let presences = node.take_outgoing().into_iter().filter_map(|(_, message)| match message {
+        Message::Presence(presence) => Some(presence),
+        _ => None,
+    });
+    let kept = presences.last().map(|presence| presence.latest_seq + 1 - presence.oldest_seq).unwrap();
+    assert!((100..=Bound::HistoryBytes.stated() as u64 / 30_000).contains(&kept), "{kept}");
+    // Nor do those of another home that wait behind a hole.
+    for seq in 2..500 {
+        let Message::Occurrence(one) = occurrence("uav/2", seq, "uav/2/x") else { unreachable!() };
+        node.handle(Duration::ZERO, Message::Occurrence(Occurrence { event: long(seq), ..one }));
+    }
+    let kept = node.caused_by(&name("uav/2"));
+    assert!((10..20).contains(&kept.entries), "{kept:?}");
+    assert!(kept.entry_bytes < Bound::PendingBytes.stated() + 40_000, "{kept:?}");
+}
+
+#[test]
+fn lives_that_each_block_something_else_fill_no_disk() {
+    let mut node = node_with(Some("uav/1"));
+    for life in 1..2000 {
+        let regions = (0..100).map(|n| EventSet::field_range("x", f64::from(life), f64::from(n)));
+        let block = EventSet::from("uav/1/x").and(EventSet::any_of(regions));
+        let hold = RemoteBid { on_loss: OnLoss::Hold, ..bid("hold", vec![], block) };
+        let at = Duration::from_secs(life as u64);
+        node.handle(at, record(life as u64, 1, vec![hold]));
+    }
+    let kept = node.kept();
+    assert_eq!(kept.blocks.len(), 1);
+    assert!(kept.blocks[0].block.extent().nodes <= Bound::SetNodes.stated());
+    let written = serde_json::to_string(&kept.blocks[0].block).unwrap();
+    assert_eq!(serde_json::from_str::<EventSet>(&written).unwrap().extent(), kept.blocks[0].block.extent());
+}
+
+#[test]
+fn a_record_that_is_too_much_names_the_bound() {
+    let check = |bids: Vec<RemoteBid>| {
+        let Message::Bid(record) = record(1, 1, bids) else { unreachable!() };
+        record.check_bounds().map_err(|exceeded| exceeded.bound)
+    };
+    let deep = (0..46).fold(EventSet::from("uav/1/x"), |set, _| EventSet::And(vec![set]));
+    assert_eq!(check(vec![bid("x", vec![], deep)]), Err(Bound::AskedDepth));
+    let wide = EventSet::Or(vec!["uav/1/x".into(); 200]);
+    assert_eq!(check(vec![bid("x", vec![], wide.clone()); 6]), Err(Bound::RecordNodes));
+    assert_eq!(
+        check(vec![bid("x", vec!["uav/1/x".into(); 60], EventSet::None); 3]),
+        Err(Bound::RecordRequests)
+    );
+    assert_eq!(check(vec![bid("x", vec![], EventSet::None); 600]), Err(Bound::RecordBids));
+    assert_eq!(check(vec![bid("x", vec!["uav/1/x".into(); 60], wide)]), Ok(()));
 }
 
 fn any_name() -> impl Strategy<Value = NodeName> {

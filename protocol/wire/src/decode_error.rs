@@ -1,5 +1,6 @@
 //! Faults of bytes from outside.
 
+use skein_bp::Exceeded;
 use skein_dbp::NodeNameError;
 
 use crate::proto::{MAX_PAYLOAD, VERSION};
@@ -19,4 +20,6 @@ pub enum DecodeError {
     Range { field: &'static str, given: String, expected: &'static str },
     #[error("`{field}`: {source}")]
     Name { field: &'static str, source: NodeNameError },
+    #[error("`{field}`: {source}")]
+    Bound { field: &'static str, source: Exceeded },
 }

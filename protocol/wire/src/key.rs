@@ -7,6 +7,7 @@ use std::sync::Arc;
 use skein_dbp::{Board, NodeName, is_chunk};
 
 use crate::message::{KINDS, Kind, Payload, Record};
+use crate::proto::MAX_PAYLOAD;
 
 /// The first chunk of every key.
 const ROOT: &str = "skein";
@@ -116,6 +117,11 @@ impl Key {
 
     pub fn sender(&self) -> &NodeName {
         &self.sender
+    }
+
+    /// The longest message that may be put under it, in bytes.
+    pub fn most_bytes(&self) -> usize {
+        self.kind.bytes.most().min(MAX_PAYLOAD)
     }
 
     /// Whom it is for; none if for all.

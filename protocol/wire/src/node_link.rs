@@ -1,21 +1,24 @@
 //! A node coupled to its link.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-use skein_dbp::{Board, Kept, Node, NodeError, NodeName, Recipient};
+use skein_dbp::{Board, Caused, Kept, Node, NodeError, NodeName, Recipient};
 
 use crate::decode_error::DecodeError;
 use crate::key::{Fleet, Key};
 use crate::link::Link;
+use crate::mailbox::{Mailbox, Owner};
 use crate::message::{Payload, Readiness, Record, State};
+use crate::share::Shares;
 use crate::store::Store;
 
-/// One pump takes in so many messages at most, so that a flood cannot keep a node from going on.
+/// One pump takes over so many messages from the link at most, so that a flood cannot keep a node from going on. Which of
+/// them it reads is a matter of each sender's share.
 const MOST_PER_PUMP: usize = 4096;
 
-/// Of how many nodes it is remembered that they speak another version.
-const MOST_SKEWED: usize = 256;
+/// Messages that wait in all; of each sender there may be far fewer.
+const MOST_WAITING: usize = 1 << 16;
 
 /// A node looks this often at its board.
 const BOARD_PERIOD: Duration = Duration::from_millis(200);
@@ -23,8 +26,6 @@ const BOARD_PERIOD: Duration = Duration::from_millis(200);
 const BOARD_CHANGED: Duration = Duration::from_millis(600);
 /// A board that has not changed is told of this often, for those who have come since.
 const BOARD_UNCHANGED: Duration = Duration::from_secs(3);
-/// Boards that wait to be taken; of more, the oldest go.
-const MOST_BOARDS: usize = 1024;
 
 /// A node, its fleet, and what has come in beside the protocol: other vehicles' states, and other nodes' boards.
 ///
@@ -39,12 +40,59 @@ pub struct NodeLink {
     unsaved: Option<Kept>,
     states: Vec<State>,
     readiness: Vec<Readiness>,
-    /// Other nodes' boards, for who reads them.
-    boards: Option<VecDeque<Board>>,
+    /// Other members' newest boards, for who reads them.
+    boards: Option<BTreeMap<NodeName, Board>>,
     board_due: Duration,
     told_board: Option<Board>,
     stats: NodeLinkStats,
     skewed: BTreeMap<NodeName, u32>,
+    mailbox: Mailbox,
+    shares: Shares,
+    /// What each member, and all others together, have sent.
+    senders: BTreeMap<Owner, SenderStats>,
+    has_met: bool,
+    /// Whether there are other members, so that all others are strangers.
+    has_roster: bool,
+}
+
+/// Counts of what has come from one member, or from all outside the roster together, since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SenderStats {
+    /// Messages taken in.
+    pub messages: u64,
+    /// Their bytes.
+    pub bytes: u64,
+    /// Messages that had to go because more had come than may wait.
+    pub dropped: u64,
+    /// Messages longer than any of their kind may be.
+    pub oversized: u64,
+    /// Payloads that could not be decoded, or were beyond a bound.
+    pub undecodable: u64,
+    /// Messages whose content claims another sender, receiver or kind than their key.
+    pub forged: u64,
+    /// Messages of nodes outside the roster, where there is one: nobody reads them.
+    pub strange: u64,
+    /// States whose numbers were brought to what is believed.
+    pub implausible: u64,
+    /// What it has made the node do and keep beside.
+    pub caused: Caused,
+    /// Event sets looked at while its messages were taken in.
+    #[cfg(feature = "mutants")]
+    pub nodes: u64,
+}
+
+impl SenderStats {
+    /// The messages that came to nothing, for whatever reason, and the facts that were not told.
+    pub fn passed_over(&self) -> u64 {
+        self.dropped
+            + self.strange
+            + self.implausible
+            + self.oversized
+            + self.undecodable
+            + self.forged
+            + self.caused.facts_withheld
+            + self.caused.lives_refused
+    }
 }
 
 /// Counts of the messages that have come and gone.
@@ -57,6 +105,16 @@ pub struct NodeLinkStats {
     pub undecodable: u64,
     /// Messages whose content claims another sender, receiver or kind than their key.
     pub forged: u64,
+    /// Messages longer than any of their kind may be.
+    pub oversized: u64,
+    /// Messages that had to go because more had come from their sender than may wait.
+    pub dropped: u64,
+    /// Messages of nodes outside the roster.
+    pub strange: u64,
+    /// States whose numbers were brought to what is believed.
+    pub implausible: u64,
+    /// Own messages that were not put, because no other node would take in one so long.
+    pub unsendable: u64,
     /// Times that the store did not take what must be kept; what it bears on was not sent.
     pub unsaved: u64,
 }
@@ -76,6 +134,11 @@ impl NodeLink {
             told_board: None,
             stats: NodeLinkStats::default(),
             skewed: BTreeMap::new(),
+            mailbox: Mailbox::new(MOST_WAITING),
+            shares: Shares::default(),
+            senders: BTreeMap::new(),
+            has_met: false,
+            has_roster: false,
         }
     }
 
@@ -87,7 +150,7 @@ impl NodeLink {
     /// A node that also reads what other nodes have on their boards.
     #[must_use]
     pub fn reading_boards(self) -> Self {
-        Self { boards: Some(VecDeque::new()), ..self }
+        Self { boards: Some(BTreeMap::new()), ..self }
     }
 
     /// Takes in what has arrived, lets the node go on, and sends what it has to say.
@@ -141,10 +204,10 @@ impl NodeLink {
         Some(self.told_board.insert(board))
     }
 
-    /// The boards of other nodes that have arrived since the last call, in order; none unless this node
+    /// The newest board of each other member that has sent one since the last call; none unless this node
     /// [reads them](Self::reading_boards).
     pub fn take_boards(&mut self) -> Vec<Board> {
-        self.boards.as_mut().map(|boards| boards.drain(..).collect()).unwrap_or_default()
+        self.boards.as_mut().map(|boards| std::mem::take(boards).into_values().collect()).unwrap_or_default()
     }
 
     /// The states of other vehicles that have arrived since the last call, in order.
@@ -171,31 +234,86 @@ impl NodeLink {
     }
 
     pub fn stats(&self) -> NodeLinkStats {
-        self.stats
+        NodeLinkStats { dropped: self.mailbox.dropped().values().sum(), ..self.stats }
     }
 
-    /// Takes in what has arrived.
+    /// Takes in what has arrived, of each sender as much as is its share; the rest waits.
     pub fn receive(&mut self, now: Duration, link: &mut dyn Link) {
+        if !std::mem::replace(&mut self.has_met, true) {
+            let members: Vec<NodeName> = self.node.peers().map(|(name, _)| name.clone()).collect();
+            link.meet(&members);
+            self.has_roster = !members.is_empty();
+            self.mailbox.meet(members);
+        }
         for (key, payload) in std::iter::from_fn(|| link.poll()).take(MOST_PER_PUMP) {
             self.stats.received += 1;
             if self.boards.is_none() && key.is_of::<Board>() {
                 continue;
             }
-            let payload = Payload::decode(&payload);
-            self.note_version(key.sender(), &payload);
-            match payload {
-                Err(_) => self.stats.undecodable += 1,
-                Ok(payload) if !key.fits(&payload) => self.stats.forged += 1,
-                Ok(Payload::State(state)) if state.node == *self.node.name() => {}
-                Ok(Payload::State(state)) => self.states.push(state),
-                Ok(Payload::Readiness(readiness)) if readiness.node == *self.node.name() => {}
-                Ok(Payload::Readiness(readiness)) => self.readiness.push(readiness),
-                Ok(Payload::Board(board)) => self.note_board(board),
-                Ok(Payload::Message(message)) => self.node.handle(now, message),
-                // Not for a node: a sensor's and a world's words have listeners of their own.
-                Ok(_) => self.stats.forged += 1,
+            if self.has_roster && self.node.member(key.sender()).is_none() && key.sender() != self.node.name()
+            {
+                self.stats.strange += 1;
+                self.sender(key.sender()).strange += 1;
+                continue;
             }
+            if payload.len() > key.most_bytes() {
+                self.stats.oversized += 1;
+                self.sender(key.sender()).oversized += 1;
+                continue;
+            }
+            self.mailbox.push(key, payload);
         }
+        let (shares, node) = (&mut self.shares, &self.node);
+        let due = self.mailbox.take(|sender, bytes| shares.take(now, node.member(sender), bytes));
+        for (key, payload) in due {
+            self.take_in(now, &key, &payload);
+        }
+    }
+
+    fn take_in(&mut self, now: Duration, key: &Key, bytes: &[u8]) {
+        #[cfg(feature = "mutants")]
+        let nodes = skein_bp::bound::mutants::nodes();
+        let payload = Payload::decode(bytes);
+        self.note_version(key.sender(), &payload);
+        let before = self.stats;
+        match payload {
+            Err(_) => self.stats.undecodable += 1,
+            Ok(payload) if !key.fits(&payload) => self.stats.forged += 1,
+            Ok(Payload::State(state)) if state.node == *self.node.name() => {}
+            Ok(Payload::State(state)) => self.note_state(state),
+            Ok(Payload::Readiness(readiness)) if readiness.node == *self.node.name() => {}
+            Ok(Payload::Readiness(readiness)) => self.readiness.push(readiness),
+            Ok(Payload::Board(board)) => self.note_board(board),
+            Ok(Payload::Message(message)) => self.node.handle(now, message),
+            // Not for a node: a sensor's and a world's words have listeners of their own.
+            Ok(_) => self.stats.forged += 1,
+        }
+        let after = self.stats;
+        let sender = self.sender(key.sender());
+        sender.messages += 1;
+        sender.bytes += bytes.len() as u64;
+        sender.undecodable += after.undecodable - before.undecodable;
+        sender.forged += after.forged - before.forged;
+        sender.implausible += after.implausible - before.implausible;
+        #[cfg(feature = "mutants")]
+        {
+            sender.nodes += skein_bp::bound::mutants::nodes() - nodes;
+        }
+    }
+
+    /// The counts of a member, or those of all others.
+    fn sender(&mut self, name: &NodeName) -> &mut SenderStats {
+        let owner = self.node.member(name).cloned();
+        self.senders.entry(owner).or_default()
+    }
+
+    /// What has come from each member, and, under no name, from all others together.
+    pub fn senders(&self) -> impl Iterator<Item = (Option<&NodeName>, SenderStats)> {
+        self.senders.iter().map(|(owner, stats)| {
+            let dropped = self.mailbox.dropped().get(owner).copied().unwrap_or(0);
+            let caused = owner.as_ref().map_or(Caused::default(), |name| self.node.caused_by(name));
+            (owner.as_ref(), SenderStats { dropped, caused, ..*stats })
+        })
     }
 
     /// The nodes whose messages this build cannot read, each with the version it speaks.
@@ -203,17 +321,23 @@ impl NodeLink {
         self.skewed.iter().map(|(node, version)| (node, *version))
     }
 
+    /// Whoever says that it is huge is kept away from, but not as far as it likes.
+    fn note_state(&mut self, mut state: State) {
+        self.stats.implausible += u64::from(state.bring_to_what_is_believed());
+        self.states.push(state);
+    }
+
     fn note_board(&mut self, board: Board) {
-        let Some(boards) = self.boards.as_mut().filter(|_| board.node != *self.node.name()) else { return };
-        if boards.len() == MOST_BOARDS {
-            boards.pop_front();
+        if self.node.member(&board.node).is_some()
+            && let Some(boards) = &mut self.boards
+        {
+            boards.insert(board.node.clone(), board);
         }
-        boards.push_back(board);
     }
 
     fn note_version(&mut self, sender: &NodeName, payload: &Result<Payload, DecodeError>) {
         match payload {
-            Err(DecodeError::Version { given }) if self.skewed.len() < MOST_SKEWED => {
+            Err(DecodeError::Version { given }) if self.node.member(sender).is_some() => {
                 self.skewed.insert(sender.clone(), *given);
             }
             Err(_) => {}
@@ -235,7 +359,12 @@ impl NodeLink {
             };
             let payload = Payload::Message(message);
             let key = Key::of(&payload, &self.fleet, self.node.name(), recipient);
-            link.put(&key, payload.encode());
+            let payload = payload.encode();
+            if payload.len() > key.most_bytes() {
+                self.stats.unsendable += 1;
+                continue;
+            }
+            link.put(&key, payload);
             self.stats.sent += 1;
         }
     }

@@ -17,5 +17,6 @@ mod g8_joint;
 mod guide;
 mod network_faults;
 mod payloads;
+mod shares;
 mod stalls_told;
 mod swarm;

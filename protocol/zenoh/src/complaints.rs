@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use skein_wire::{NodeLink, NodeName};
+use skein_wire::{NodeLink, NodeName, Owner, SenderStats};
 
 use crate::link::ZenohLink;
 
@@ -14,7 +14,7 @@ const PERIOD: Duration = Duration::from_secs(1);
 /// Looks at what a node could not use, and says so when there is more of it.
 #[derive(Debug, Default)]
 pub struct Complaints {
-    told: [u64; 5],
+    told: [u64; 11],
     told_versions: BTreeMap<NodeName, u32>,
     due: Duration,
 }
@@ -27,7 +27,22 @@ impl Complaints {
             return None;
         }
         let (heard, arrived) = (node.stats(), link.stats());
-        let counts = [heard.undecodable, heard.forged, arrived.oversized, arrived.misnamed, arrived.dropped];
+        let senders: Vec<(Option<&NodeName>, SenderStats)> = node.senders().collect();
+        let caused =
+            |count: fn(&SenderStats) -> u64| senders.iter().map(|(_, stats)| count(stats)).sum::<u64>();
+        let counts = [
+            heard.undecodable,
+            heard.forged,
+            arrived.oversized + heard.oversized,
+            arrived.misnamed,
+            arrived.dropped,
+            heard.dropped,
+            heard.unsendable,
+            heard.strange,
+            heard.implausible,
+            caused(|stats| stats.caused.facts_withheld),
+            caused(|stats| stats.caused.lives_refused),
+        ];
         let versions: BTreeMap<_, _> = node.skewed().map(|(node, version)| (node.clone(), version)).collect();
         if counts == self.told && versions == self.told_versions {
             return None;
@@ -39,6 +54,12 @@ impl Complaints {
             "too long",
             "under strange keys",
             "dropped because the node was too slow",
+            "dropped because their sender sends more than its share",
+            "of this node's own not sent because they are too long",
+            "of nodes outside the roster",
+            "states with a radius, speed or position error that nobody has",
+            "facts not told because one member caused too many",
+            "lives of members that began too often",
         ];
         if counts != self.told {
             let listed: Vec<String> = counts
@@ -47,7 +68,8 @@ impl Complaints {
                 .filter(|(count, _)| **count > 0)
                 .map(|(count, what)| format!("{count} {what}"))
                 .collect();
-            let _ = write!(line, "messages passed over so far: {}. ", listed.join(", "));
+            let _ =
+                write!(line, "messages passed over so far: {}{}. ", listed.join(", "), whose(&senders, link));
         }
         for (node, version) in
             versions.iter().filter(|(node, version)| self.told_versions.get(*node) != Some(version))
@@ -63,4 +85,17 @@ impl Complaints {
         self.due = now + PERIOD;
         (!line.is_empty()).then(|| line.trim_end().to_owned())
     }
+}
+
+/// From whom most of it comes: ` (most from uav/9: 1200)`.
+fn whose(senders: &[(Option<&NodeName>, SenderStats)], link: &ZenohLink) -> String {
+    let mut of: BTreeMap<Owner, u64> = link.dropped();
+    for (sender, stats) in senders {
+        *of.entry(sender.cloned()).or_default() += stats.passed_over();
+    }
+    let most = of.into_iter().max_by_key(|(_, count)| *count).filter(|(_, count)| *count > 0);
+    most.map_or_else(String::new, |(sender, count)| {
+        let name = sender.map_or("nodes outside the roster".to_owned(), |sender| sender.to_string());
+        format!(" (most from {name}: {count})")
+    })
 }

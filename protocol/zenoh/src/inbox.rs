@@ -1,51 +1,30 @@
 //! The messages that wait at one link.
 
-use std::collections::VecDeque;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use skein_wire::{Key, MAX_PAYLOAD};
+use skein_wire::{Key, Mailbox, NodeName, Owner};
 
 use crate::bell::Bell;
 
-/// So many bytes may wait at a link, however few messages they are.
-const MOST_BYTES: usize = 64 << 20;
-
-/// A bounded ring: when it is full, the oldest message makes room, because newer ones supersede it.
+/// A mailbox that Zenoh's threads fill and one loop empties.
 #[derive(Debug)]
 pub(crate) struct Inbox {
-    waiting: Mutex<Waiting>,
-    capacity: usize,
+    waiting: Mutex<Mailbox>,
     /// Rung when a message has come.
     pub(crate) bell: Bell,
     pub(crate) received: AtomicU64,
-    pub(crate) dropped: AtomicU64,
     pub(crate) misnamed: AtomicU64,
     pub(crate) oversized: AtomicU64,
-}
-
-#[derive(Debug, Default)]
-struct Waiting {
-    messages: VecDeque<(Key, Vec<u8>)>,
-    bytes: usize,
-}
-
-impl Waiting {
-    fn pop(&mut self) -> Option<(Key, Vec<u8>)> {
-        let message = self.messages.pop_front()?;
-        self.bytes -= message.1.len();
-        Some(message)
-    }
 }
 
 impl Inbox {
     pub(crate) fn new(capacity: usize) -> Self {
         Self {
-            waiting: Mutex::default(),
-            capacity,
+            waiting: Mutex::new(Mailbox::new(capacity)),
             bell: Bell::default(),
             received: AtomicU64::new(0),
-            dropped: AtomicU64::new(0),
             misnamed: AtomicU64::new(0),
             oversized: AtomicU64::new(0),
         }
@@ -56,39 +35,49 @@ impl Inbox {
     pub(crate) fn push(&self, key: &str, bytes: usize, payload: impl FnOnce() -> Vec<u8>) {
         let count = |counter: &AtomicU64| counter.fetch_add(1, Ordering::Relaxed);
         count(&self.received);
-        let Ok(key) = key.parse() else {
+        let Ok(key) = key.parse::<Key>() else {
             count(&self.misnamed);
             return;
         };
-        if bytes > MAX_PAYLOAD {
+        if bytes > key.most_bytes() {
             count(&self.oversized);
             return;
         }
         let payload = payload();
-        let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-        while waiting.messages.len() >= self.capacity || waiting.bytes + payload.len() > MOST_BYTES {
-            if waiting.pop().is_none() {
-                break;
-            }
-            count(&self.dropped);
-        }
-        waiting.bytes += payload.len();
-        waiting.messages.push_back((key, payload));
-        drop(waiting);
+        self.waiting().push(key, payload);
         self.bell.ring();
     }
 
     pub(crate) fn pop(&self) -> Option<(Key, Vec<u8>)> {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner).pop()
+        self.waiting().pop()
+    }
+
+    pub(crate) fn meet(&self, members: &[NodeName]) {
+        self.waiting().meet(members.iter().cloned());
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.waiting().len()
     }
 
     pub(crate) fn is_empty(&self) -> bool {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner).messages.is_empty()
+        self.waiting().is_empty()
+    }
+
+    /// The messages that had to go because more had come than may wait, by sender.
+    pub(crate) fn dropped(&self) -> BTreeMap<Owner, u64> {
+        self.waiting().dropped().clone()
+    }
+
+    fn waiting(&self) -> MutexGuard<'_, Mailbox> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use skein_wire::Fleet;
+
     use super::*;
 
     const KEY: &str = "skein/demo/state/uav/1";
@@ -104,7 +93,8 @@ mod tests {
             inbox.push(KEY, 1, || vec![byte]);
         }
         inbox.push("elsewhere", 1, || panic!("the payload of a strange key was read"));
-        assert_eq!((read(&inbox.received), read(&inbox.dropped), read(&inbox.misnamed)), (4, 1, 1));
+        let dropped: u64 = inbox.dropped().values().sum();
+        assert_eq!((read(&inbox.received), dropped, read(&inbox.misnamed)), (4, 1, 1));
         let payloads: Vec<_> = std::iter::from_fn(|| inbox.pop()).map(|(_, payload)| payload).collect();
         assert_eq!(payloads, [vec![1], vec![2]]);
     }
@@ -112,13 +102,30 @@ mod tests {
     #[test]
     fn neither_one_long_message_nor_many_fill_the_memory() {
         let inbox = Inbox::new(1 << 20);
-        inbox.push(KEY, MAX_PAYLOAD + 1, || panic!("a payload that is too long was read"));
+        let longest = skein_wire::Key::to_all::<skein_wire::State>(
+            &Fleet::new("demo").unwrap(),
+            NodeName::new("uav/1").unwrap(),
+        )
+        .most_bytes();
+        inbox.push(KEY, longest + 1, || panic!("a payload that is too long was read"));
         assert_eq!(read(&inbox.oversized), 1);
-        for _ in 0..80 {
-            inbox.push(KEY, MAX_PAYLOAD, || vec![0; MAX_PAYLOAD]);
+        for _ in 0..2000 {
+            inbox.push(KEY, longest, || vec![0; longest]);
         }
         let kept: usize = std::iter::from_fn(|| inbox.pop()).map(|(_, payload)| payload.len()).sum();
-        assert_eq!(kept, MOST_BYTES);
+        assert!((longest..=512 << 10).contains(&kept), "{kept}");
         assert!(inbox.is_empty() && inbox.bell.wait(std::time::Duration::ZERO));
+    }
+
+    #[test]
+    fn a_member_is_heard_whatever_others_send() {
+        let inbox = Inbox::new(4096);
+        inbox.meet(&[NodeName::new("uav/1").unwrap()]);
+        inbox.push(KEY, 1, || vec![7]);
+        for number in 0..30_000 {
+            inbox.push(&format!("skein/demo/state/uav/x{number}"), 1, || vec![0]);
+        }
+        let of_member = std::iter::from_fn(|| inbox.pop()).find(|(key, _)| key.sender().as_str() == "uav/1");
+        assert_eq!(of_member.map(|(_, payload)| payload), Some(vec![7]));
     }
 }

@@ -1,9 +1,10 @@
 //! One node's link over Zenoh.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use skein_wire::{Key, Link};
+use skein_wire::{Key, Link, NodeName, Owner};
 
 use crate::bell::Bell;
 use crate::inbox::Inbox;
@@ -41,14 +42,25 @@ impl ZenohLink {
         self.inbox.bell.clone()
     }
 
+    /// The messages that wait.
+    pub fn waiting(&self) -> usize {
+        self.inbox.len()
+    }
+
     pub fn is_empty(&self) -> bool {
         self.inbox.is_empty()
+    }
+
+    /// The messages dropped because the node did not take them in time, by sender; under no name those of all who are not
+    /// of the roster.
+    pub fn dropped(&self) -> BTreeMap<Owner, u64> {
+        self.inbox.dropped()
     }
 
     pub fn stats(&self) -> ZenohLinkStats {
         ZenohLinkStats {
             received: self.inbox.received.load(Ordering::Relaxed),
-            dropped: self.inbox.dropped.load(Ordering::Relaxed),
+            dropped: self.inbox.dropped().values().sum(),
             misnamed: self.inbox.misnamed.load(Ordering::Relaxed),
             oversized: self.inbox.oversized.load(Ordering::Relaxed),
         }
@@ -56,6 +68,10 @@ impl ZenohLink {
 }
 
 impl Link for ZenohLink {
+    fn meet(&mut self, members: &[NodeName]) {
+        self.inbox.meet(members);
+    }
+
     fn put(&mut self, key: &Key, payload: Vec<u8>) {
         self.session.put(self.port, key, payload);
     }

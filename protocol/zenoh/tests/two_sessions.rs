@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, Program, ProgramConfig};
-use skein_dbp::{Happened, Node, NodeConfig, NodeName};
+use skein_dbp::{Happened, Node, NodeConfig, NodeName, Occurrence};
 use skein_wire::{Fleet, Key, Link, NodeLink, Payload, State};
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohError, ZenohLink, ZenohSession};
 
@@ -186,8 +186,8 @@ fn a_long_message_arrives_whole() {
     let (first, second) = sessions();
     let mut link = first.link(&name("uav/1")).unwrap();
     let mut other = second.link(&name("uav/2")).unwrap();
-    let key = Key::to_all::<State>(&fleet(), name("uav/2"));
-    let long: Vec<u8> = (0..skein_wire::MAX_PAYLOAD).map(|n| n as u8).collect();
+    let key = Key::to_all::<Occurrence>(&fleet(), name("uav/2"));
+    let long: Vec<u8> = (0..key.most_bytes()).map(|n| n as u8).collect();
     let mut heard = None;
     wait_until("it is heard", || {
         other.put(&key, long.clone());

@@ -31,6 +31,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::bid::Bid;
+use crate::bound::Bound;
 use crate::event_set::EventSet;
 use crate::script::filler::Filler;
 use crate::script::op::Op;
@@ -131,6 +133,7 @@ impl ScriptFile {
         let ops = ending_on(ops, &ends_on);
         let bthread =
             Script::new(&ops).map_err(|error: ScriptError| Fault::new("body", error.to_string()))?;
+        check_size(&bthread)?;
         Ok(BoundScript { name: name.to_owned(), about: self.about.clone(), with, bthread })
     }
 
@@ -190,6 +193,19 @@ impl Assignment {
     pub fn bind(&self, me: &str) -> Result<BoundScript, ScriptFileError> {
         self.script.bind(me, self.called.as_deref(), &self.with)
     }
+}
+
+/// Checks that there is not too much in all synchronisation points together, and nothing too deep in any.
+fn check_size(script: &Script) -> Result<(), Fault> {
+    let mut nodes = 0;
+    for set in script.bids().flat_map(|bid: &Bid| [bid.waits(), bid.blocks(), bid.interrupts()]) {
+        let extent = set.extent();
+        nodes += extent.nodes;
+        extent.check().and(Bound::ScriptNodes.check(nodes)).map_err(|exceeded| {
+            Fault::new("body", format!("is too much, with what ends it at each `sync`: {exceeded}"))
+        })?;
+    }
+    Ok(())
 }
 
 fn check_name(field: &str, name: &str) -> Result<(), Fault> {

@@ -4,19 +4,23 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
+use crate::bound::Bound;
 use crate::script::reading::Fault;
 
 /// The most ops that a script may have once each `each` is spelled out.
 pub const MAX_OPS: usize = 400;
+
 /// Puts values in the place of names in braces.
 pub(super) struct Filler {
     names: BTreeMap<String, Value>,
     ops_left: usize,
+    /// Bytes of texts so far.
+    bytes: usize,
 }
 
 impl Filler {
     pub(super) fn new(names: BTreeMap<String, Value>) -> Self {
-        Self { names, ops_left: MAX_OPS }
+        Self { names, ops_left: MAX_OPS, bytes: 0 }
     }
 
     pub(super) fn fill(&mut self, value: &Value, field: &str) -> Result<Value, Fault> {
@@ -90,7 +94,22 @@ impl Filler {
 
     /// A text that is nothing but a name in braces becomes its value, whatever that is; inside a longer text it is
     /// written out.
-    fn fill_text(&self, text: &str, field: &str) -> Result<Value, Fault> {
+    fn fill_text(&mut self, text: &str, field: &str) -> Result<Value, Fault> {
+        let filled = self.filled(text, field)?;
+        self.count(size(&filled), field)?;
+        Ok(filled)
+    }
+
+    /// Notes that the script is so much longer.
+    fn count(&mut self, bytes: usize, field: &str) -> Result<(), Fault> {
+        self.bytes += bytes;
+        Bound::ScriptBytes
+            .check(self.bytes)
+            .map_err(|exceeded| Fault::new(field, format!("makes it too long: {exceeded}")))
+    }
+
+    fn filled(&self, text: &str, field: &str) -> Result<Value, Fault> {
+        let room = Bound::ScriptBytes.most().saturating_sub(self.bytes);
         let mut filled = String::new();
         let mut rest = text;
         while let Some((before, after)) = rest.split_once('{') {
@@ -102,6 +121,10 @@ impl Filler {
                 return Ok(value);
             }
             filled.push_str(before);
+            if filled.len() > room {
+                // Whoever counts it refuses it.
+                break;
+            }
             match value {
                 Value::String(text) => filled.push_str(&text),
                 other => filled.push_str(&other.to_string()),
@@ -128,5 +151,15 @@ impl Filler {
         coordinate.and_then(|index| value.get(index)).filter(|value| value.is_number()).cloned().ok_or_else(
             || Fault::new(field, format!("has `{{{name}.{axis}}}`: expected `.x`, `.y` or `.z` of a point")),
         )
+    }
+}
+
+/// About how many bytes a value is.
+fn size(value: &Value) -> usize {
+    match value {
+        Value::String(text) => text.len(),
+        Value::Array(list) => list.iter().map(size).sum(),
+        Value::Object(object) => object.iter().map(|(key, value)| key.len() + size(value)).sum(),
+        _ => size_of::<f64>(),
     }
 }

@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::samples::samples;
 use super::{Op, Script};
 use crate::bid::Bid;
+use crate::bound::Bound;
 use crate::event::Event;
 use crate::event_set::EventSet;
 use crate::program::{Program, ProgramConfig};
@@ -45,14 +46,21 @@ impl Script {
     /// Events that the script blocks somewhere: for each of its sets some, as far as it distinguishes them.
     pub fn blocked(&self) -> BTreeSet<Event> {
         let blocks: Vec<&EventSet> = self.bids().map(Bid::blocks).collect();
-        samples(&blocks).filter(|event| blocks.iter().any(|set| set.contains(event))).collect()
+        some_of(&blocks)
     }
 
     /// Events that the script waits for or is ended by somewhere: for each of its sets some, as far as it distinguishes
     /// them.
     pub fn listened_to(&self) -> BTreeSet<Event> {
         let hears: Vec<&EventSet> = self.bids().flat_map(|bid| [bid.waits(), bid.interrupts()]).collect();
-        samples(&hears).filter(|event| hears.iter().any(|set| set.contains(event))).collect()
+        some_of(&hears)
+    }
+
+    /// Whether there are more events that it distinguishes than it is tried with.
+    fn distinguishes_more(&self) -> bool {
+        let blocks: Vec<&EventSet> = self.bids().map(Bid::blocks).collect();
+        let hears: Vec<&EventSet> = self.bids().flat_map(|bid| [bid.waits(), bid.interrupts()]).collect();
+        [blocks, hears].iter().any(|sets| samples(sets).nth(Bound::ScriptEvents.most()).is_some())
     }
 
     /// Tries the script in no more than `most_states` states.
@@ -72,7 +80,7 @@ impl Script {
         }
         let graph = Verifier::new(program).timers(Timers::AnyTime).most_states(most_states).graph();
         let paths = Paths::of(&graph);
-        let is_complete = graph.not_covered.is_empty();
+        let is_complete = graph.not_covered.is_empty() && !self.distinguishes_more();
         // What was not looked at might let go.
         for event in held.into_iter().filter(|_| is_complete) {
             if let Some(state) = paths.never_again(&event) {
@@ -85,6 +93,12 @@ impl Script {
         }
         Ok(Trial { states: graph.states.len(), is_complete })
     }
+}
+
+/// Events of the sets, as far as these distinguish them.
+fn some_of(sets: &[&EventSet]) -> BTreeSet<Event> {
+    let some = samples(sets).take(Bound::ScriptEvents.most());
+    some.filter(|event| sets.iter().any(|set| set.contains(event))).collect()
 }
 
 /// The ways through a graph.

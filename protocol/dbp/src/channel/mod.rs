@@ -74,6 +74,11 @@ impl Channel {
         self.streams.get(home).map_or(0, Stream::applied)
     }
 
+    /// The occurrences of `home` that wait behind a hole, and their bytes.
+    pub(crate) fn waiting_of(&self, home: &NodeName) -> (usize, usize) {
+        self.streams.get(home).map_or((0, 0), Stream::waiting)
+    }
+
     /// Whether it is known from where on `home` is heard.
     pub(crate) fn hears_from(&self, home: &NodeName) -> bool {
         self.streams.get(home).is_some_and(Stream::has_begun)
@@ -115,7 +120,9 @@ impl Channel {
         run: &mut Run,
     ) {
         let lease = Duration::from_millis(presence.lease_ms);
-        self.peers.set_lease(&presence.node, lease.clamp(LEAST_LEASE, config.longest_lease));
+        // One that is lost and back all the time would be told to all each time.
+        let least = LEAST_LEASE.max(config.lease / 4);
+        self.peers.set_lease(&presence.node, lease.clamp(least, config.longest_lease));
         // Whoever started within a lease of this node counts as having started with it.
         let from_start = presence.up <= clock.up() + config.lease;
         if let Some(stream) = self.streams.get_mut(&presence.node) {
@@ -146,8 +153,10 @@ impl Channel {
     }
 
     /// Sends again what is missed of `history`.
-    pub(crate) fn repeat(&mut self, repair: &Repair, history: &History) {
-        let again = history.repeat(repair.from_seq, repair.to_seq).cloned();
+    pub(crate) fn repeat(&mut self, now: Duration, repair: &Repair, history: &History) {
+        let peers = &mut self.peers;
+        let may_repeat = |_: &&Occurrence| peers.may_be_repeated_to(now, &repair.requester);
+        let again = history.repeat(repair.from_seq, repair.to_seq).take_while(may_repeat).cloned();
         let recipient = Recipient::Node(repair.requester.clone());
         self.outgoing.extend(again.map(|occurrence| (recipient.clone(), Message::Occurrence(occurrence))));
     }

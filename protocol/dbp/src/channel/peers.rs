@@ -3,6 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use skein_bp::Bound;
+
+use crate::allowance::Allowance;
 use crate::name::NodeName;
 
 /// A peer, as this node knows it.
@@ -16,6 +19,11 @@ pub struct Peer {
     pub lease: Duration,
     /// Whether it counts as alive.
     pub alive: bool,
+    /// The lives that it has begun, beyond those that a process can begin.
+    pub lives_refused: u64,
+    lives: Allowance,
+    /// Occurrences repeated for it.
+    repeats: Allowance,
 }
 
 /// The meaning of a word from a peer.
@@ -41,7 +49,15 @@ pub(crate) struct Peers(BTreeMap<NodeName, Peer>);
 impl Peers {
     /// Nobody has been heard yet; `lease` counts until a peer has told its own.
     pub(crate) fn new(roster: impl IntoIterator<Item = NodeName>, lease: Duration) -> Self {
-        let silent = Peer { incarnation: None, last_word: None, lease, alive: false };
+        let silent = Peer {
+            incarnation: None,
+            last_word: None,
+            lease,
+            alive: false,
+            lives_refused: 0,
+            lives: Allowance::default(),
+            repeats: Allowance::default(),
+        };
         Self(roster.into_iter().map(|name| (name, silent.clone())).collect())
     }
 
@@ -63,6 +79,12 @@ impl Peers {
         if peer.incarnation.is_some_and(|known| incarnation < known) {
             return Word::Fenced;
         }
+        if peer.incarnation != Some(incarnation)
+            && !peer.lives.take(now, Bound::LivesPerSecond, Bound::LivesPerSecond)
+        {
+            peer.lives_refused += 1;
+            return Word::Fenced;
+        }
         let was_alive = std::mem::replace(&mut peer.alive, true);
         peer.last_word = Some(now);
         if peer.incarnation.replace(incarnation) != Some(incarnation) {
@@ -72,6 +94,16 @@ impl Peers {
         } else {
             Word::Back
         }
+    }
+
+    pub(crate) fn lives_refused(&self, node: &NodeName) -> u64 {
+        self.0.get(node).map_or(0, |peer| peer.lives_refused)
+    }
+
+    /// Whether one more occurrence may be repeated for `node`.
+    pub(crate) fn may_be_repeated_to(&mut self, now: Duration, node: &NodeName) -> bool {
+        let peer = self.0.get_mut(node);
+        peer.is_some_and(|peer| peer.repeats.take(now, Bound::RepeatsAtOnce, Bound::RepeatsPerSecond))
     }
 
     /// The life in which `node` was last heard.

@@ -1,12 +1,13 @@
 //! The occurrences of another home, put back in order (G1).
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
+use skein_bp::Bound;
+
 use crate::message::Occurrence;
 
-/// Most occurrences that wait behind a hole; those too far ahead are asked for again later.
-const MOST_PENDING: usize = 1024;
 /// Most holes that are asked for at once.
 const MOST_HOLES: usize = 8;
 /// Most occurrences of one hole that are asked for, and repeated, at once.
@@ -34,6 +35,8 @@ pub(crate) struct Stream {
     latest: u64,
     /// Occurrences ahead of a hole.
     pending: BTreeMap<u64, Occurrence>,
+    /// What they weigh.
+    pending_bytes: usize,
     repair_due: Duration,
 }
 
@@ -41,6 +44,11 @@ impl Stream {
     /// The number up to which this home's occurrences have been given out.
     pub(crate) fn applied(&self) -> u64 {
         self.applied.unwrap_or(0)
+    }
+
+    /// The occurrences that wait behind a hole, and their bytes.
+    pub(crate) fn waiting(&self) -> (usize, usize) {
+        (self.pending.len(), self.pending_bytes)
     }
 
     /// The life of the home that is heard.
@@ -115,10 +123,15 @@ impl Stream {
             return;
         }
         let wanted = self.applied.is_none_or(|applied| seq > applied);
+        let is_next = Some(seq) == self.applied.map(|applied| applied + 1);
+        let has_room = self.pending.len() < Bound::PendingOccurrences.most()
+            && self.pending_bytes < Bound::PendingBytes.most();
         if wanted
-            && (self.pending.len() < MOST_PENDING || Some(seq) == self.applied.map(|applied| applied + 1))
+            && (is_next || has_room)
+            && let Entry::Vacant(vacant) = self.pending.entry(seq)
         {
-            self.pending.entry(seq).or_insert(occurrence);
+            self.pending_bytes += occurrence.weight();
+            vacant.insert(occurrence);
         }
         self.give_out(heard);
     }
@@ -160,6 +173,7 @@ impl Stream {
         let mut applied = self.applied();
         while let Some(first) = self.pending.first_entry().filter(|first| *first.key() < oldest) {
             let (seq, occurrence) = first.remove_entry();
+            self.pending_bytes -= occurrence.weight();
             if seq > applied + 1 {
                 heard.push_back(Heard::Gap { from: applied + 1, to: seq - 1 });
             }
@@ -178,6 +192,7 @@ impl Stream {
         let Some(mut applied) = self.applied else { return };
         while let Some(first) = self.pending.first_entry().filter(|first| *first.key() <= applied + 1) {
             let (seq, occurrence) = first.remove_entry();
+            self.pending_bytes -= occurrence.weight();
             if seq == applied + 1 {
                 heard.push_back(Heard::Occurrence(occurrence));
                 applied = seq;

@@ -77,6 +77,9 @@ impl Guest {
             }
         }
         self.held.retain(&watched);
+        for told in [&mut self.unroutable, &mut self.two_homed] {
+            told.retain(|bthread, _| run.program.bid(bthread).is_some());
+        }
         for (home, outbox) in &mut self.outboxes {
             outbox.state(by_home.remove(home).unwrap_or_default());
         }
@@ -140,7 +143,7 @@ impl Guest {
         let refused = self.outboxes.get_mut(&home).map(|outbox| outbox.acknowledged(now, ack));
         for refusal in refused.into_iter().flatten() {
             let bthread = refusal.bthread.as_str().into();
-            run.fact(Refused { bthread, home: home.clone(), reason: refusal.reason });
+            run.fact_because_of(&home, Refused { bthread, home: home.clone(), reason: refusal.reason });
         }
     }
 

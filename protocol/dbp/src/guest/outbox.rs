@@ -153,7 +153,12 @@ impl Outbox {
             return Vec::new();
         }
         self.acked_epoch = ack.epoch;
-        let before = std::mem::replace(&mut self.refused, ack.refused);
+        let mut refused = ack.refused;
+        // A home has a say about what is asked of it, and nothing else.
+        refused.retain(|refusal| {
+            self.bids.iter().any(|bid| bid.bthread == refusal.bthread && refusal.sync <= bid.sync)
+        });
+        let before = std::mem::replace(&mut self.refused, refused);
         for bid in self.bids.iter().filter(|bid| bid.on_loss == OnLoss::Hold) {
             let Some(statement) = self.blocks.get_mut(&bid.bthread) else { continue };
             if statement.is_refused(&bid.bthread, &self.refused) {

@@ -10,8 +10,9 @@ pub(crate) mod table;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use skein_bp::{Bid, EventSet, Program};
+use skein_bp::{Bid, Bound, EventSet, Program};
 
+use crate::board::shorten_to;
 use crate::clock::Clock;
 use crate::config::NodeConfig;
 use crate::facts::{Denied, PeerLost, Stalled, Unstalled};
@@ -25,6 +26,8 @@ use crate::message::{BidAck, BidRecord};
 use crate::name::NodeName;
 use crate::run::Run;
 
+/// Bytes of the names of b-threads that are told when a node is lost.
+const MOST_NAMES: usize = 4 << 10;
 /// The proxy that keeps `guarded` events back after a start.
 const RESTART_GUARD: &str = "restart guard";
 
@@ -75,9 +78,10 @@ impl Home {
         let past = Past { history: &self.history, term, decisions };
         let TakenIn { proxies, denied } = self.table.take_in(now, record, &past)?;
         run.change_proxies(proxies);
-        for refusal in denied {
-            let bthread = refusal.bthread.as_str().into();
-            run.fact(Denied { node: record.node.clone(), bthread, reason: refusal.reason });
+        for refusal in denied.iter().take(Bound::RecordDenials.most()) {
+            let (node, bthread) = (record.node.clone(), refusal.bthread.as_str().into());
+            let more = (denied.len() > 1).then(|| denied.len() as u64 - 1);
+            run.fact_because_of(&record.node, Denied { node, bthread, reason: refusal.reason, more });
         }
         Some(BidAck {
             home: config.name.clone(),
@@ -93,7 +97,11 @@ impl Home {
 
     /// Tells that a node is lost, and which of its blocks here end or stay.
     pub(crate) fn tell_loss(&self, node: &NodeName, run: &mut Run) {
-        let names = |bthreads: BTreeSet<String>| bthreads.into_iter().collect::<Vec<_>>().join(" ");
+        let names = |bthreads: BTreeSet<String>| {
+            let mut names = bthreads.into_iter().collect::<Vec<_>>().join(" ");
+            shorten_to(&mut names, MOST_NAMES);
+            names
+        };
         let (released, held) = (names(self.table.released_by(node)), names(self.table.held_for(node)));
         let held = (!held.is_empty()).then(|| held.into());
         run.fact(PeerLost { node: node.clone(), released: released.into(), held });
@@ -128,7 +136,13 @@ impl Home {
         }
         for news in self.stalls.update(stalled) {
             match news {
-                StallNews::Stalled { event, by } => run.fact(Stalled { event: event.into(), by: by.into() }),
+                StallNews::Stalled { event, by } => {
+                    let stalled = Stalled { event: event.into(), by: by.as_str().into() };
+                    match self.table.party_name(&by) {
+                        Some(node) => run.fact_because_of(node, stalled),
+                        None => run.fact(stalled),
+                    }
+                }
                 StallNews::Unstalled { event } => run.fact(Unstalled { event: event.into() }),
             }
         }

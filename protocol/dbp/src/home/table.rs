@@ -5,8 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use skein_bp::{Event, EventSet};
+use rustc_hash::FxHashSet;
+use skein_bp::{Bound, Event, EventSet};
 
+use crate::board::{size_of_event, size_of_set};
 use crate::history::History;
 use crate::home::bidder::{Bidder, TakenBid};
 use crate::home::rights::Rights;
@@ -137,6 +139,8 @@ impl BidTable {
             Ordering::Equal => return bidder.live.then(TakenIn::default),
             Ordering::Greater => {}
         }
+        let requested: FxHashSet<&Event> = record.bids.iter().flat_map(|bid| &bid.requests).collect();
+        let since: FxHashSet<&Event> = since.into_iter().filter(|event| requested.contains(*event)).collect();
         let refused_before = std::mem::take(&mut bidder.refused);
         bidder.renew(now, record);
         bidder.released.clear();
@@ -151,7 +155,7 @@ impl BidTable {
             bidder.refuse(bid, reasons);
             let Some(mut honoured) = honoured else { continue };
             // What has occurred since the bidder stated this resumes its b-thread, which asks no more (G4).
-            let resumed = since.iter().any(|event| bid.requests.contains(event));
+            let resumed = bid.requests.iter().any(|event| since.contains(event));
             let over = bidder.has_been_served(bid) || resumed;
             #[cfg(feature = "mutants")]
             let over = over && self.rights.mutant != Some(Mutant::G4);
@@ -171,8 +175,16 @@ impl BidTable {
             // The b-thread's new life takes the block over if it states all of it, and then may withdraw it. What this
             // home honours of the two may differ, when it has become the coordinator between them, or is it no more.
             if !(heir.keep && orphan.asked_block.is_within(&heir.asked_block)) {
-                heir.block = joined(&heir.block, &orphan.block);
-                heir.asked_block = joined(&heir.asked_block, &orphan.asked_block);
+                let block = joined(&heir.block, &orphan.block);
+                let asked_block = joined(&heir.asked_block, &orphan.asked_block);
+                if block.extent().check().and(asked_block.extent().check()).is_ok() {
+                    (heir.block, heir.asked_block) = (block, asked_block);
+                } else {
+                    // Lives that each block something else must not fill the disk.
+                    let reason = RefusalReason::Quota;
+                    bidder.refused.push(Refusal { bthread: bthread.clone(), sync: heir.sync, reason });
+                    (heir.block, heir.asked_block) = (orphan.block.clone(), orphan.asked_block.clone());
+                }
                 heir.keep = true;
                 heir.orphaned = true;
             }
@@ -187,6 +199,20 @@ impl BidTable {
     /// The refusals of the last record of `node`.
     pub(crate) fn refused(&self, node: &NodeName) -> &[Refusal] {
         self.bidders.get(node).map_or(&[], |bidder| &bidder.refused)
+    }
+
+    /// What is kept of `node`: how many entries, and about how many bytes.
+    pub(crate) fn entries_of(&self, node: &NodeName) -> (usize, usize) {
+        let Some(bidder) = self.bidders.get(node) else { return (0, 0) };
+        let Bidder { bids, released, served, refused, lifted, .. } = bidder;
+        let entries = bids.len() + released.len() + served.len() + refused.len() + lifted.len();
+        let names = bids.keys().chain(released).chain(served.keys()).chain(lifted.keys());
+        let names = names.chain(refused.iter().map(|refusal| &refusal.bthread)).map(String::len);
+        let of_bid = |bid: &TakenBid| {
+            let requests: usize = bid.requests.iter().map(size_of_event).sum();
+            size_of::<TakenBid>() + requests + size_of_set(&bid.block) + size_of_set(&bid.asked_block)
+        };
+        (entries, names.chain(bids.values().map(of_bid)).sum())
     }
 
     /// Whether all that `node` blocks here is known: a record that it made for this home's present life has come.
@@ -281,7 +307,7 @@ impl BidTable {
     pub(crate) fn blockers_of(&self, event: &Event) -> impl Iterator<Item = String> {
         self.bidders.iter().flat_map(move |(node, bidder)| {
             let blockers = bidder.bids.iter().filter(move |(_, bid)| bid.block.contains(event));
-            blockers.map(move |(bthread, _)| format!("{node}#{bthread}"))
+            blockers.take(Bound::StallsNoted.most()).map(move |(bthread, _)| format!("{node}#{bthread}"))
         })
     }
 
@@ -290,6 +316,12 @@ impl BidTable {
         let (node, bthread) = proxy.split_once('#')?;
         let bid = self.bidders.get(node)?.bids.get(bthread)?;
         (!bid.block.is_none()).then_some(&bid.asked_block)
+    }
+
+    /// The node of the remote b-thread behind a proxy.
+    pub(super) fn party_name(&self, proxy: &str) -> Option<&NodeName> {
+        let (node, _) = proxy.split_once('#')?;
+        self.bidders.get_key_value(node).map(|(node, _)| node)
     }
 
     /// The remote b-thread behind a proxy.

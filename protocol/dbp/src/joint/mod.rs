@@ -148,7 +148,7 @@ impl Joint {
             run.hear(node, |heard| term.stream.presence(word.decided, 1, true, heard));
         }
         if let Some(term) = astray {
-            run.fact(OutOfStep { node: node.clone(), term });
+            run.fact_because_of(node, OutOfStep { node: node.clone(), term });
         }
         is_followed && word.asks
     }

@@ -46,7 +46,7 @@ impl Term {
         Self {
             leads: roster.coordinator == config.name,
             roster,
-            decisions: History::new(MOST_DECISIONS),
+            decisions: History::whole(MOST_DECISIONS),
             stream,
             words: BTreeMap::new(),
             heard: None,
@@ -118,7 +118,7 @@ impl Term {
             self.mutant != Some(crate::mutant::Mutant::G8) || self.words.contains_key(*member)
         });
         self.leads
-            && self.decisions.latest_seq() < MOST_DECISIONS as u64
+            && !self.decisions.is_full()
             && others.into_iter().all(|member| self.words.get(member).is_some_and(fresh))
     }
 

@@ -116,7 +116,7 @@ impl Node {
             term => self.joint.decisions_of(term),
         };
         let Some(history) = history else { return false };
-        self.channel.repeat(repair, history);
+        self.channel.repeat(self.clock.now(), repair, history);
         if repair.term == 0 && repair.from_seq < history.oldest_seq() {
             // The presence tells what cannot be had any more.
             self.channel.speak_up(self.clock.now());

@@ -24,6 +24,7 @@ impl Node {
     /// Goes on, with every selection made by `select`.
     pub(crate) fn step_by(&mut self, now: Duration, select: &mut Select<'_>) -> Result<(), NodeError> {
         self.clock.set(now);
+        self.run.now = self.clock.now();
         self.let_go_of_the_lapsed();
         let outcome = self.settle(select);
         self.send_what_is_due();
@@ -128,7 +129,7 @@ impl Node {
                 && self.run.sync_of(&request.bthread) == Some(request.sync);
             if ours && !wanted {
                 let (event, bthread) = (event.name().into(), request.bthread.as_str().into());
-                self.run.fact(Orphan { event, bthread, home: home.clone() });
+                self.run.fact_because_of(home, Orphan { event, bthread, home: home.clone() });
             }
         }
         self.stats.heard += 1;

@@ -2,15 +2,17 @@
 
 use std::time::Duration;
 
+use skein_bp::Bound;
 use skein_dbp::{BidAck, NodeName, Refusal, RefusalReason};
 
-use super::field::{Result, node, ns, number, same_variants, text};
+use super::field::{Result, bounded, node, ns, number, same_variants, text};
 use super::record::{Addressee, Kind, Record};
 use crate::decode_error::DecodeError;
 use crate::proto;
 
 impl Record for BidAck {
-    const KIND: Kind = Kind { word: "ack", addressee: Addressee::One, every_node_listens: true };
+    const KIND: Kind =
+        Kind { word: "ack", addressee: Addressee::One, every_node_listens: true, bytes: Bound::BidBytes };
 
     fn sender(&self) -> Option<&NodeName> {
         Some(&self.home)
@@ -40,6 +42,7 @@ impl TryFrom<proto::BidAck> for BidAck {
     type Error = DecodeError;
 
     fn try_from(ack: proto::BidAck) -> Result<Self> {
+        bounded("BidAck.refused", Bound::ListItems, ack.refused.len())?;
         Ok(Self {
             home: node("BidAck.home", &ack.home)?,
             home_incarnation: ack.home_incarnation,
@@ -69,6 +72,7 @@ impl TryFrom<proto::Refusal> for Refusal {
     type Error = DecodeError;
 
     fn try_from(refusal: proto::Refusal) -> Result<Self> {
+        bounded("Refusal.bthread", Bound::NameBytes, refusal.bthread.len())?;
         // A reason of a later version is still a refusal.
         let reason = proto::RefusalReason::try_from(refusal.reason).unwrap_or_default().into();
         Ok(Self { bthread: refusal.bthread, sync: number("Refusal.sync", refusal.sync, 1)?, reason })

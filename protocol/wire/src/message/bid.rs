@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use skein_bp::{Event, EventSet};
+use skein_bp::{Bound, Event, EventSet};
 use skein_dbp::{BidRecord, NodeName, OnLoss, RemoteBid};
 
 use super::field::{Result, node, ns, number, out_of_range, same_variants, text};
@@ -11,7 +11,8 @@ use crate::decode_error::DecodeError;
 use crate::proto;
 
 impl Record for BidRecord {
-    const KIND: Kind = Kind { word: "bid", addressee: Addressee::One, every_node_listens: true };
+    const KIND: Kind =
+        Kind { word: "bid", addressee: Addressee::One, every_node_listens: true, bytes: Bound::BidBytes };
 
     fn sender(&self) -> Option<&NodeName> {
         Some(&self.node)
@@ -44,7 +45,7 @@ impl TryFrom<proto::BidRecord> for BidRecord {
     type Error = DecodeError;
 
     fn try_from(record: proto::BidRecord) -> Result<Self> {
-        Ok(Self {
+        let record = Self {
             node: node("BidRecord.node", &record.node)?,
             incarnation: record.incarnation,
             home: node("BidRecord.home", &record.home)?,
@@ -56,7 +57,9 @@ impl TryFrom<proto::BidRecord> for BidRecord {
             term: number("BidRecord.term", record.term, 0)?,
             decided: number("BidRecord.decided", record.decided, 0)?,
             bids: record.bids.into_iter().map(RemoteBid::try_from).collect::<Result<_>>()?,
-        })
+        };
+        record.check_bounds().map_err(|source| DecodeError::Bound { field: "BidRecord", source })?;
+        Ok(record)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use skein_bp::EventSet;
+use skein_bp::{Bound, EventSet};
 use skein_dbp::{Board, BoardLease, BoardRequest, BoardRow, NodeName};
 
 use super::field::{Result, node, ns, required, text};
@@ -11,7 +11,12 @@ use crate::decode_error::DecodeError;
 use crate::proto;
 
 impl Record for Board {
-    const KIND: Kind = Kind { word: "board", addressee: Addressee::All, every_node_listens: false };
+    const KIND: Kind = Kind {
+        word: "board",
+        addressee: Addressee::All,
+        every_node_listens: false,
+        bytes: Bound::BoardBytes,
+    };
 
     fn sender(&self) -> Option<&NodeName> {
         Some(&self.node)

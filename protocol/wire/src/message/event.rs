@@ -1,8 +1,9 @@
 //! Events and their data, inside of other messages.
 
-use skein_bp::{Event, Value};
+use skein_bp::{Bound, Event, Value};
+use skein_dbp::shortened;
 
-use super::field::{Result, required};
+use super::field::{Result, bounded, required};
 use crate::decode_error::DecodeError;
 use crate::proto::{self, value::Kind};
 
@@ -33,10 +34,17 @@ impl TryFrom<proto::Value> for Value {
 
 impl From<&Event> for proto::Event {
     fn from(event: &Event) -> Self {
-        Self {
-            name: event.name().into(),
-            data: event.data().map(|(key, value)| (key.into(), value.into())).collect(),
-        }
+        // What no other node would take in is cut here: a hole in the stream of events would be for ever.
+        let mut room = Bound::EventBytes.stated() * 3 / 4;
+        let datum = |(key, value): (&str, &Value)| {
+            let value = match value {
+                Value::Text(text) if text.len() > room => Value::from(shortened(text, room)),
+                value => value.clone(),
+            };
+            room = room.saturating_sub(value.as_text().map_or(0, |text| text.len()));
+            (key.into(), (&value).into())
+        };
+        Self { name: event.name().into(), data: event.data().map(datum).collect() }
     }
 }
 
@@ -47,8 +55,12 @@ impl TryFrom<proto::Event> for Event {
         if event.name.is_empty() {
             return Err(DecodeError::Missing { field: "Event.name" });
         }
-        event.data.into_iter().try_fold(Event::new(event.name), |event, (key, value)| {
-            Ok(event.with(key, Value::try_from(value)?))
-        })
+        // Each datum is put in its place among those before.
+        bounded("Event.data", Bound::EventFields, event.data.len())?;
+        let event = event.data.into_iter().try_fold(Event::new(event.name), |event, (key, value)| {
+            Ok::<_, DecodeError>(event.with(key, Value::try_from(value)?))
+        })?;
+        event.check_bounds().map_err(|source| DecodeError::Bound { field: "Event", source })?;
+        Ok(event)
     }
 }

@@ -41,36 +41,41 @@ impl From<&EventSet> for proto::EventSet {
 impl TryFrom<proto::EventSet> for EventSet {
     type Error = DecodeError;
 
-    /// Ends for any input: the decoder has bounded the tree's depth.
     fn try_from(set: proto::EventSet) -> Result<Self> {
-        use event_set::Form;
-        let list =
-            |list: event_set::List| list.sets.into_iter().map(EventSet::try_from).collect::<Result<Vec<_>>>();
-        let corner = |corner: proto::Vec3| [corner.x, corner.y, corner.z].map(Real::from);
-        Ok(match required("EventSet.form", set.form)? {
-            Form::None(_) => Self::None,
-            Form::All(_) => Self::All,
-            Form::Exactly(event) => Self::Exactly(event.try_into()?),
-            Form::Named(pattern) => Self::Named(Pattern::new(pattern)),
-            Form::Name(name) => Self::Named(Pattern::literal(name)),
-            Form::Prefix(prefix) => Self::Prefix(prefix.into()),
-            Form::Range(range) => {
-                Self::FieldRange { key: range.key.into(), min: range.min.into(), max: range.max.into() }
-            }
-            Form::Fields(fields) => Self::FieldIs(
-                fields
-                    .fields
-                    .into_iter()
-                    .map(|(key, value)| Ok((Arc::from(key), Value::try_from(value)?)))
-                    .collect::<Result<BTreeMap<_, _>>>()?,
-            ),
-            Form::Region(region) => Self::Region {
-                min: corner(required("EventSet.region.min", region.min)?),
-                max: corner(required("EventSet.region.max", region.max)?),
-            },
-            Form::Not(set) => Self::Not(Box::new((*set).try_into()?)),
-            Form::And(sets) => Self::And(list(sets)?),
-            Form::Or(sets) => Self::Or(list(sets)?),
-        })
+        let set = read(set)?;
+        set.check_bounds().map_err(|source| DecodeError::Bound { field: "EventSet", source })?;
+        Ok(set)
     }
+}
+
+/// Ends for any input: the decoder has bounded the tree's depth.
+fn read(set: proto::EventSet) -> Result<EventSet> {
+    use event_set::Form;
+    let list = |list: event_set::List| list.sets.into_iter().map(read).collect::<Result<Vec<_>>>();
+    let corner = |corner: proto::Vec3| [corner.x, corner.y, corner.z].map(Real::from);
+    Ok(match required("EventSet.form", set.form)? {
+        Form::None(_) => EventSet::None,
+        Form::All(_) => EventSet::All,
+        Form::Exactly(event) => EventSet::Exactly(event.try_into()?),
+        Form::Named(pattern) => EventSet::Named(Pattern::new(pattern)),
+        Form::Name(name) => EventSet::Named(Pattern::literal(name)),
+        Form::Prefix(prefix) => EventSet::Prefix(prefix.into()),
+        Form::Range(range) => {
+            EventSet::FieldRange { key: range.key.into(), min: range.min.into(), max: range.max.into() }
+        }
+        Form::Fields(fields) => EventSet::FieldIs(
+            fields
+                .fields
+                .into_iter()
+                .map(|(key, value)| Ok((Arc::from(key), Value::try_from(value)?)))
+                .collect::<Result<BTreeMap<_, _>>>()?,
+        ),
+        Form::Region(region) => EventSet::Region {
+            min: corner(required("EventSet.region.min", region.min)?),
+            max: corner(required("EventSet.region.max", region.max)?),
+        },
+        Form::Not(set) => EventSet::Not(Box::new(read(*set)?)),
+        Form::And(sets) => EventSet::And(list(sets)?),
+        Form::Or(sets) => EventSet::Or(list(sets)?),
+    })
 }

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_dbp::NodeName;
+use skein_bp::Bound;
+use skein_dbp::{NodeName, shortened};
 
 use crate::decode_error::DecodeError;
 use crate::proto;
@@ -58,6 +59,30 @@ pub fn vector(field: &'static str, v: &proto::Vec3) -> Result<Vector3<f64>> {
 
 pub fn at_most(field: &'static str, given: usize, most: usize, expected: &'static str) -> Result<()> {
     if given <= most { Ok(()) } else { Err(out_of_range(field, given, expected)) }
+}
+
+/// Lets through so many of something as there may be.
+pub fn bounded(field: &'static str, bound: Bound, given: usize) -> Result<()> {
+    bound.check(given).map_err(|source| DecodeError::Bound { field, source })
+}
+
+/// A place in the world, metres ENU.
+pub fn place(field: &'static str, v: &proto::Vec3) -> Result<Vector3<f64>> {
+    let place = vector(field, v)?;
+    let most = Bound::PlaceMetres.most_real();
+    match place.iter().find(|coordinate| coordinate.abs() > most) {
+        Some(far) => {
+            Err(out_of_range(field, far, "at most 1 000 000 m from the world's origin (bound `place_m`)"))
+        }
+        None => Ok(place),
+    }
+}
+
+/// A text for people, cut where it is too long: what it says beside matters more.
+pub fn words(text: impl Into<String>) -> String {
+    let text = text.into();
+    let most = Bound::TextBytes.most();
+    if text.len() <= most { text } else { shortened(&text, most) }
 }
 
 impl From<[f64; 3]> for proto::Vec3 {

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use skein_bp::Bound;
 use skein_dbp::{JointWord, NodeName, Presence};
 
 use super::field::{Result, node, ns, number, text};
@@ -10,7 +11,12 @@ use crate::decode_error::DecodeError;
 use crate::proto;
 
 impl Record for Presence {
-    const KIND: Kind = Kind { word: "presence", addressee: Addressee::All, every_node_listens: true };
+    const KIND: Kind = Kind {
+        word: "presence",
+        addressee: Addressee::All,
+        every_node_listens: true,
+        bytes: Bound::PresenceBytes,
+    };
 
     fn sender(&self) -> Option<&NodeName> {
         Some(&self.node)

@@ -1,8 +1,11 @@
 //! A vehicle's checks before take-off, on `readiness/<node>`: also of one that does not know yet where it is.
 
+use skein_bp::Bound;
 use skein_dbp::NodeName;
 
-use super::field::{Result, at_most, finite, node, out_of_range, required, same_variants, text, vector};
+use super::field::{
+    Result, at_most, finite, node, out_of_range, place, required, same_variants, text, words,
+};
 use super::record::{Addressee, Kind, Record};
 use crate::decode_error::DecodeError;
 use crate::proto;
@@ -70,7 +73,12 @@ impl CheckState {
 }
 
 impl Record for Readiness {
-    const KIND: Kind = Kind { word: "readiness", addressee: Addressee::All, every_node_listens: true };
+    const KIND: Kind = Kind {
+        word: "readiness",
+        addressee: Addressee::All,
+        every_node_listens: true,
+        bytes: Bound::BoardBytes,
+    };
 
     fn sender(&self) -> Option<&NodeName> {
         Some(&self.node)
@@ -82,10 +90,10 @@ same_variants!(CheckState, proto::CheckState: Waits, Passes, Fails);
 impl From<&Readiness> for proto::Readiness {
     fn from(readiness: &Readiness) -> Self {
         let check = |check: &Check| proto::Check {
-            name: check.name.clone(),
+            name: words(&check.name),
             state: proto::CheckState::from(check.state).into(),
-            value: check.value.clone(),
-            advice: check.advice.clone(),
+            value: words(&check.value),
+            advice: words(&check.advice),
         };
         let [latitude_deg, longitude_deg, height_m] = readiness.datum;
         Self {
@@ -114,14 +122,14 @@ impl TryFrom<proto::Readiness> for Readiness {
         let check = |check: proto::Check| Check {
             // One of a later version does not pass as far as this one can tell.
             state: check.state().into(),
-            name: check.name,
-            value: check.value,
-            advice: check.advice,
+            name: words(check.name),
+            value: words(check.value),
+            advice: words(check.advice),
         };
         Ok(Self {
             node: node("Readiness.node", &readiness.node)?,
             incarnation: readiness.incarnation,
-            home: vector("Readiness.home", &required("Readiness.home", readiness.home)?)?.into(),
+            home: place("Readiness.home", &required("Readiness.home", readiness.home)?)?.into(),
             datum: [
                 within("Readiness.datum", datum.latitude_deg, 90.0)?,
                 within("Readiness.datum", datum.longitude_deg, 180.0)?,

@@ -1,5 +1,6 @@
 //! The heading of a message: the keys that it travels under, and who may say it.
 
+use skein_bp::Bound;
 use skein_dbp::NodeName;
 
 /// A message between nodes.
@@ -23,6 +24,8 @@ pub struct Kind {
     pub addressee: Addressee,
     /// Every node listens to those that are for it or for all. If not, only those listen who ask for them.
     pub every_node_listens: bool,
+    /// The bound on their length.
+    pub bytes: Bound,
 }
 
 /// Whom a kind of message is for.

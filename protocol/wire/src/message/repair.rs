@@ -1,5 +1,6 @@
 //! A wish to hear some occurrences of a home again, on `repair/<from>/<home>`.
 
+use skein_bp::Bound;
 use skein_dbp::{NodeName, Repair};
 
 use super::field::{Result, node, number, text};
@@ -8,7 +9,12 @@ use crate::decode_error::DecodeError;
 use crate::proto;
 
 impl Record for Repair {
-    const KIND: Kind = Kind { word: "repair", addressee: Addressee::One, every_node_listens: true };
+    const KIND: Kind = Kind {
+        word: "repair",
+        addressee: Addressee::One,
+        every_node_listens: true,
+        bytes: Bound::PresenceBytes,
+    };
 
     fn sender(&self) -> Option<&NodeName> {
         Some(&self.requester)

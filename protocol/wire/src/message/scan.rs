@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use skein_bp::Bound;
 use skein_dbp::NodeName;
 
 use super::field::{Result, at_most, finite, not_negative, ns};
@@ -36,7 +37,8 @@ impl Scan {
 }
 
 impl Record for Scan {
-    const KIND: Kind = Kind { word: "scan", addressee: Addressee::One, every_node_listens: false };
+    const KIND: Kind =
+        Kind { word: "scan", addressee: Addressee::One, every_node_listens: false, bytes: Bound::ScanBytes };
 
     /// The key alone names the sensor.
     fn sender(&self) -> Option<&NodeName> {

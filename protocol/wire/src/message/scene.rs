@@ -1,6 +1,7 @@
 //! A world, as a recording and the console show it, on `scene/<node>`.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use skein_bp::Bound;
 use skein_dbp::NodeName;
 
 use super::field::{Result, at_most, not_negative, out_of_range, required, vector};
@@ -48,7 +49,12 @@ impl Scene {
 }
 
 impl Record for Scene {
-    const KIND: Kind = Kind { word: "scene", addressee: Addressee::All, every_node_listens: false };
+    const KIND: Kind = Kind {
+        word: "scene",
+        addressee: Addressee::All,
+        every_node_listens: false,
+        bytes: Bound::SceneBytes,
+    };
 
     /// The key alone names the host of the world.
     fn sender(&self) -> Option<&NodeName> {

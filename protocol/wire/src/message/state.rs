@@ -3,10 +3,12 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
+use skein_bp::Bound;
 use skein_dbp::NodeName;
 
 use super::field::{
-    Result, at_most, finite, node, not_negative, ns, out_of_range, required, same_variants, text, vector,
+    Result, at_most, finite, node, not_negative, ns, out_of_range, place, required, same_variants, text,
+    vector, words,
 };
 use super::record::{Addressee, Kind, Record};
 use crate::decode_error::DecodeError;
@@ -98,8 +100,23 @@ impl State {
     }
 }
 
+impl State {
+    /// Brings radius, position error and speed down to the most that a neighbour is believed; says whether one was
+    /// beyond.
+    pub fn bring_to_what_is_believed(&mut self) -> bool {
+        let before = (self.radius_m, self.position_sigma_m, self.velocity);
+        self.radius_m = self.radius_m.min(Bound::RadiusMetres.most_real());
+        self.position_sigma_m = self.position_sigma_m.min(Bound::SigmaMetres.most_real());
+        // A number near the largest has a length beyond all numbers.
+        let fastest = Bound::SpeedMetresPerSecond.most_real();
+        self.velocity = self.velocity.map(|speed| speed.clamp(-fastest, fastest)).cap_magnitude(fastest);
+        before != (self.radius_m, self.position_sigma_m, self.velocity)
+    }
+}
+
 impl Record for State {
-    const KIND: Kind = Kind { word: "state", addressee: Addressee::All, every_node_listens: true };
+    const KIND: Kind =
+        Kind { word: "state", addressee: Addressee::All, every_node_listens: true, bytes: Bound::StateBytes };
 
     fn sender(&self) -> Option<&NodeName> {
         Some(&self.node)
@@ -119,11 +136,11 @@ impl From<&State> for proto::State {
             yaw_rad: state.yaw_rad,
             position_sigma_m: state.position_sigma_m,
             radius_m: state.radius_m,
-            mode: state.mode.clone(),
+            mode: words(&state.mode),
             armed: state.armed,
             battery: state.battery,
-            task: state.task.clone(),
-            waiting_for: state.waiting_for.clone(),
+            task: words(&state.task),
+            waiting_for: words(&state.waiting_for),
             path: state.path.iter().take(State::MAX_PATH).map(Into::into).collect(),
             mission: proto::Mission::from(state.mission).into(),
             scripts: state.scripts.iter().take(State::MAX_SCRIPTS).cloned().collect(),
@@ -150,20 +167,20 @@ impl TryFrom<proto::State> for State {
             node: node("State.node", &state.node)?,
             incarnation: state.incarnation,
             time: Duration::from_nanos(state.time_ns),
-            position: vector("State.position", &required("State.position", state.position)?)?,
+            position: place("State.position", &required("State.position", state.position)?)?,
             velocity: vector("State.velocity", &required("State.velocity", state.velocity)?)?,
             yaw_rad: finite("State.yaw_rad", state.yaw_rad)?,
             position_sigma_m: not_negative("State.position_sigma_m", state.position_sigma_m)?,
             radius_m: not_negative("State.radius_m", state.radius_m)?,
-            mode: state.mode,
+            mode: words(state.mode),
             armed: state.armed,
             battery: state.battery,
-            task: state.task,
-            waiting_for: state.waiting_for,
+            task: words(state.task),
+            waiting_for: words(state.waiting_for),
             path: state.path.iter().map(|point| vector("State.path", point)).collect::<Result<_>>()?,
             // In a word of a later version, it is not over as far as this one can tell.
             mission: proto::Mission::try_from(state.mission).unwrap_or_default().into(),
-            scripts: state.scripts,
+            scripts: state.scripts.into_iter().map(words).collect(),
             echo: state.echo.map(Echo::try_from).transpose()?,
         })
     }

@@ -17,7 +17,8 @@ use crate::promise::Promise;
 #[derive(Default)]
 pub(super) struct Rights {
     told: BTreeSet<(usize, String, usize)>,
-    noted: BTreeSet<(usize, String, usize)>,
+    /// Of several in one record the home notes one, and how many more there are.
+    noted: BTreeSet<(usize, usize)>,
 }
 
 impl Oracle for Rights {
@@ -33,7 +34,7 @@ impl Oracle for Rights {
                 } else if let Some(denied) = Denied::read(event)
                     && let Some(node) = knowledge.number(denied.node.as_str())
                 {
-                    self.noted.insert((node, denied.bthread.to_string(), step.node));
+                    self.noted.insert((node, step.node));
                 }
             } else if happened.origin == Origin::Internal {
                 let remote = happened.requested_by.iter().filter_map(|name| name.split_once('#'));
@@ -59,7 +60,7 @@ impl Oracle for Rights {
                     let key = (node, bthread.clone(), home);
                     if home != node
                         && (asks || holds)
-                        && !(self.told.contains(&key) && self.noted.contains(&key))
+                        && !(self.told.contains(&key) && self.noted.contains(&(node, home)))
                     {
                         let what =
                             format!("what {bthread} may not bid at {} was not told to both", at_home.name);

@@ -1,0 +1,68 @@
+//! Each sender's share of a node's time.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use skein_bp::Bound;
+use skein_dbp::NodeName;
+
+/// Reading and following a message costs about as much as so many bytes, however short it is.
+const PER_MESSAGE: usize = 512;
+/// A share is for so long.
+const TICK_MS: u128 = 20;
+
+/// What is left of each sender's share.
+#[derive(Debug, Default)]
+pub(crate) struct Shares(BTreeMap<Option<NodeName>, Share>);
+
+#[derive(Clone, Copy, Debug)]
+struct Share {
+    /// Bytes; below zero after a long message.
+    left: i64,
+    /// When it was added to last.
+    at: Duration,
+}
+
+impl Shares {
+    /// Uses the share of a member, or that of all others together, for a message of so many bytes, if any of it is left
+    /// at `now`. A long message uses what is to come.
+    pub(crate) fn take(&mut self, now: Duration, member: Option<&NodeName>, bytes: usize) -> bool {
+        let full = i64::try_from(Bound::TickBytes.most()).unwrap_or(i64::MAX);
+        let member = member.cloned();
+        let share = self.0.entry(member).or_insert(Share { left: full, at: now });
+        let passed_ms = now.saturating_sub(share.at).as_millis();
+        if passed_ms > 0 {
+            let more = i64::try_from(passed_ms.saturating_mul(full as u128) / TICK_MS).unwrap_or(i64::MAX);
+            *share = Share { left: share.left.saturating_add(more).min(full), at: now };
+        }
+        let may = share.left > 0;
+        if may {
+            share.left -= i64::try_from(bytes + PER_MESSAGE).unwrap_or(i64::MAX);
+        }
+        may
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn short_messages_use_a_share_up_and_get_it_back_in_a_tick() {
+        let (mut shares, one) = (Shares::default(), NodeName::new("uav/1").unwrap());
+        let mut taken = |at: Duration| (0..1000).filter(|_| shares.take(at, Some(&one), 0)).count();
+        assert_eq!(taken(MS), 128);
+        assert_eq!((taken(MS), taken(11 * MS), taken(31 * MS)), (0, 64, 128));
+        assert!(shares.take(31 * MS, None, 0), "another's share is its own");
+    }
+
+    #[test]
+    fn a_long_message_is_taken_and_paid_for() {
+        let mut shares = Shares::default();
+        assert!(shares.take(MS, None, 256 << 10));
+        assert!(!shares.take(50 * MS, None, 0));
+        assert!(shares.take(100 * MS, None, 0));
+    }
+}
