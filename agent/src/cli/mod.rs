@@ -50,15 +50,7 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
     let mut known = Behaviours::default();
     add(&mut known);
     skein_zenoh::share_threads();
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
-        .with_target(false)
-        .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env()
-                .unwrap_or_else(|_| "info,zenoh=error".into()),
-        )
-        .init();
+    skein_zenoh::log("info", false);
     let done = match Cli::parse().command {
         Command::Run { config, shadow } => Config::read(&config, &known)
             .and_then(|config| run::run(config, shadow))

@@ -79,7 +79,9 @@ impl Driver {
             Vec::new()
         });
         let fleet = Fleet::new(&config.agent.fleet).context("`fleet`")?;
-        let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
+        let known = config.known();
+        let session =
+            ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network).of(&config.name, known))?;
         let link = session.link(&config.name)?;
         let lidar = config.lidar;
         let scans = lidar.map(|it| LidarScans::open(&fleet, &config.name, it, &session)).transpose()?;

@@ -1,5 +1,6 @@
 //! The program of a ground station: see `skein-ground --help`.
 
+mod certificates;
 mod explain;
 mod recording;
 mod serve;
@@ -40,6 +41,8 @@ enum Command {
         #[arg(long)]
         until_over: bool,
     },
+    /// Make a fleet's authority and the certificates of its nodes, or renew them.
+    Certificates(certificates::Certificates),
     /// Explain why vehicles of a recorded mission moved or stood still: who requested what, who blocked it, and what
     /// would have to change.
     Explain {
@@ -59,18 +62,11 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
     let mut known = Behaviours::default();
     add(&mut known);
     skein_zenoh::share_threads();
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
-        .with_target(false)
-        .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env()
-                .unwrap_or_else(|_| "info,zenoh=error".into()),
-        )
-        .init();
+    skein_zenoh::log("info", false);
     let cli = Cli::parse();
     let outcome = match &cli.command {
         Command::Serve { config, until_over } => serve(config, &known, *until_over, cli.json),
+        Command::Certificates(args) => certificates::run(args, cli.json),
         Command::Explain { file, at, vehicle } => explain::run(file, *at, vehicle.as_deref(), cli.json),
     };
     match outcome {

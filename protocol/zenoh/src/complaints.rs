@@ -7,6 +7,7 @@ use std::time::Duration;
 use skein_wire::{NodeLink, NodeName};
 
 use crate::link::ZenohLink;
+use crate::links;
 
 /// Between two lines.
 const PERIOD: Duration = Duration::from_secs(1);
@@ -27,9 +28,10 @@ impl Complaints {
             return None;
         }
         let (heard, arrived) = (node.stats(), link.stats());
+        let refused = links::take();
         let counts = [heard.undecodable, heard.forged, arrived.oversized, arrived.misnamed, arrived.dropped];
         let versions: BTreeMap<_, _> = node.skewed().map(|(node, version)| (node.clone(), version)).collect();
-        if counts == self.told && versions == self.told_versions {
+        if counts == self.told && versions == self.told_versions && refused.is_empty() {
             return None;
         }
         let mut line = String::new();
@@ -57,6 +59,9 @@ impl Complaints {
                 line,
                 "{node} speaks version {version} of the messages and this node {own}: update one of them. "
             );
+        }
+        for refusal in refused {
+            let _ = write!(line, "{refusal}. ");
         }
         self.told = counts;
         self.told_versions = versions;

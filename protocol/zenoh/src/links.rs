@@ -1,0 +1,190 @@
+//! The links that this process has, or had refused: whose, and why.
+//!
+//! Zenoh says in its log alone why an encrypted link failed, and whose certificate a link has in its events. Both are
+//! turned into one line for each cause here. It is the process's, as its log is.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use skein_wire::NodeName;
+use tracing::field::{Field, Visit};
+use tracing::level_filters::LevelFilter;
+use tracing_subscriber::Layer;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::Context;
+
+use crate::roster::Roster;
+
+/// Of so many causes it is remembered that they have been told; later ones are passed over.
+const MOST_TOLD: usize = 256;
+
+static LINKS: Mutex<Links> = Mutex::new(Links::new());
+
+/// What is known of this process's links.
+struct Links {
+    roster: Option<(NodeName, Roster)>,
+    /// Each link's far end, and whose it is.
+    linked: BTreeMap<String, NodeName>,
+    told: BTreeSet<String>,
+    untold: Vec<String>,
+}
+
+fn links() -> MutexGuard<'static, Links> {
+    LINKS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// This process opens a secured session as `node`.
+pub(crate) fn open(node: &NodeName, roster: &Roster) {
+    links().roster = Some((node.clone(), roster.clone()));
+}
+
+/// A link has come up: `far` is the other end's address, `common_name` that of its certificate.
+pub(crate) fn up(far: &str, common_name: Option<&str>) {
+    let mut links = links();
+    let Some((_, roster)) = &links.roster else { return };
+    match roster.holder(common_name).cloned() {
+        Ok(node) => drop(links.linked.insert(far.into(), node)),
+        Err(why) => links.tell(format!("refused whatever comes from {}: {why}", host(far))),
+    }
+}
+
+/// A link has ended.
+pub(crate) fn down(far: &str) {
+    links().linked.remove(far);
+}
+
+/// What there is to tell since the last call, each once.
+pub fn take() -> Vec<String> {
+    std::mem::take(&mut links().untold)
+}
+
+impl Links {
+    const fn new() -> Self {
+        Self { roster: None, linked: BTreeMap::new(), told: BTreeSet::new(), untold: Vec::new() }
+    }
+
+    fn tell(&mut self, line: String) {
+        if self.told.len() < MOST_TOLD && self.told.insert(line.clone()) {
+            self.untold.push(line);
+        }
+    }
+
+    /// Takes in a line of Zenoh's log.
+    fn overhear(&mut self, line: &str) {
+        if let Some((endpoint, error)) =
+            line.split_once("nable to connect to ").map(|(_, rest)| endpoint(rest))
+        {
+            if let Some(cause) = after(error, "received fatal alert: ") {
+                self.tell(format!("{endpoint} refuses this node's certificate: {}", alert(cause)));
+            } else if let Some(cause) = after(error, "invalid peer certificate: ") {
+                self.tell(format!("refused the link to {endpoint}: {}", fault(cause)));
+            }
+        } else if let Some(cause) = after(line, "invalid peer certificate: ") {
+            let missing = self.missing();
+            self.tell(format!("refused a link: {}; {missing}", fault(cause)));
+        } else if line.contains("peer sent no certificates") {
+            let missing = self.missing();
+            self.tell(format!("refused a link: the other end has no certificate; {missing}"));
+        } else if let Some(cause) = after(line, "received fatal alert: ") {
+            let missing = self.missing();
+            self.tell(format!("somebody refuses this node's certificate: {}; {missing}", alert(cause)));
+        }
+    }
+
+    /// Who could be at the other end of a link that has failed before it could be known.
+    fn missing(&self) -> String {
+        let Some((own, roster)) = &self.roster else { return "nobody is known here".into() };
+        let linked: BTreeSet<&NodeName> = self.linked.values().collect();
+        let members = roster.members().map(|(node, _)| node);
+        let missing: Vec<&str> =
+            members.filter(|node| *node != own && !linked.contains(node)).map(NodeName::as_str).collect();
+        match missing.is_empty() {
+            true => "all members of the roster are linked".into(),
+            false => format!("of the roster, these are not linked: {}", missing.join(", ")),
+        }
+    }
+}
+
+/// An address without its port, which is another each time.
+fn host(far: &str) -> &str {
+    far.rsplit_once(':').map_or(far, |(host, _)| host)
+}
+
+/// The endpoint at the start of the rest of a line, and the error after it.
+fn endpoint(rest: &str) -> (&str, &str) {
+    let rest = rest.strip_prefix("configured peer ").unwrap_or(rest);
+    rest.split_once("! ").unwrap_or((rest, rest))
+}
+
+fn after<'a>(text: &'a str, words: &str) -> Option<&'a str> {
+    text.split_once(words).map(|(_, after)| after)
+}
+
+/// What rustls found wrong with the other end's certificate, in plain words.
+fn fault(cause: &str) -> String {
+    let words = [
+        (&["xpired"][..], "the other end's certificate has expired, or this computer's clock is wrong"),
+        (
+            &["not valid yet", "NotValidYet"],
+            "the other end's certificate is not valid yet, or this computer's clock is wrong",
+        ),
+        (
+            &["UnknownIssuer", "BadSignature", "CaUsedAsEndEntity"],
+            "the other end's certificate is not of this fleet's authority",
+        ),
+        (&["not valid for name", "NotValidForName"], "the other end's certificate is for another host"),
+    ];
+    plain(cause, &words).map_or_else(
+        || format!("the other end's certificate is not sound ({})", first_words(cause)),
+        Into::into,
+    )
+}
+
+/// What the other end found wrong with this node's certificate.
+fn alert(cause: &str) -> String {
+    let words = [
+        (&["CertificateExpired", "expired"][..], "it has expired, or is not valid yet, by the clock there"),
+        (&["UnknownCA", "unknown_ca", "DecryptError"], "it is not of the authority that counts there"),
+        (&["CertificateRequired"], "there is none"),
+    ];
+    plain(cause, &words).map_or_else(|| format!("it is not sound there ({})", first_words(cause)), Into::into)
+}
+
+fn plain(cause: &str, words: &[(&[&str], &'static str)]) -> Option<&'static str> {
+    words.iter().find(|(hints, _)| hints.iter().any(|hint| cause.contains(hint))).map(|(_, plain)| *plain)
+}
+
+/// Without what differs from one time to the next.
+fn first_words(cause: &str) -> &str {
+    cause.split([':', ';', '.', ' ']).next().unwrap_or_default()
+}
+
+/// Listens to Zenoh's log for links that have failed. It belongs to the program's subscriber.
+pub fn overhearing<S: tracing::Subscriber + for<'a> tracing_subscriber::registry::LookupSpan<'a>>()
+-> impl Layer<S> {
+    let targets = Targets::new()
+        .with_target("zenoh_link_tls", LevelFilter::WARN)
+        .with_target("zenoh::net::runtime::orchestrator", LevelFilter::DEBUG);
+    Overhearing.with_filter(targets)
+}
+
+struct Overhearing;
+
+impl<S: tracing::Subscriber> Layer<S> for Overhearing {
+    fn on_event(&self, event: &tracing::Event<'_>, _: Context<'_, S>) {
+        let mut line = Line(String::new());
+        event.record(&mut line);
+        links().overhear(&line.0);
+    }
+}
+
+struct Line(String);
+
+impl Visit for Line {
+    fn record_debug(&mut self, field: &Field, value: &dyn std::fmt::Debug) {
+        if field.name() == "message" {
+            let _ = write!(self.0, "{value:?}");
+        }
+    }
+}
