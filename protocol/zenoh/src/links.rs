@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use skein_wire::NodeName;
+use skein_wire::{Key, NodeName};
 use tracing::field::{Field, Visit};
 use tracing::level_filters::LevelFilter;
 use tracing_subscriber::Layer;
@@ -19,13 +19,17 @@ use crate::roster::Roster;
 /// Of so many causes it is remembered that they have been told; later ones are passed over.
 const MOST_TOLD: usize = 256;
 
+/// Where Zenoh says whom it has kept from doing what, and how.
+const ACCESS: &str = "zenoh::net::routing::interceptor::access_control";
+const DENIED: &str = " is unauthorized to Put (ingress) on ";
+
 static LINKS: Mutex<Links> = Mutex::new(Links::new());
 
 /// What is known of this process's links.
 struct Links {
     roster: Option<(NodeName, Roster)>,
-    /// Each link's far end, and whose it is.
-    linked: BTreeMap<String, NodeName>,
+    /// Each link's far end, with the session's identifier there and whose it is.
+    linked: BTreeMap<String, (String, NodeName)>,
     told: BTreeSet<String>,
     untold: Vec<String>,
 }
@@ -39,12 +43,13 @@ pub(crate) fn open(node: &NodeName, roster: &Roster) {
     links().roster = Some((node.clone(), roster.clone()));
 }
 
-/// A link has come up: `far` is the other end's address, `common_name` that of its certificate.
-pub(crate) fn up(far: &str, common_name: Option<&str>) {
+/// A link has come up: `far` is the other end's address, `session` the identifier of the session there, `common_name`
+/// that of its certificate.
+pub(crate) fn up(far: &str, session: &str, common_name: Option<&str>) {
     let mut links = links();
     let Some((_, roster)) = &links.roster else { return };
     match roster.holder(common_name).cloned() {
-        Ok(node) => drop(links.linked.insert(far.into(), node)),
+        Ok(node) => drop(links.linked.insert(far.into(), (session.into(), node))),
         Err(why) => links.tell(format!("refused whatever comes from {}: {why}", host(far))),
     }
 }
@@ -72,6 +77,10 @@ impl Links {
 
     /// Takes in a line of Zenoh's log.
     fn overhear(&mut self, line: &str) {
+        if let Some((who, key)) = line.split_once(DENIED) {
+            self.overhear_denied(who, key);
+            return;
+        }
         if let Some((endpoint, error)) =
             line.split_once("nable to connect to ").map(|(_, rest)| endpoint(rest))
         {
@@ -92,10 +101,23 @@ impl Links {
         }
     }
 
+    /// A session, `who`, has been kept from putting something under `key`.
+    fn overhear_denied(&mut self, who: &str, key: &str) {
+        let Ok(key) = key.parse::<Key>() else { return };
+        let is_it = |session: &str| who.split_whitespace().any(|word| word == session);
+        let found = self.linked.iter().find(|(_, (session, _))| is_it(session));
+        let Some((far, (_, node))) = found else { return };
+        // What is for itself it has named to listen to it.
+        if key.sender() != node && key.recipient() != Some(node) {
+            let line = format!("{node}, at {}, has tried to speak as {}: refused", host(far), key.sender());
+            self.tell(line);
+        }
+    }
+
     /// Who could be at the other end of a link that has failed before it could be known.
     fn missing(&self) -> String {
         let Some((own, roster)) = &self.roster else { return "nobody is known here".into() };
-        let linked: BTreeSet<&NodeName> = self.linked.values().collect();
+        let linked: BTreeSet<&NodeName> = self.linked.values().map(|(_, node)| node).collect();
         let members = roster.members().map(|(node, _)| node);
         let missing: Vec<&str> =
             members.filter(|node| *node != own && !linked.contains(node)).map(NodeName::as_str).collect();
@@ -165,7 +187,8 @@ pub fn overhearing<S: tracing::Subscriber + for<'a> tracing_subscriber::registry
 -> impl Layer<S> {
     let targets = Targets::new()
         .with_target("zenoh_link_tls", LevelFilter::WARN)
-        .with_target("zenoh::net::runtime::orchestrator", LevelFilter::DEBUG);
+        .with_target("zenoh::net::runtime::orchestrator", LevelFilter::DEBUG)
+        .with_target(ACCESS, LevelFilter::TRACE);
     Overhearing.with_filter(targets)
 }
 

@@ -35,7 +35,9 @@ struct RosterFile {
 pub enum Unlisted {
     #[error("its certificate has no common name: expected `<node>;<serial>`, such as `uav/1;1`")]
     Nameless,
-    #[error("its certificate is that of `{0}`, whom the roster does not name")]
+    #[error(
+        "its certificate is that of `{0}`, whom the roster does not name: name it there if it belongs to the fleet"
+    )]
     Stranger(String),
     #[error("its certificate is `{given}`, and the roster asks for `{expected}`: renew it")]
     Old { given: String, expected: String },

@@ -160,7 +160,9 @@ fn watch_links(session: &zenoh::Session) {
     let noted = |event: zenoh::session::LinkEvent| {
         let far = event.link().dst().address();
         match event.kind() {
-            SampleKind::Put => links::up(far.as_str(), event.link().auth_identifier()),
+            SampleKind::Put => {
+                links::up(far.as_str(), &event.link().zid().to_string(), event.link().auth_identifier());
+            }
             SampleKind::Delete => links::down(far.as_str()),
         }
     };
