@@ -70,7 +70,7 @@ struct Driver {
 
 impl Driver {
     fn open(mut config: Config, is_shadow: bool) -> anyhow::Result<Self> {
-        config.agent.incarnation = next_incarnation(&config.state, &config.name)?;
+        config.agent.incarnation = next_incarnation(&config.state, &config.name, config.agent.incarnation)?;
         let (store, kept) = PromiseStore::open(&config.state, &config.name)?;
         config.agent.kept = kept;
         let (script_store, scripts) = ScriptStore::open(&config.state, &config.name);

@@ -57,7 +57,8 @@ struct Station {
 impl Station {
     fn open(mut config: Config, stopping: &Arc<AtomicBool>) -> anyhow::Result<Self> {
         let recording = Recording::create(&config.record)?;
-        config.station.incarnation = next_incarnation(&config.state, &config.station.name)?;
+        let station = &mut config.station;
+        station.incarnation = next_incarnation(&config.state, &station.name, station.incarnation)?;
         let (store, kept) = PromiseStore::open(&config.state, &config.station.name)?;
         config.station.kept = kept;
         let fleet = config.station.fleet.clone();

@@ -16,6 +16,7 @@ const PERIOD: Duration = Duration::from_secs(1);
 #[derive(Debug, Default)]
 pub struct Complaints {
     told: [u64; 5],
+    told_life: Option<u64>,
     told_versions: BTreeMap<NodeName, u32>,
     due: Duration,
 }
@@ -29,9 +30,14 @@ impl Complaints {
         }
         let (heard, arrived) = (node.stats(), link.stats());
         let refused = links::take();
+        let outlived = node.node().outlived();
         let counts = [heard.undecodable, heard.forged, arrived.oversized, arrived.misnamed, arrived.dropped];
         let versions: BTreeMap<_, _> = node.skewed().map(|(node, version)| (node.clone(), version)).collect();
-        if counts == self.told && versions == self.told_versions && refused.is_empty() {
+        if counts == self.told
+            && versions == self.told_versions
+            && refused.is_empty()
+            && outlived.map(|(_, life)| life) == self.told_life
+        {
             return None;
         }
         let mut line = String::new();
@@ -59,6 +65,15 @@ impl Complaints {
                 line,
                 "{node} speaks version {version} of the messages and this node {own}: update one of them. "
             );
+        }
+        if let Some((peer, life)) = outlived.filter(|(_, life)| self.told_life != Some(*life)) {
+            let (name, own, next) = (node.node().name(), node.node().incarnation(), life.saturating_add(1));
+            let _ = write!(
+                line,
+                "{peer} has heard {name} in life {life}, and hears nothing of this one, life {own}: `state` is not the \
+                 folder it was. If no other process has this name, start again with `--incarnation {next}`. "
+            );
+            self.told_life = Some(life);
         }
         for refusal in refused {
             let _ = write!(line, "{refusal}. ");

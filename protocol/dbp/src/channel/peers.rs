@@ -5,6 +5,10 @@ use std::time::Duration;
 
 use crate::name::NodeName;
 
+/// A life so many after the last one that is known is none: a node's lives are counted one by one, and one false word
+/// must not silence it for ever.
+pub(crate) const MOST_LIVES_AHEAD: u64 = 1 << 32;
+
 /// A peer, as this node knows it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Peer {
@@ -60,7 +64,8 @@ impl Peers {
     /// Notes a word from `node` in its life `incarnation`.
     pub(crate) fn hear(&mut self, now: Duration, node: &NodeName, incarnation: u64) -> Word {
         let Some(peer) = self.0.get_mut(node) else { return Word::Fenced };
-        if peer.incarnation.is_some_and(|known| incarnation < known) {
+        let known = peer.incarnation.unwrap_or(0);
+        if incarnation < known || incarnation - known > MOST_LIVES_AHEAD {
             return Word::Fenced;
         }
         let was_alive = std::mem::replace(&mut peer.alive, true);
