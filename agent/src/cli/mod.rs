@@ -39,7 +39,7 @@ enum Command {
         #[arg(long)]
         shadow: bool,
         /// Least number of this life, for a vehicle that has lost the folder where its lives are counted: others say it.
-        #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=1 << 32))]
+        #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=1 << 48))]
         incarnation: u64,
     },
     /// Tell every check before take-off, with its value and what to do. Arms nothing; for a vehicle on the ground.

@@ -41,7 +41,7 @@ enum Command {
         #[arg(long)]
         until_over: bool,
         /// Least number of this life, for a station that has lost the folder where its lives are counted: others say it.
-        #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=1 << 32))]
+        #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=1 << 48))]
         incarnation: u64,
     },
     /// Make a fleet's authority and the certificates of its nodes, or renew them.

@@ -29,6 +29,10 @@ impl Complaints {
             return None;
         }
         let (heard, arrived) = (node.stats(), link.stats());
+        links::note_silent(|name| {
+            let mut peers = node.node().peers();
+            peers.find(|(peer, _)| *peer == name).map(|(_, peer)| peer.age(now))
+        });
         let refused = links::take();
         let outlived = node.node().outlived();
         let counts = [heard.undecodable, heard.forged, arrived.oversized, arrived.misnamed, arrived.dropped];

@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use skein_wire::{Key, NodeName};
 use tracing::field::{Field, Visit};
@@ -16,6 +17,8 @@ use tracing_subscriber::layer::Context;
 
 use crate::roster::Roster;
 
+/// A member that is linked and has not been heard for so long is told of.
+const PATIENCE: Duration = Duration::from_secs(5);
 /// Of so many causes it is remembered that they have been told; later ones are passed over.
 const MOST_TOLD: usize = 256;
 
@@ -28,10 +31,18 @@ static LINKS: Mutex<Links> = Mutex::new(Links::new());
 /// What is known of this process's links.
 struct Links {
     roster: Option<(NodeName, Roster)>,
-    /// Each link's far end, with the session's identifier there and whose it is.
-    linked: BTreeMap<String, (String, NodeName)>,
+    /// The links, each by the address of its far end.
+    linked: BTreeMap<String, Link>,
     told: BTreeSet<String>,
     untold: Vec<String>,
+}
+
+/// A link to a member.
+struct Link {
+    /// The identifier of the session there.
+    session: String,
+    node: NodeName,
+    since: Instant,
 }
 
 fn links() -> MutexGuard<'static, Links> {
@@ -49,7 +60,10 @@ pub(crate) fn up(far: &str, session: &str, common_name: Option<&str>) {
     let mut links = links();
     let Some((_, roster)) = &links.roster else { return };
     match roster.holder(common_name).cloned() {
-        Ok(node) => drop(links.linked.insert(far.into(), (session.into(), node))),
+        Ok(node) => {
+            let link = Link { session: session.into(), node, since: Instant::now() };
+            links.linked.insert(far.into(), link);
+        }
         Err(why) => links.tell(format!("refused whatever comes from {}: {why}", host(far))),
     }
 }
@@ -57,6 +71,23 @@ pub(crate) fn up(far: &str, session: &str, common_name: Option<&str>) {
 /// A link has ended.
 pub(crate) fn down(far: &str) {
     links().linked.remove(far);
+}
+
+/// Tells of those members who are linked, and of whom nothing has been heard since: `heard` gives how long ago that
+/// was, and none for one of whom nothing is to be heard.
+pub(crate) fn note_silent(heard: impl Fn(&NodeName) -> Option<Option<Duration>>) {
+    let mut links = links();
+    let is_silent = |link: &Link| {
+        let up = link.since.elapsed();
+        up >= PATIENCE && heard(&link.node).is_some_and(|age| age.is_none_or(|age| age > up))
+    };
+    let silent: BTreeSet<NodeName> =
+        links.linked.values().filter(|link| is_silent(link)).map(|link| link.node.clone()).collect();
+    for node in silent {
+        links.tell(format!(
+            "{node} is linked and says nothing here: it may not take this node's certificate, and its log says why"
+        ));
+    }
 }
 
 /// What there is to tell since the last call, each once.
@@ -105,8 +136,8 @@ impl Links {
     fn overhear_denied(&mut self, who: &str, key: &str) {
         let Ok(key) = key.parse::<Key>() else { return };
         let is_it = |session: &str| who.split_whitespace().any(|word| word == session);
-        let found = self.linked.iter().find(|(_, (session, _))| is_it(session));
-        let Some((far, (_, node))) = found else { return };
+        let found = self.linked.iter().find(|(_, link)| is_it(&link.session));
+        let Some((far, Link { node, .. })) = found else { return };
         // What is for itself it has named to listen to it.
         if key.sender() != node && key.recipient() != Some(node) {
             let line = format!("{node}, at {}, has tried to speak as {}: refused", host(far), key.sender());
@@ -117,7 +148,7 @@ impl Links {
     /// Who could be at the other end of a link that has failed before it could be known.
     fn missing(&self) -> String {
         let Some((own, roster)) = &self.roster else { return "nobody is known here".into() };
-        let linked: BTreeSet<&NodeName> = self.linked.values().map(|(_, node)| node).collect();
+        let linked: BTreeSet<&NodeName> = self.linked.values().map(|link| &link.node).collect();
         let members = roster.members().map(|(node, _)| node);
         let missing: Vec<&str> =
             members.filter(|node| *node != own && !linked.contains(node)).map(NodeName::as_str).collect();

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use crate::name::NodeName;
 
-/// A life so many after the last one that is known is none: a node's lives are counted one by one, and one false word
-/// must not silence it for ever.
-pub(crate) const MOST_LIVES_AHEAD: u64 = 1 << 32;
+/// A life so many after the last one that is known is none: lives are counted one by one, or begin with the time since
+/// 1970 in milliseconds, and one false word must not silence it for ever.
+pub(crate) const MOST_LIVES_AHEAD: u64 = 1 << 48;
 
 /// A peer, as this node knows it.
 #[derive(Clone, Debug, PartialEq, Eq)]
