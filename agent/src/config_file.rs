@@ -168,6 +168,12 @@ impl Config {
         Self::parse(&text, folder, known).with_context(|| path.display().to_string())
     }
 
+    /// The nodes that this one knows of: those of its roster, and its lidar's.
+    pub fn known(&self) -> Vec<NodeName> {
+        let roster = self.agent.roster.iter().filter_map(|node| NodeName::new(node).ok());
+        roster.chain(self.lidar.iter().map(|(sensor, _)| sensor.clone())).collect()
+    }
+
     /// The configuration that `agent/agent.toml` shows.
     pub fn example() -> anyhow::Result<Self> {
         Self::parse(EXAMPLE, Path::new(""), &Behaviours::default()).context("agent/agent.toml")

@@ -33,6 +33,7 @@ import re
 import sys
 import time
 import tomllib
+from pathlib import Path
 
 try:
     import zenoh
@@ -89,7 +90,7 @@ class Unreachable(Exception):
 class Swarm:
     """This script's place in a fleet: hears what others say on some topics, and speaks under the name of `NODE`."""
 
-    def __init__(self, fleet, connect, topics):
+    def __init__(self, fleet, connect, topics, certificates=None):
         self.root = f"skein/{fleet}"
         self.incarnation = time.time_ns() // 1_000_000
         self._began = time.monotonic()
@@ -98,13 +99,22 @@ class Swarm:
             "mode": "peer",
             "scouting/multicast/enabled": False,
             "scouting/delay": 0,
-            "listen/endpoints": ["tcp/127.0.0.1:0"],
-            "connect/endpoints": [connect],
+            "listen/endpoints": [],
+            "connect/endpoints": connect.split(","),
             # Whoever is not there yet is tried again.
             "connect/timeout_ms": -1,
             "connect/exit_on_failure": False,
             "connect/retry": {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5},
         }
+        if certificates:
+            own = str(Path(certificates) / NODE.replace("/", "-"))
+            settings |= {
+                "transport/link/protocols": ["tls"],
+                "transport/link/tls/root_ca_certificate": str(Path(certificates) / "authority.pem"),
+                "transport/link/tls/connect_certificate": f"{own}.pem",
+                "transport/link/tls/connect_private_key": f"{own}.key",
+                "transport/link/tls/enable_mtls": True,
+            }
         config = zenoh.Config()
         for key, value in settings.items():
             config.insert_json5(key, json.dumps(value))
@@ -253,7 +263,7 @@ def ordered(nodes):
 def list_vehicles(options, output, interrupted):
     """`list`: every vehicle that is heard within a second of the first."""
     states = {}
-    with Swarm(options.fleet, options.connect, ["state/*/*"]) as swarm:
+    with Swarm(options.fleet, options.connect, ["state/*/*"], options.certificates) as swarm:
         end_s = PATIENCE_S
         while swarm.now_s() < end_s and not interrupted:
             heard = swarm.hear(TICK_S)
@@ -288,7 +298,7 @@ def list_vehicles(options, output, interrupted):
 
 def watch(options, output, interrupted):
     """`watch`: occurrences as they come."""
-    with Swarm(options.fleet, options.connect, ["occ/*/*"]) as swarm:
+    with Swarm(options.fleet, options.connect, ["occ/*/*"], options.certificates) as swarm:
         while not interrupted:
             heard = swarm.hear(TICK_S)
             if not heard or not isinstance(heard[1], wire.Occurrence):
@@ -320,7 +330,8 @@ def hold(options, output, interrupted):
     wanted = named(options)
     outboxes, said, faults = {}, {}, set()
 
-    with Swarm(options.fleet, options.connect, ["state/*/*", "presence/*/*", f"ack/*/*/{NODE}"]) as swarm:
+    topics = ["state/*/*", "presence/*/*", f"ack/*/*/{NODE}"]
+    with Swarm(options.fleet, options.connect, topics, options.certificates) as swarm:
 
         def ask(node):
             outboxes[node] = Outbox(swarm, node)
@@ -397,7 +408,8 @@ def order(options, output, interrupted):
     verb, data = (ORDER, {"what": what}) if what not in (LOAD, UNLOAD) else (what, script_data(options))
     outboxes, taken, unwilling = {}, set(), {}
 
-    with Swarm(options.fleet, options.connect, ["state/*/*", "occ/*/*", f"occ/*/*/{NODE}", f"ack/*/*/{NODE}"]) as swarm:
+    topics = ["state/*/*", "occ/*/*", f"occ/*/*/{NODE}", f"ack/*/*/{NODE}"]
+    with Swarm(options.fleet, options.connect, topics, options.certificates) as swarm:
 
         def ask(node):
             outboxes[node] = Outbox(swarm, node)
@@ -532,17 +544,24 @@ def fleet_name(text):
     return text
 
 
-def endpoint(text):
+def endpoints(text):
     """Without certificates only this computer is spoken to, as everywhere in Skein."""
-    parts = re.fullmatch(r"tcp/(\[[0-9a-f:]+\]|[^:/\[\]]+):(\d{1,5})", text)
-    if parts and 0 < int(parts[2]) < 65536:
-        host = parts[1].strip("[]")
+    return ",".join(endpoint(part) for part in text.split(","))
+
+
+def endpoint(text):
+    parts = re.fullmatch(r"(tcp|tls)/(\[[0-9a-f:]+\]|[^:/\[\]]+):(\d{1,5})", text)
+    if parts and 0 < int(parts[3]) < 65536:
+        if parts[1] == "tls":
+            return text
+        host = parts[2].strip("[]")
         try:
             if host == "localhost" or ipaddress.ip_address(host).is_loopback:
                 return text
         except ValueError:
             pass
-    raise argparse.ArgumentTypeError(f"{text!r}: expected a TCP port of this computer, such as tcp/127.0.0.1:7447")
+    raise argparse.ArgumentTypeError(f"{text!r}: expected a TCP port of this computer, such as tcp/127.0.0.1:7447, "
+                                     "or, with --certificates, tls/ADDRESS:PORT")
 
 
 def duration(text):
@@ -581,10 +600,11 @@ def read_arguments(arguments):
         options.add_argument("--fleet", type=fleet_name, help="the fleet's name (default: sim)")
         options.add_argument(
             "--connect",
-            type=endpoint,
-            metavar="ENDPOINT",
-            help="where a node of the fleet listens (default: tcp/127.0.0.1:7447)",
+            type=endpoints,
+            metavar="ENDPOINT,...",
+            help="where nodes of the fleet listen: one that relays, or all (default: tcp/127.0.0.1:7447)",
         )
+        options.add_argument("--certificates", metavar="DIR", help="folder of authority, certificate and key, for tls/")
         options.add_argument("--json", action="store_true", help="one JSON object a line on standard output")
         options.set_defaults(**defaults)
         return options
@@ -595,7 +615,7 @@ def read_arguments(arguments):
         description=about,
         epilog=rest,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        parents=[common(fleet="sim", connect="tcp/127.0.0.1:7447", json=False)],
+        parents=[common(fleet="sim", connect="tcp/127.0.0.1:7447", certificates=None, json=False)],
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 

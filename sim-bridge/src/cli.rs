@@ -102,6 +102,9 @@ pub struct Fly {
     /// Topology of the processes' network.
     #[arg(long, value_enum, default_value_t = Network::Peer, requires = "processes")]
     pub network: Network,
+    /// Make certificates for the processes, which then talk over TLS, each as itself alone.
+    #[arg(long, requires = "processes")]
+    pub secure: bool,
     /// Agent to run in place of `skein-agent`: one with your behaviours.
     #[arg(long, value_name = "PATH", requires = "processes")]
     pub agent: Option<PathBuf>,
@@ -139,6 +142,9 @@ pub struct Setup {
     /// Let the swarm take off when an operator orders it, not as soon as it is ready.
     #[arg(long)]
     pub launch_on_order: bool,
+    /// Make certificates, and let every node say and hear what is its own alone, over TLS.
+    #[arg(long)]
+    pub secure: bool,
     /// Offset of all network ports, to run beside another swarm on this computer.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port_offset: u16,

@@ -5,6 +5,8 @@
 use std::fmt::Write as _;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use std::time::SystemTime;
 
 use anyhow::Context as _;
 use serde::Serialize;
@@ -15,11 +17,11 @@ use skein_agent::config_file::{AgentFile, EXAMPLE as AGENT_EXAMPLE, ScriptEntry}
 use skein_bp::behaviour::Behaviours;
 use skein_ground::GroundConfig;
 use skein_ground::config_file::{EXAMPLE as GROUND_EXAMPLE, GroundFile};
-use skein_wire::Fleet;
-use skein_zenoh::{Mode, NetworkSettings};
+use skein_wire::{Fleet, NodeName};
+use skein_zenoh::{Authority, Holder, Mode, NetworkSettings, Security, ZenohConfig};
 
 use crate::cli::{self, Network, Setup};
-use crate::fly::{FLEET, agent_configs, ground_config};
+use crate::fly::{FLEET, GROUND, agent_configs, ground_config, node_name, vehicle_name};
 use crate::mavlink_ports::COMPANION;
 use crate::scenario::Scenario;
 use crate::world_host::{WORLD, WorldConfig};
@@ -29,6 +31,14 @@ const WORLD_PORT: u16 = 7446;
 const GROUND_PORT: u16 = 7447;
 const FIRST_VEHICLE_PORT: u16 = 7450;
 const CONSOLE_PORT: u16 = 8700;
+
+/// The folder of certificates, beside the files.
+const CERTIFICATES: &str = "certificates";
+/// Days for which certificates of a simulated fleet are valid.
+const DAYS: u32 = 365;
+
+/// The name of a `zenohd`, which relays.
+static ZENOHD: LazyLock<NodeName> = LazyLock::new(|| node_name("router", "zenohd"));
 
 const WORLD_EXAMPLE: &str = include_str!("../world.toml");
 
@@ -50,6 +60,8 @@ pub struct Files {
     pub ground: PathBuf,
     /// For `skein-agent run`, in the order of the vehicles.
     pub agents: Vec<PathBuf>,
+    /// For `zenohd`, where there is one that is to know its members.
+    pub zenohd: Option<PathBuf>,
 }
 
 /// Writes the files, and says how to start the swarm.
@@ -69,7 +81,10 @@ fn instructions(args: &cli::Configure, files: &Files) -> String {
     let cli::Configure { world: cli::WorldArgs { scenario, overrides, seed }, setup, autopilots, .. } = args;
     if setup.network == Network::Zenohd {
         let port = router_port(setup.port_offset);
-        let _ = writeln!(text, "  zenohd --listen tcp/127.0.0.1:{port} --no-multicast-scouting");
+        let _ = match &files.zenohd {
+            Some(file) => writeln!(text, "  zenohd --config {}", file.display()),
+            None => writeln!(text, "  zenohd --listen tcp/127.0.0.1:{port} --no-multicast-scouting"),
+        };
     }
     let mut world = format!("  skein-sim serve {scenario} --seed {seed}");
     if let Some(vehicles) = overrides.vehicles {
@@ -105,6 +120,8 @@ pub fn write(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result
         launch_on_order: setup.launch_on_order,
         ..ground_config(scenario, Fleet::new(FLEET)?, cli::Controller::Bp)
     };
+    let zenohd = if setup.secure { setup.certify(scenario, &ground, folder)? } else { None };
+    let zenohd = zenohd.map(|text| save("zenohd.json5", text)).transpose()?;
     let world = save("world.toml", filled_in(WORLD_EXAMPLE, &setup.world())?)?;
     let ground = save("ground.toml", filled_in(GROUND_EXAMPLE, &setup.ground(&ground))?)?;
     let agents = agent_configs(scenario);
@@ -120,16 +137,47 @@ pub fn write(scenario: &Scenario, folder: &Path, setup: Setup) -> anyhow::Result
         }
         save(&format!("{stem}.toml"), filled_in(AGENT_EXAMPLE, &config)?)
     });
-    Ok(Files { world, ground, agents: agents.collect::<anyhow::Result<_>>()? })
+    Ok(Files { world, ground, agents: agents.collect::<anyhow::Result<_>>()?, zenohd })
 }
 
 impl Setup {
     fn endpoint(&self, port: u16) -> String {
-        format!("tcp/127.0.0.1:{}", port + self.port_offset)
+        let protocol = if self.secure { "tls" } else { "tcp" };
+        format!("{protocol}/127.0.0.1:{}", port + self.port_offset)
     }
 
-    /// The network settings of a node that listens on `port`, and connects to those before it.
-    fn join(&self, port: u16, before: impl IntoIterator<Item = u16>) -> NetworkSettings {
+    /// Makes the certificates of all members, and gives the text of the file of the router that is none of them.
+    fn certify(
+        &self,
+        scenario: &Scenario,
+        ground: &GroundConfig,
+        folder: &Path,
+    ) -> anyhow::Result<Option<String>> {
+        let folder = folder.canonicalize().context(folder.display().to_string())?.join(CERTIFICATES);
+        let now = SystemTime::now();
+        let mut authority = Authority::open(&folder, FLEET, now)?;
+        let agents = agent_configs(scenario).into_iter().map(|agent| NodeName::new(&agent.node));
+        let others = ground.operators.iter().cloned().map(Ok).chain([NodeName::new(WORLD)]);
+        let members = agents.chain(others).map(|node| Ok(Holder::here(node?)));
+        let mut members = members.collect::<anyhow::Result<Vec<_>>>()?;
+        let relays = self.network == Network::Router;
+        members.push(Holder { relays, ..Holder::here(GROUND.clone()) });
+        if self.network == Network::Zenohd {
+            members.push(Holder { relays: true, ..Holder::here(ZENOHD.clone()) });
+        }
+        authority.issue(&members, DAYS, false, now)?;
+        let router = NetworkSettings {
+            mode: Mode::Router,
+            listen: vec![self.endpoint(GROUND_PORT)],
+            connect: vec![],
+            security: Some(authority.security(&ZENOHD)),
+        };
+        let zenohd = ZenohConfig::new(Fleet::new(FLEET)?, router).of(&ZENOHD, []);
+        Ok((self.network == Network::Zenohd).then(|| zenohd.to_file()).transpose()?)
+    }
+
+    /// The network settings of `node`, which listens on `port` and connects to those before it.
+    fn join(&self, node: &NodeName, port: u16, before: impl IntoIterator<Item = u16>) -> NetworkSettings {
         let router = vec![self.endpoint(GROUND_PORT)];
         let (mode, listen, connect) = match self.network {
             Network::Peer => {
@@ -139,15 +187,19 @@ impl Setup {
             Network::Router if port == GROUND_PORT => (Mode::Router, router, vec![]),
             Network::Router | Network::Zenohd => (Mode::Client, vec![], router),
         };
-        NetworkSettings { mode, listen, connect, security: None }
+        let security = self.secure.then(|| Security::in_folder(Path::new(CERTIFICATES), node));
+        NetworkSettings { mode, listen, connect, security }
     }
 
     fn world(&self) -> WorldConfig {
-        WorldConfig { network: self.join(WORLD_PORT, []), ..WorldConfig::default() }
+        WorldConfig {
+            network: self.join(&node_name("sim", "world"), WORLD_PORT, []),
+            ..WorldConfig::default()
+        }
     }
 
     fn ground(&self, station: &GroundConfig) -> GroundFile {
-        let network = self.join(GROUND_PORT, [WORLD_PORT]);
+        let network = self.join(&GROUND, GROUND_PORT, [WORLD_PORT]);
         let mut file = GroundFile::of(station, console(self.port_offset), network);
         file.record = ".".into();
         file
@@ -155,8 +207,11 @@ impl Setup {
 
     fn agent(&self, index: u16, agent: &AgentConfig) -> AgentFile {
         let vehicles = (0..index).map(|index| FIRST_VEHICLE_PORT + index);
-        let network =
-            self.join(FIRST_VEHICLE_PORT + index, [WORLD_PORT, GROUND_PORT].into_iter().chain(vehicles));
+        let network = self.join(
+            &vehicle_name(index.into()),
+            FIRST_VEHICLE_PORT + index,
+            [WORLD_PORT, GROUND_PORT].into_iter().chain(vehicles),
+        );
         let companion = (Ipv4Addr::LOCALHOST, COMPANION.1 + index + self.port_offset).into();
         AgentFile::of(agent, Address::UdpIn(companion), WORLD, network)
     }
@@ -212,7 +267,7 @@ mod tests {
         let station = ground_config(&scenario, Fleet::new(FLEET).unwrap(), cli::Controller::Bp);
         let station = GroundConfig { muster: true, ..station };
         for network in [Network::Peer, Network::Router, Network::Zenohd] {
-            let setup = Setup { network, port_offset: 100, launch_on_order: false };
+            let setup = Setup { network, port_offset: 100, launch_on_order: false, secure: false };
             let agent: toml::Table =
                 filled_in(AGENT_EXAMPLE, &setup.agent(1, &agents[1])).unwrap().parse().unwrap();
             assert_eq!(agent["mission"]["waypoints"].as_array().unwrap().len(), agents[1].waypoints.len());

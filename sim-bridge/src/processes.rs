@@ -83,7 +83,9 @@ impl Processes {
         let logs = folder.join("logs");
         std::fs::create_dir_all(&logs).with_context(|| format!("{}: cannot be made", logs.display()))?;
         let router = match network {
-            Network::Zenohd => Some(start_zenohd(&logs, configure::router_port(port_offset))?),
+            Network::Zenohd => {
+                Some(start_zenohd(&logs, configure::router_port(port_offset), files.zenohd.as_deref())?)
+            }
             Network::Peer | Network::Router => None,
         };
         let config = WorldConfig::read(&files.world)?;
@@ -129,11 +131,8 @@ impl Processes {
         // With a place of its own to listen: only its name is that of the other.
         let config = self.config_of(node)?;
         let text = std::fs::read_to_string(config)?;
-        let listens = |line: &&str| line.starts_with("listen = ");
-        let own =
-            text.lines().map(|line| if listens(&line) { "listen = [\"tcp/127.0.0.1:0\"]" } else { line });
         let double = config.with_extension("double.toml");
-        std::fs::write(&double, own.collect::<Vec<_>>().join("\n"))?;
+        std::fs::write(&double, elsewhere(&text))?;
         let mut command = self.program_of(node)?;
         command.arg("--config").arg(double);
         Ok(Double { child: spawn(command, &log)?, log })
@@ -282,9 +281,27 @@ fn spawn(mut command: Command, log: &Path) -> anyhow::Result<Child> {
     command.spawn().with_context(|| format!("{} cannot be started", program.display()))
 }
 
-fn start_zenohd(logs: &Path, port: u16) -> anyhow::Result<Child> {
+/// The configuration of a node, but that it listens elsewhere, and connects to the place where the node listens.
+fn elsewhere(config: &str) -> String {
+    let place =
+        config.lines().find_map(|line| line.strip_prefix("listen = [")?.strip_suffix(']')).unwrap_or("");
+    let elsewhere = |line: &str| match line.split_once(" = [") {
+        Some(("listen", _)) if !place.is_empty() => {
+            format!("listen = [{}:0\"]", place.rsplit_once(':').map_or("", |(host, _)| host))
+        }
+        Some(("connect", rest)) if !place.is_empty() && rest != "]" => format!("connect = [{place}, {rest}"),
+        Some(("connect", _)) => format!("connect = [{place}]"),
+        _ => line.to_owned(),
+    };
+    config.lines().map(elsewhere).collect::<Vec<_>>().join("\n")
+}
+
+fn start_zenohd(logs: &Path, port: u16, config: Option<&Path>) -> anyhow::Result<Child> {
     let mut command = Command::new("zenohd");
-    command.arg("--listen").arg(format!("tcp/127.0.0.1:{port}")).arg("--no-multicast-scouting");
+    match config {
+        Some(config) => command.arg("--config").arg(config),
+        None => command.arg("--listen").arg(format!("tcp/127.0.0.1:{port}")).arg("--no-multicast-scouting"),
+    };
     command.arg("--rest-http-port").arg("none");
     let mut child = spawn(command, &logs.join("zenohd.log"))
         .context("`zenohd` is needed for --network zenohd: cargo install zenohd")?;

@@ -17,16 +17,10 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
     let mut known = Behaviours::default();
     add(&mut known);
     #[cfg(feature = "zenoh")]
-    skein_zenoh::share_threads();
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
-        .with_env_filter(
-            // Zenoh warns of things that are as they should be on one host; RUST_LOG says otherwise.
-            tracing_subscriber::EnvFilter::try_from_default_env()
-                .unwrap_or_else(|_| "warn,zenoh=error".into()),
-        )
-        .init();
+    {
+        skein_zenoh::share_threads();
+        skein_zenoh::log("warn", true);
+    }
     let cli = Cli::parse();
     let exit = run(&cli, &known).unwrap_or_else(|error| {
         let message = format!("{error:#}");

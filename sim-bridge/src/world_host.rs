@@ -16,7 +16,7 @@ use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
 use crate::autopilots::make::Make;
 use crate::autopilots::{Autopilots, Companions};
 use crate::fly::account::Account;
-use crate::fly::{FLEET, simulation_config, vehicle_name};
+use crate::fly::{FLEET, GROUND, simulation_config, vehicle_name};
 use crate::mavlink_ports::MavlinkPorts;
 use crate::scenario::{Scenario, VehiclePlan};
 use crate::scene_view;
@@ -103,7 +103,8 @@ impl WorldHost {
         let ports = MavlinkPorts::open(scenario.vehicles.iter().map(|plan| !is_px4(plan)), port_offset)?;
         let mut simulation = Simulation::new(simulation_config(scenario));
         autopilots.seat(&mut simulation, scenario, folder, Companions::Elsewhere)?;
-        let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
+        let known = (0..scenario.vehicles.len()).map(vehicle_name).chain([GROUND.clone()]);
+        let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network).of(&node, known))?;
         let occurrences = Key::pattern::<Occurrence>(&fleet);
         let scan_key = |index| Key::to_one::<Scan>(&fleet, node.clone(), vehicle_name(index));
         Ok(Self {

@@ -25,8 +25,9 @@ impl LidarScans {
         (sensor, network): (NodeName, Option<NetworkSettings>),
         session: &ZenohSession,
     ) -> anyhow::Result<Self> {
-        let key = Key::to_one::<Scan>(fleet, sensor, vehicle.clone());
-        let own = network.map(|network| ZenohSession::open(ZenohConfig::new(fleet.clone(), network)));
+        let key = Key::to_one::<Scan>(fleet, sensor.clone(), vehicle.clone());
+        let own = network.map(|network| ZenohConfig::new(fleet.clone(), network).of(vehicle, [sensor]));
+        let own = own.map(ZenohSession::open);
         let session = own.transpose()?.unwrap_or_else(|| session.clone());
         let link = session.listen(vec![key.to_string()]).context("`lidar`")?;
         Ok(Self { link, strange: 0 })

@@ -38,6 +38,9 @@ enum Command {
         /// autopilot none, nor any command.
         #[arg(long)]
         shadow: bool,
+        /// Least number of this life, for a vehicle that has lost the folder where its lives are counted: others say it.
+        #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=1 << 48))]
+        incarnation: u64,
     },
     /// Tell every check before take-off, with its value and what to do. Arms nothing; for a vehicle on the ground.
     Preflight(preflight::Preflight),
@@ -50,18 +53,13 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
     let mut known = Behaviours::default();
     add(&mut known);
     skein_zenoh::share_threads();
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
-        .with_target(false)
-        .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env()
-                .unwrap_or_else(|_| "info,zenoh=error".into()),
-        )
-        .init();
+    skein_zenoh::log("info", false);
     let done = match Cli::parse().command {
-        Command::Run { config, shadow } => Config::read(&config, &known)
-            .and_then(|config| run::run(config, shadow))
+        Command::Run { config, shadow, incarnation } => Config::read(&config, &known)
+            .and_then(|mut config| {
+                config.agent.incarnation = incarnation;
+                run::run(config, shadow)
+            })
             .map(|()| ExitCode::SUCCESS),
         Command::Preflight(preflight) => {
             preflight.run(&known).map(|ready| if ready { ExitCode::SUCCESS } else { ExitCode::FAILURE })

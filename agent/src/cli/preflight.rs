@@ -64,7 +64,9 @@ struct Vehicle {
 impl Vehicle {
     fn open(config: Config) -> anyhow::Result<Self> {
         let fleet = Fleet::new(&config.agent.fleet)?;
-        let network = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network));
+        let known = config.known();
+        let network =
+            ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network).of(&config.name, known));
         let (mut scans, mut others) = (None, None);
         match network {
             Ok(session) => {

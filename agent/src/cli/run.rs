@@ -70,7 +70,7 @@ struct Driver {
 
 impl Driver {
     fn open(mut config: Config, is_shadow: bool) -> anyhow::Result<Self> {
-        config.agent.incarnation = next_incarnation(&config.state, &config.name)?;
+        config.agent.incarnation = next_incarnation(&config.state, &config.name, config.agent.incarnation)?;
         let (store, kept) = PromiseStore::open(&config.state, &config.name)?;
         config.agent.kept = kept;
         let (script_store, scripts) = ScriptStore::open(&config.state, &config.name);
@@ -79,7 +79,9 @@ impl Driver {
             Vec::new()
         });
         let fleet = Fleet::new(&config.agent.fleet).context("`fleet`")?;
-        let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
+        let known = config.known();
+        let session =
+            ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network).of(&config.name, known))?;
         let link = session.link(&config.name)?;
         let lidar = config.lidar;
         let scans = lidar.map(|it| LidarScans::open(&fleet, &config.name, it, &session)).transpose()?;

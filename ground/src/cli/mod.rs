@@ -1,5 +1,6 @@
 //! The program of a ground station: see `skein-ground --help`.
 
+mod certificates;
 mod explain;
 mod recording;
 mod serve;
@@ -39,7 +40,12 @@ enum Command {
         /// End when every vehicle's mission is over: exit 0 if all succeeded, 1 if not.
         #[arg(long)]
         until_over: bool,
+        /// Least number of this life, for a station that has lost the folder where its lives are counted: others say it.
+        #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=1 << 48))]
+        incarnation: u64,
     },
+    /// Make a fleet's authority and the certificates of its nodes, or renew them.
+    Certificates(certificates::Certificates),
     /// Explain why vehicles of a recorded mission moved or stood still: who requested what, who blocked it, and what
     /// would have to change.
     Explain {
@@ -59,18 +65,13 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
     let mut known = Behaviours::default();
     add(&mut known);
     skein_zenoh::share_threads();
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
-        .with_target(false)
-        .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env()
-                .unwrap_or_else(|_| "info,zenoh=error".into()),
-        )
-        .init();
+    skein_zenoh::log("info", false);
     let cli = Cli::parse();
     let outcome = match &cli.command {
-        Command::Serve { config, until_over } => serve(config, &known, *until_over, cli.json),
+        Command::Serve { config, until_over, incarnation } => {
+            serve(config, &known, *until_over, *incarnation, cli.json)
+        }
+        Command::Certificates(args) => certificates::run(args, cli.json),
         Command::Explain { file, at, vehicle } => explain::run(file, *at, vehicle.as_deref(), cli.json),
     };
     match outcome {
@@ -86,8 +87,16 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
     }
 }
 
-fn serve(config: &Path, known: &Behaviours, until_over: bool, json: bool) -> anyhow::Result<ExitCode> {
-    let outcome = serve::run(Config::read(config, known)?, until_over)?;
+fn serve(
+    config: &Path,
+    known: &Behaviours,
+    until_over: bool,
+    incarnation: u64,
+    json: bool,
+) -> anyhow::Result<ExitCode> {
+    let mut config = Config::read(config, known)?;
+    config.station.incarnation = incarnation;
+    let outcome = serve::run(config, until_over)?;
     let failed = outcome.as_ref().map(|outcome| outcome.failed.clone()).unwrap_or_default();
     if json {
         println!(

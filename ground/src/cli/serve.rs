@@ -57,11 +57,15 @@ struct Station {
 impl Station {
     fn open(mut config: Config, stopping: &Arc<AtomicBool>) -> anyhow::Result<Self> {
         let recording = Recording::create(&config.record)?;
-        config.station.incarnation = next_incarnation(&config.state, &config.station.name)?;
+        let station = &mut config.station;
+        station.incarnation = next_incarnation(&config.state, &station.name, station.incarnation)?;
         let (store, kept) = PromiseStore::open(&config.state, &config.station.name)?;
         config.station.kept = kept;
         let fleet = config.station.fleet.clone();
-        let session = ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network))?;
+        let station = &config.station;
+        let known = station.vehicles.iter().chain(&station.operators).cloned();
+        let session =
+            ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network).of(&station.name, known))?;
         let link = session.listen(Key::subscriptions_with_boards(&fleet, &config.station.name))?;
         let scenes = session.listen(vec![Key::pattern::<Scene>(&fleet)])?;
         let bell = link.bell();

@@ -213,6 +213,12 @@ impl Node {
         self.config.incarnation
     }
 
+    /// Who knows this node in a later life than this one, and in which: then nothing it says counts there. Another
+    /// process has its name, or it has lost count of its lives.
+    pub fn outlived(&self) -> Option<(&NodeName, u64)> {
+        self.channel.outlived()
+    }
+
     pub fn program(&self) -> &Program {
         &self.run.program
     }

@@ -104,6 +104,59 @@ fn strangers_and_lives_that_are_over_are_not_heard() {
     assert_eq!(node.stats().ignored, 3);
 }
 
+fn sign_of_life(node: &str, incarnation: u64) -> Message {
+    let Message::Presence(presence) = presence(node, 0) else { unreachable!() };
+    Message::Presence(Presence { incarnation, ..presence })
+}
+
+#[test]
+fn a_huge_incarnation_or_term_locks_nobody_out() {
+    let mut node = node_with(Some("uav/1"));
+    for (peer, before) in [("uav/2", None), ("uav/3", Some(7))] {
+        before.into_iter().for_each(|life| node.handle(Duration::ZERO, sign_of_life(peer, life)));
+        node.handle(Duration::ZERO, sign_of_life(peer, u64::MAX));
+        node.handle(Duration::ZERO, sign_of_life(peer, 8));
+        let known = node.peers().find(|(name, _)| name.as_str() == peer).unwrap().1;
+        assert_eq!((known.incarnation, known.alive), (Some(8), true), "{peer}");
+    }
+    let first = Roster::first(name("uav/1"), ["uav/2", "uav/3"].map(name));
+    for (term, taken) in [(i64::MAX.unsigned_abs(), false), (2, true)] {
+        node.enqueue(Roster { term, ..first.clone() }.order(&name("uav/1")));
+        node.step(Duration::from_millis(20)).unwrap();
+        assert_eq!(node.roster().unwrap().term == term, taken, "term {term}");
+    }
+}
+
+#[test]
+fn who_speaks_in_a_life_before_the_last_is_told_and_learns_which_one_that_was() {
+    let mut node = node();
+    node.handle(Duration::ZERO, sign_of_life("uav/2", 57));
+    node.take_outgoing();
+    let mut told = Vec::new();
+    for tick in 0..100 {
+        node.handle(Duration::from_millis(20 * tick), sign_of_life("uav/2", 1));
+        told.extend(node.take_outgoing());
+    }
+    let [(Recipient::Node(to), Message::Repair(told))] = &told[..] else { panic!("{told:?}") };
+    assert_eq!((to.as_str(), told.home.as_str(), told.incarnation), ("uav/2", "uav/2", 57));
+
+    // The other end: here the life is the third.
+    let asked = |requester: &str, incarnation| {
+        let (home, requester) = (name("uav/1"), name(requester));
+        Message::Repair(Repair { home, incarnation, from_seq: 1, to_seq: 1, term: 0, requester })
+    };
+    for (requester, life, known) in [
+        ("uav/2", 2, None),
+        ("uav/9", 57, None),
+        ("uav/2", u64::MAX, None),
+        ("uav/2", 57, Some(57)),
+        ("uav/3", 9, Some(57)),
+    ] {
+        node.handle(Duration::from_secs(3), asked(requester, life));
+        assert_eq!(node.outlived().map(|(_, life)| life), known, "{requester} of life {life}");
+    }
+}
+
 #[test]
 fn an_acknowledgement_of_what_was_never_sent_confirms_nothing() {
     let mut node = node();

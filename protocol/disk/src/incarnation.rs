@@ -18,17 +18,18 @@ pub enum IncarnationError {
 }
 
 /// The next incarnation of `node`: greater than every one before that had this `folder`, and on disk before it is
-/// returned. Others take a lower one for a node that is no more.
+/// returned; at least `least`, for a node that has lost count. Others take a lower one for a node that is no more.
 ///
 /// ```
 /// let folder = std::env::temp_dir().join("skein-incarnation-example");
 /// let node = skein_wire::NodeName::new("uav/1")?;
-/// let first = skein_disk::next_incarnation(&folder, &node)?;
-/// assert_eq!(skein_disk::next_incarnation(&folder, &node)?, first + 1);
+/// let first = skein_disk::next_incarnation(&folder, &node, 0)?;
+/// assert_eq!(skein_disk::next_incarnation(&folder, &node, 0)?, first + 1);
+/// assert_eq!(skein_disk::next_incarnation(&folder, &node, 58)?, 58);
 /// # std::fs::remove_dir_all(folder)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn next_incarnation(folder: &Path, node: &NodeName) -> Result<u64, IncarnationError> {
+pub fn next_incarnation(folder: &Path, node: &NodeName, least: u64) -> Result<u64, IncarnationError> {
     let path = path_of(folder, node, "incarnation");
     let failed = |source| IncarnationError::File { path: path.clone(), source };
     fs::create_dir_all(folder).map_err(failed)?;
@@ -45,7 +46,7 @@ pub fn next_incarnation(folder: &Path, node: &NodeName) -> Result<u64, Incarnati
             found: number.chars().take(40).collect(),
         })?,
     };
-    let next = last.saturating_add(1);
+    let next = last.saturating_add(1).max(least);
     write_over(&mut file, next).map_err(failed)?;
     Ok(next)
 }
@@ -65,7 +66,7 @@ mod tests {
     fn two_that_start_at_once_get_two_numbers() {
         let folder = tempfile::tempdir().unwrap();
         let node = NodeName::new("uav/1").unwrap();
-        let start = || next_incarnation(folder.path(), &node).unwrap();
+        let start = || next_incarnation(folder.path(), &node, 0).unwrap();
         let mut numbers: Vec<u64> = std::thread::scope(|scope| {
             let starts: Vec<_> = (0..8).map(|_| scope.spawn(start)).collect();
             starts.into_iter().map(|start| start.join().unwrap()).collect()
@@ -80,7 +81,7 @@ mod tests {
         let path = folder.path().join("uav-1.incarnation");
         fs::write(&path, "seven").unwrap();
         let error =
-            next_incarnation(folder.path(), &NodeName::new("uav/1").unwrap()).unwrap_err().to_string();
+            next_incarnation(folder.path(), &NodeName::new("uav/1").unwrap(), 0).unwrap_err().to_string();
         assert!(error.contains("uav-1.incarnation") && error.contains("seven"), "{error}");
         assert_eq!(fs::read_to_string(path).unwrap(), "seven");
     }

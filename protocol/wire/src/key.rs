@@ -143,6 +143,23 @@ impl Key {
         to_all.chain(to_one.map(|kind| format!("{}/{node}", pattern(fleet, kind)))).collect()
     }
 
+    /// The patterns of all keys that a node of this name may hear: whatever is for all, and what is for it.
+    pub fn audible(fleet: &Fleet, node: &NodeName) -> Vec<String> {
+        let to_all = KINDS.iter().filter(|kind| kind.may_be_for_all()).map(|kind| pattern(fleet, kind));
+        let to_one = KINDS.iter().filter(|kind| kind.may_be_for_one());
+        to_all.chain(to_one.map(|kind| format!("{}/{node}", pattern(fleet, kind)))).collect()
+    }
+
+    /// The pattern of all keys under which a node of this name puts.
+    pub fn said_by(fleet: &Fleet, node: &NodeName) -> String {
+        format!("{ROOT}/{fleet}/*/{node}/**")
+    }
+
+    /// The pattern of all keys of a fleet.
+    pub fn of_fleet(fleet: &Fleet) -> String {
+        format!("{ROOT}/{fleet}/**")
+    }
+
     /// The same for a node that also reads the boards of all.
     pub fn subscriptions_with_boards(fleet: &Fleet, node: &NodeName) -> Vec<String> {
         Self::subscriptions(fleet, node).into_iter().chain([Self::pattern::<Board>(fleet)]).collect()
@@ -232,6 +249,20 @@ mod tests {
             "board/*/*",
         ];
         assert_eq!(patterns, expected.map(|pattern| format!("skein/demo/{pattern}")));
+    }
+
+    #[test]
+    fn a_node_may_hear_what_is_for_it_and_for_all_and_nothing_for_others() {
+        let (fleet, me) = (Fleet::new("demo").unwrap(), node("uav/1"));
+        let audible = Key::audible(&fleet, &me);
+        for pattern in Key::subscriptions_with_boards(&fleet, &me) {
+            assert!(audible.contains(&pattern), "{pattern} may not be heard");
+        }
+        for pattern in audible {
+            let text = pattern.replacen("*/*", "ground/main", 1);
+            let key: Key = text.parse().unwrap();
+            assert!(key.recipient().is_none_or(|recipient| *recipient == me), "{key}");
+        }
     }
 
     #[test]

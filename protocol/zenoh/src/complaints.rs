@@ -7,6 +7,7 @@ use std::time::Duration;
 use skein_wire::{NodeLink, NodeName, Owner, SenderStats};
 
 use crate::link::ZenohLink;
+use crate::links;
 
 /// Between two lines.
 const PERIOD: Duration = Duration::from_secs(1);
@@ -15,6 +16,7 @@ const PERIOD: Duration = Duration::from_secs(1);
 #[derive(Debug, Default)]
 pub struct Complaints {
     told: [u64; 11],
+    told_life: Option<u64>,
     told_versions: BTreeMap<NodeName, u32>,
     due: Duration,
 }
@@ -43,8 +45,18 @@ impl Complaints {
             caused(|stats| stats.caused.facts_withheld),
             caused(|stats| stats.caused.lives_refused),
         ];
+        links::note_silent(|name| {
+            let mut peers = node.node().peers();
+            peers.find(|(peer, _)| *peer == name).map(|(_, peer)| peer.age(now))
+        });
+        let refused = links::take();
+        let outlived = node.node().outlived();
         let versions: BTreeMap<_, _> = node.skewed().map(|(node, version)| (node.clone(), version)).collect();
-        if counts == self.told && versions == self.told_versions {
+        if counts == self.told
+            && versions == self.told_versions
+            && refused.is_empty()
+            && outlived.map(|(_, life)| life) == self.told_life
+        {
             return None;
         }
         let mut line = String::new();
@@ -79,6 +91,18 @@ impl Complaints {
                 line,
                 "{node} speaks version {version} of the messages and this node {own}: update one of them. "
             );
+        }
+        if let Some((peer, life)) = outlived.filter(|(_, life)| self.told_life != Some(*life)) {
+            let (name, own, next) = (node.node().name(), node.node().incarnation(), life.saturating_add(1));
+            let _ = write!(
+                line,
+                "{peer} has heard {name} in life {life}, and hears nothing of this one, life {own}: `state` is not the \
+                 folder it was. If no other process has this name, start again with `--incarnation {next}`. "
+            );
+            self.told_life = Some(life);
+        }
+        for refusal in refused {
+            let _ = write!(line, "{refusal}. ");
         }
         self.told = counts;
         self.told_versions = versions;

@@ -2,11 +2,19 @@
 
 use std::net::{IpAddr, TcpListener};
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
-use skein_wire::Fleet;
+use serde_json::Value;
+use skein_wire::{Fleet, NodeName};
 
 use crate::error::ZenohError;
+use crate::roster::Roster;
+use crate::{access, certificate, links};
+
+/// The files of an authority and of a fleet's roster in a folder of certificates.
+pub(crate) const AUTHORITY: &str = "authority.pem";
+pub(crate) const ROSTER: &str = "roster.toml";
 
 /// Longest message that Zenoh puts together from its fragments, in bytes: more than any that Skein reads.
 const MOST_REASSEMBLED: usize = 16 << 20;
@@ -17,6 +25,9 @@ pub struct ZenohConfig {
     /// The fleet; sessions of other fleets are not heard.
     pub fleet: Fleet,
     pub network: NetworkSettings,
+    /// The node that speaks here, and all that it knows of: who may take part where the network's security names no
+    /// roster of its own.
+    pub node: Option<(NodeName, Vec<NodeName>)>,
     /// Capacity for messages that wait to be put. Beyond, new ones are dropped: bids and states are repeated anyway,
     /// occurrences are repaired.
     pub outgoing_capacity: usize,
@@ -26,7 +37,7 @@ pub struct ZenohConfig {
 
 /// The table `[network]` of a node's configuration file.
 ///
-/// Nothing is found by multicast: who is to be reached is named, and peers then tell each other of further ones.
+/// Nothing is found by multicast or by word of others: who is to be reached is named here or there.
 /// Endpoints are Zenoh's: `tcp/127.0.0.1:7447`, or `tls/192.168.1.4:7447` where [`Security`] is configured.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -54,7 +65,8 @@ pub enum Mode {
     Router,
 }
 
-/// Certificates, as PEM files: whoever has one of this authority is a member, and all that travels is encrypted.
+/// Certificates, as PEM files: whoever has one of this authority in a name of the roster is a member, says what is its
+/// own to say, and all that travels is encrypted.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Security {
@@ -64,6 +76,10 @@ pub struct Security {
     pub certificate: PathBuf,
     /// Its private key.
     pub key: PathBuf,
+    /// Who takes part, and with which certificates: a [`Roster`]'s file. Without it, whoever this node's own
+    /// configuration names, with their first certificates, and nobody relays.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub roster: Option<PathBuf>,
 }
 
 impl Default for NetworkSettings {
@@ -78,10 +94,109 @@ impl Default for NetworkSettings {
     }
 }
 
+/// Settings of Zenoh's, each with its value in JSON.
+type Settings = Vec<(&'static str, String)>;
+
+/// The files of a node's certificate and key, but for their endings.
+pub(crate) fn stem(node: &NodeName) -> String {
+    node.as_str().replace('/', "-")
+}
+
+impl Security {
+    /// The files of `node` in a folder that `skein-ground certificates` has filled.
+    pub fn in_folder(folder: &Path, node: &NodeName) -> Self {
+        let stem = stem(node);
+        Self {
+            authority: folder.join(AUTHORITY),
+            certificate: folder.join(format!("{stem}.pem")),
+            key: folder.join(format!("{stem}.key")),
+            roster: Some(folder.join(ROSTER)),
+        }
+    }
+
+    /// The settings by which only members come in, encrypted, and say only what is theirs to say.
+    fn settings(&self, fleet: &Fleet, roster: &Roster) -> Settings {
+        let Self { authority, certificate, key, .. } = self;
+        vec![
+            // Access control knows the other end by its certificate alone.
+            ("transport/link/protocols", "[\"tls\"]".into()),
+            ("transport/link/tls/root_ca_certificate", json(authority)),
+            ("transport/link/tls/listen_certificate", json(certificate)),
+            ("transport/link/tls/listen_private_key", json(key)),
+            ("transport/link/tls/connect_certificate", json(certificate)),
+            ("transport/link/tls/connect_private_key", json(key)),
+            ("transport/link/tls/enable_mtls", "true".into()),
+            ("transport/link/tls/verify_name_on_connect", "true".into()),
+            ("transport/unicast/max_links", "1".into()),
+            ("access_control", access::control(fleet, roster).to_string()),
+        ]
+    }
+}
+
 impl ZenohConfig {
     /// A session of `fleet` that is joined to others as `network` says.
     pub fn new(fleet: Fleet, network: NetworkSettings) -> Self {
-        Self { fleet, network, outgoing_capacity: 4096, incoming_capacity: 4096 }
+        Self { fleet, network, node: None, outgoing_capacity: 4096, incoming_capacity: 4096 }
+    }
+
+    /// The same, of `node`, which knows of `others`. With security it must be somebody's.
+    #[must_use]
+    pub fn of(self, node: &NodeName, others: impl IntoIterator<Item = NodeName>) -> Self {
+        Self { node: Some((node.clone(), others.into_iter().collect())), ..self }
+    }
+
+    /// The configuration file of a program that is none of Skein's and joins in as this node: `zenohd`, a router.
+    ///
+    /// # Errors
+    /// Those of [`ZenohSession::open`](crate::ZenohSession::open) that the settings and certificates alone cause.
+    pub fn to_file(&self) -> Result<String, ZenohError> {
+        let (settings, _) = self.settings()?;
+        let mut file = Value::default();
+        for (key, value) in settings {
+            let place = key.split('/').fold(&mut file, |table, chunk| &mut table[chunk]);
+            *place = serde_json::from_str(&value).unwrap_or(Value::String(value));
+        }
+        Ok(format!("{file:#}\n"))
+    }
+
+    /// Zenoh's own configuration, with the endpoints that are listened on in the end.
+    pub(crate) fn to_zenoh(&self) -> Result<(zenoh::Config, Vec<String>), ZenohError> {
+        let (settings, listen) = self.settings()?;
+        let mut config = zenoh::Config::default();
+        for (key, value) in settings {
+            config.insert_json5(key, &value).map_err(|source| ZenohError::Config { key, value, source })?;
+        }
+        Ok((config, listen))
+    }
+
+    /// Zenoh's settings, with the endpoints that are listened on in the end.
+    fn settings(&self) -> Result<(Settings, Vec<String>), ZenohError> {
+        let (mut settings, listen) = self.network.settings()?;
+        if let Some(security) = &self.network.security {
+            let (node, roster) = self.admitted(security)?;
+            let hosts: Vec<String> =
+                listen.iter().filter_map(|it| Some(Endpoint::parse(it).ok()?.host.into())).collect();
+            for warning in certificate::check(security, node, &roster, &hosts, SystemTime::now())? {
+                tracing::warn!("{warning}");
+            }
+            settings.extend(security.settings(&self.fleet, &roster));
+            links::open(node, &roster);
+        }
+        Ok((settings, listen))
+    }
+
+    /// This node, and who takes part.
+    fn admitted(&self, security: &Security) -> Result<(&NodeName, Roster), ZenohError> {
+        let (node, others) = self.node.as_ref().ok_or(ZenohError::Nobody)?;
+        let roster = match &security.roster {
+            Some(path) => Roster::read(path)?,
+            None => Roster::of(others.iter().chain([node]).cloned()),
+        };
+        match self.network.mode {
+            Mode::Client if !roster.has_relays() => Err(ZenohError::NobodyRelays),
+            Mode::Router if !roster.relays(node) => Err(ZenohError::NoRelay { node: node.clone() }),
+            _ => Ok((node, roster)),
+        }
     }
 }
 
@@ -95,15 +210,16 @@ impl NetworkSettings {
     #[must_use]
     pub fn relative_to(mut self, folder: &Path) -> Self {
         if let Some(security) = &mut self.security {
-            for path in [&mut security.authority, &mut security.certificate, &mut security.key] {
+            let Security { authority, certificate, key, roster } = security;
+            for path in [authority, certificate, key].into_iter().chain(roster) {
                 *path = folder.join(&*path);
             }
         }
         self
     }
 
-    /// Zenoh's own configuration, with the endpoints that are listened on in the end.
-    pub(crate) fn to_zenoh(&self) -> Result<(zenoh::Config, Vec<String>), ZenohError> {
+    /// Zenoh's settings but for those of security, with the endpoints that are listened on in the end.
+    fn settings(&self) -> Result<(Settings, Vec<String>), ZenohError> {
         for endpoint in &self.connect {
             Endpoint::parse(endpoint)?.check(self.security.is_some())?;
         }
@@ -113,38 +229,26 @@ impl NetworkSettings {
             Mode::Client if self.connect.is_empty() => return Err(ZenohError::ClientOfNobody),
             Mode::Client => ("client", Vec::new()),
         };
-        let mut settings = vec![
-            ("mode", format!("{mode:?}")),
+        let settings = vec![
+            ("mode", json(&mode)),
             ("scouting/multicast/enabled", "false".into()),
             // Without multicast there is nothing to wait for at opening.
             ("scouting/delay", "0".into()),
+            // Whoever is told of by others would be connected to, wherever that is.
+            ("scouting/gossip/enabled", "false".into()),
             ("listen/endpoints", json(&listen)),
             ("connect/endpoints", json(&self.connect)),
             // Peers try those who are not there yet again and again, by themselves. A client's session does not open
             // without its router; whoever opens it has to try again.
-            ("connect/timeout_ms", "{ router: -1, peer: -1, client: 0 }".into()),
-            ("connect/exit_on_failure", "{ router: false, peer: false, client: true }".into()),
+            ("connect/timeout_ms", r#"{ "router": -1, "peer": -1, "client": 0 }"#.into()),
+            ("connect/exit_on_failure", r#"{ "router": false, "peer": false, "client": true }"#.into()),
             (
                 "connect/retry",
-                "{ period_init_ms: 200, period_max_ms: 1000, period_increase_factor: 1.5 }".into(),
+                r#"{ "period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5 }"#.into(),
             ),
             ("transport/link/rx/max_message_size", MOST_REASSEMBLED.to_string()),
         ];
-        if let Some(Security { authority, certificate, key }) = &self.security {
-            settings.extend([
-                ("transport/link/tls/root_ca_certificate", json(authority)),
-                ("transport/link/tls/listen_certificate", json(certificate)),
-                ("transport/link/tls/listen_private_key", json(key)),
-                ("transport/link/tls/connect_certificate", json(certificate)),
-                ("transport/link/tls/connect_private_key", json(key)),
-                ("transport/link/tls/enable_mtls", "true".into()),
-            ]);
-        }
-        let mut config = zenoh::Config::default();
-        for (key, value) in settings {
-            config.insert_json5(key, &value).map_err(|source| ZenohError::Config { key, value, source })?;
-        }
-        Ok((config, listen))
+        Ok((settings, listen))
     }
 
     /// Where to listen, with free ports in the place of 0, so that they are known before anyone asks for them.
@@ -194,8 +298,9 @@ impl<'a> Endpoint<'a> {
         match (self.encrypted, secured) {
             (true, true) => Ok(()),
             (true, false) => Err(ZenohError::NoCertificates { endpoint: self.text.into() }),
-            (false, _) if self.is_loopback() => Ok(()),
-            (false, _) => Err(ZenohError::NotLoopback { endpoint: self.text.into() }),
+            (false, true) => Err(ZenohError::NotEncrypted { endpoint: self.text.into() }),
+            (false, false) if self.is_loopback() => Ok(()),
+            (false, false) => Err(ZenohError::NotLoopback { endpoint: self.text.into() }),
         }
     }
 
@@ -210,9 +315,10 @@ impl<'a> Endpoint<'a> {
     }
 }
 
-/// A value in the language of Zenoh's configuration, of which Rust's quoted text is a part here.
-fn json(value: &impl std::fmt::Debug) -> String {
-    format!("{value:?}")
+/// A value in the language of Zenoh's configuration.
+fn json(value: &impl Serialize) -> String {
+    // What is no text is no name of a file that Zenoh could open.
+    serde_json::to_string(value).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -229,10 +335,7 @@ mod tests {
             assert!(check(fine, false).is_ok(), "{fine} was refused");
         }
         for open in ["tcp/0.0.0.0:7447", "tcp/[::]:0", "tcp/192.168.1.4:7447", "tcp/example.org:7447"] {
-            for secured in [false, true] {
-                let outcome = check(open, secured);
-                assert!(matches!(outcome, Err(ZenohError::NotLoopback { .. })), "{open} was accepted");
-            }
+            assert!(matches!(check(open, false), Err(ZenohError::NotLoopback { .. })), "{open} was accepted");
         }
         for bad in [
             "",
@@ -251,6 +354,9 @@ mod tests {
     #[test]
     fn encrypted_links_need_certificates_and_may_lead_anywhere() {
         assert!(check("tls/192.168.1.4:7447", true).is_ok());
+        // Beside a link whose other end is known, none may stand whose other end is not.
+        let beside = check("tcp/127.0.0.1:7447", true);
+        assert!(matches!(beside, Err(ZenohError::NotEncrypted { .. })));
         let without = check("tls/192.168.1.4:7447", false);
         assert!(matches!(without, Err(ZenohError::NoCertificates { .. })));
     }
@@ -264,7 +370,7 @@ mod tests {
     #[test]
     fn a_client_needs_somebody_to_connect_to() {
         let alone = NetworkSettings { mode: Mode::Client, ..NetworkSettings::default() };
-        assert!(matches!(alone.to_zenoh(), Err(ZenohError::ClientOfNobody)));
+        assert!(matches!(alone.settings(), Err(ZenohError::ClientOfNobody)));
     }
 
     #[test]

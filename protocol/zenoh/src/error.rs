@@ -1,5 +1,11 @@
 //! Faults of a session.
 
+use std::path::PathBuf;
+
+use skein_wire::NodeName;
+
+use crate::certificate::CertificateError;
+
 /// Why a session cannot be opened, or a link not be had.
 #[derive(Debug, thiserror::Error)]
 pub enum ZenohError {
@@ -15,6 +21,24 @@ pub enum ZenohError {
         "`{endpoint}` needs certificates: configure `authority`, `certificate` and `key` under `[network.security]`"
     )]
     NoCertificates { endpoint: String },
+    #[error(
+        "`{endpoint}` is not encrypted: with `[network.security]` every endpoint is of the form `tls/<address>:<port>`"
+    )]
+    NotEncrypted { endpoint: String },
+    #[error(transparent)]
+    Certificate(#[from] CertificateError),
+    #[error("`{}`: {fault}", path.display())]
+    Roster { path: PathBuf, fault: String },
+    #[error("`[network.security]` is for one node of a roster, and this session is nobody's")]
+    Nobody,
+    #[error(
+        "`mode = \"client\"` with `[network.security]` needs a roster that says who relays: name its file, `roster`, there"
+    )]
+    NobodyRelays,
+    #[error(
+        "`mode = \"router\"`, and the roster does not trust {node} with what others say: add it to `relays`"
+    )]
+    NoRelay { node: NodeName },
     #[error("`mode = \"client\"` needs a router to connect to: name its endpoint in `connect`")]
     ClientOfNobody,
     #[error("no free port for `{endpoint}`: {source}")]

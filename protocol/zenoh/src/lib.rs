@@ -6,7 +6,9 @@
 //! (`CongestionControl::Drop`). A program that calls [`share_threads`] first has messages wake fewer threads.
 //!
 //! Several nodes of one process share a session; other processes connect to its [`locators`](ZenohSession::locators).
-//! Without security configured, only the loopback interface is used, and nothing is announced by multicast.
+//! Without security configured, only the loopback interface is used; nothing is announced by multicast or to third
+//! ones. With it, links are encrypted, and a node may say and hear what is its own by the name of its certificate
+//! ([`Roster`]).
 //!
 //! ```
 //! use skein_wire::{Fleet, NodeName};
@@ -19,19 +21,32 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod access;
+#[cfg(feature = "authority")]
+mod authority;
 mod bell;
+mod certificate;
 mod complaints;
 mod config;
 mod error;
 mod inbox;
 mod link;
+mod links;
+mod log;
 mod queue;
+mod roster;
 mod session;
 
+#[cfg(feature = "authority")]
+pub use authority::{Authority, AuthorityError, Holder, Issued};
 pub use bell::Bell;
+pub use certificate::{CertificateError, Fault};
 pub use complaints::Complaints;
 pub use config::{Mode, NetworkSettings, Security, ZenohConfig};
 pub use error::ZenohError;
 pub use link::{ZenohLink, ZenohLinkStats};
+pub use links::{overhearing, take as take_refusals};
+pub use log::log;
 pub use queue::ZenohStats;
+pub use roster::{FIRST_SERIAL, Roster, Unlisted};
 pub use session::{ZenohSession, share_threads};

@@ -11,12 +11,13 @@ use zenoh::Wait;
 use zenoh::internal::runtime::ZRuntime;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
-use zenoh::sample::Locality;
+use zenoh::sample::{Locality, SampleKind};
 
 use crate::config::{Mode, ZenohConfig};
 use crate::error::ZenohError;
 use crate::inbox::Inbox;
 use crate::link::ZenohLink;
+use crate::links;
 use crate::queue::{Asked, Command, Entry, Put, Queue, ZenohStats, queue};
 
 /// Opening is tried so often when the port that was free has been taken meanwhile.
@@ -139,13 +140,36 @@ impl ZenohSession {
 fn open(config: &ZenohConfig) -> Result<(zenoh::Session, Vec<String>), ZenohError> {
     let mut tries = if config.network.chooses_port() { OPENING_TRIES } else { 1 };
     loop {
-        let (zenoh_config, listen) = config.network.to_zenoh()?;
+        let (zenoh_config, listen) = config.to_zenoh()?;
         tries -= 1;
         match zenoh::open(zenoh_config).wait() {
-            Ok(session) => return Ok((session, listen)),
+            Ok(session) => {
+                if config.network.security.is_some() {
+                    watch_links(&session);
+                }
+                return Ok((session, listen));
+            }
             Err(_) if tries > 0 => {}
             Err(source) => return Err(ZenohError::Open { listen, source }),
         }
+    }
+}
+
+/// Has it noted whose links come and go.
+fn watch_links(session: &zenoh::Session) {
+    let noted = |event: zenoh::session::LinkEvent| {
+        let far = event.link().dst().address();
+        match event.kind() {
+            SampleKind::Put => {
+                links::up(far.as_str(), &event.link().zid().to_string(), event.link().auth_identifier());
+            }
+            SampleKind::Delete => links::down(far.as_str()),
+        }
+    };
+    let info = session.info();
+    let listener = info.link_events_listener().history(true).callback(noted).background();
+    if let Err(error) = listener.wait() {
+        tracing::warn!("whose links come and go is not noted: {error}");
     }
 }
 
@@ -169,7 +193,7 @@ fn await_router(
     answer: &SyncSender<Result<Vec<String>, ZenohError>>,
 ) -> Option<(zenoh::Session, Vec<Command>)> {
     // What is wrong with the configuration is said at once; a router that is not there is not wrong.
-    let checked = config.network.to_zenoh().map(|(_, listen)| listen);
+    let checked = config.to_zenoh().map(|(_, listen)| listen);
     answer.send(checked).ok()?;
     let mut waiting = Vec::new();
     loop {

@@ -3,4 +3,5 @@
 #![allow(clippy::unwrap_used)] // A test fails by panicking.
 
 mod joining;
+mod trust;
 mod two_sessions;

@@ -23,7 +23,12 @@ pub fn fly(
     out: &Path,
     mut table: LiveTable<std::io::Stderr>,
 ) -> anyhow::Result<Summary> {
-    let setup = Setup { network: args.network, port_offset: args.port_offset, launch_on_order: false };
+    let setup = Setup {
+        network: args.network,
+        port_offset: args.port_offset,
+        launch_on_order: false,
+        secure: args.secure,
+    };
     let programs = Programs { agent: args.agent.clone(), ground: args.ground.clone() };
     let mut swarm = Processes::prepare(scenario, out, setup, &args.autopilots)?.running(programs);
     swarm.start_all()?;

@@ -26,7 +26,9 @@ use skein_wire::{Fleet, Network, NetworkConfig};
 use self::call_off::{CalledOff, interruptions};
 pub use self::{
     recording::Recording,
-    setup::{FLEET, GROUND, agent_configs, agent_parts, ground_config, simulation_config, vehicle_name},
+    setup::{
+        FLEET, GROUND, agent_configs, agent_parts, ground_config, node_name, simulation_config, vehicle_name,
+    },
     swarm::{Happenings, Links, Swarm},
     trial::{Flown, Trial},
 };

@@ -38,9 +38,9 @@ pub fn vehicle_name(index: usize) -> NodeName {
     node_name("uav", &(index + 1).to_string())
 }
 
-/// A name made of two known words.
+/// A name made of two words that are known to be plain.
 #[allow(clippy::expect_used)]
-fn node_name(kind: &str, id: &str) -> NodeName {
+pub fn node_name(kind: &str, id: &str) -> NodeName {
     NodeName::new(&format!("{kind}/{id}")).expect("both chunks are plain words")
 }
 

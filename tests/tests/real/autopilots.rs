@@ -58,7 +58,7 @@ fn flies_as_processes(autopilots: &Autopilots, port_offset: u16) {
     let folder = tempfile::tempdir().unwrap();
     let mut scenario = Scenario::built_in("antipodal", Some(2), 1).unwrap();
     autopilots.assign(&mut scenario);
-    let setup = Setup { network: Network::Peer, launch_on_order: false, port_offset };
+    let setup = Setup { network: Network::Peer, launch_on_order: false, port_offset, secure: false };
     let mut swarm = Processes::prepare(&scenario, folder.path(), setup, autopilots).unwrap();
     swarm.start_all().unwrap();
     while !swarm.world().is_over() {

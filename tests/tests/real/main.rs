@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)] // A test fails by panicking.
 
 mod autopilots;
+mod certificates;
 mod console;
 mod processes;
 mod real_clock;

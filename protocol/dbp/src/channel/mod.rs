@@ -7,7 +7,7 @@ pub(crate) mod stream;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use crate::channel::peers::Peers;
+use crate::channel::peers::{MOST_LIVES_AHEAD, Peers};
 #[cfg(feature = "mutants")]
 use crate::channel::stream::Heard;
 use crate::channel::stream::{Hole, Stream};
@@ -34,6 +34,10 @@ pub(crate) struct Channel {
     presences: VecDeque<Duration>,
     /// When the node was last told that another process has its name.
     double_told: Option<Duration>,
+    /// When each peer that lives in a life before the last was last told so.
+    former_told: BTreeMap<NodeName, Duration>,
+    /// Who knows this node in a later life, and in which.
+    outlived: Option<(NodeName, u64)>,
     outgoing: Vec<(Recipient, Message)>,
     #[cfg(feature = "mutants")]
     mutant: Option<crate::mutant::Mutant>,
@@ -47,6 +51,8 @@ impl Channel {
             presence_due: Duration::ZERO,
             presences: VecDeque::new(),
             double_told: None,
+            former_told: BTreeMap::new(),
+            outlived: None,
             outgoing: Vec::new(),
             #[cfg(feature = "mutants")]
             mutant: config.mutant,
@@ -150,6 +156,32 @@ impl Channel {
             self.double_told = Some(clock.now());
             run.fact(DuplicateName { incarnation: presence.incarnation });
         }
+    }
+
+    /// Lets `node`, of which a sign of life in the life `given` has come, know that it was heard in a later one: it asks
+    /// that one to begin anew.
+    pub(crate) fn tell_former_life(&mut self, now: Duration, me: &NodeName, node: &NodeName, given: u64) {
+        let Some(known) = self.peers.incarnation(node).filter(|known| given < *known) else { return };
+        if self.former_told.get(node).is_none_or(|at| now >= *at + REPEAT_DOUBLE) {
+            self.former_told.insert(node.clone(), now);
+            self.outgoing.extend(repairs(me, node, known, 0, vec![(1, 1)]));
+        }
+    }
+
+    /// A peer wants something of the life `other` of this node, which lives in `incarnation`.
+    pub(crate) fn note_other_life(&mut self, peer: &NodeName, other: u64, incarnation: u64) {
+        let known = self.outlived.as_ref().map_or(incarnation, |(_, known)| *known);
+        if self.peers.name(peer.as_str()).is_some()
+            && other > known
+            && other - incarnation <= MOST_LIVES_AHEAD
+        {
+            self.outlived = Some((peer.clone(), other));
+        }
+    }
+
+    /// Who knows this node in a later life than this, and in which.
+    pub(crate) fn outlived(&self) -> Option<(&NodeName, u64)> {
+        self.outlived.as_ref().map(|(peer, life)| (peer, *life))
     }
 
     /// Sends again what is missed of `history`.

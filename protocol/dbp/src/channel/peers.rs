@@ -8,6 +8,10 @@ use skein_bp::Bound;
 use crate::allowance::Allowance;
 use crate::name::NodeName;
 
+/// A life so many after the last one that is known is none: lives are counted one by one, or begin with the time since
+/// 1970 in milliseconds, and one false word must not silence it for ever.
+pub(crate) const MOST_LIVES_AHEAD: u64 = 1 << 48;
+
 /// A peer, as this node knows it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Peer {
@@ -76,7 +80,8 @@ impl Peers {
     /// Notes a word from `node` in its life `incarnation`.
     pub(crate) fn hear(&mut self, now: Duration, node: &NodeName, incarnation: u64) -> Word {
         let Some(peer) = self.0.get_mut(node) else { return Word::Fenced };
-        if peer.incarnation.is_some_and(|known| incarnation < known) {
+        let known = peer.incarnation.unwrap_or(0);
+        if incarnation < known || incarnation - known > MOST_LIVES_AHEAD {
             return Word::Fenced;
         }
         if peer.incarnation != Some(incarnation)

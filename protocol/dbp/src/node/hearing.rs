@@ -18,9 +18,11 @@ impl Node {
             Message::Bid(record) => record.home == *name && self.take_in_bids(&record),
             Message::Ack(ack) => ack.node == *name && ack.incarnation == incarnation && self.take_in_ack(ack),
             Message::Occurrence(occurrence) => self.take_in_occurrence(occurrence),
-            Message::Repair(repair) => {
-                repair.home == *name && repair.incarnation == incarnation && self.take_in_repair(&repair)
+            Message::Repair(repair) if repair.home == *name && repair.incarnation != incarnation => {
+                self.channel.note_other_life(&repair.requester, repair.incarnation, incarnation);
+                false
             }
+            Message::Repair(repair) => repair.home == *name && self.take_in_repair(&repair),
             Message::Presence(presence) => self.take_in_presence(&presence),
         }
     }
@@ -95,6 +97,8 @@ impl Node {
 
     fn take_in_presence(&mut self, presence: &Presence) -> bool {
         if !self.hear(&presence.node, presence.incarnation) {
+            let (now, me) = (self.clock.now(), &self.config.name);
+            self.channel.tell_former_life(now, me, &presence.node, presence.incarnation);
             return false;
         }
         self.channel.take_in_presence(presence, &self.clock, &self.config, &mut self.run);

@@ -9,6 +9,9 @@ use crate::name::NodeName;
 use crate::node::Node;
 use crate::rule::{Lift, NewRoster};
 
+/// A term so many after the present one is none: after the last number no roster could be given any more.
+const MOST_TERMS_AHEAD: u64 = 1 << 32;
+
 impl Node {
     /// Obeys an event that was selected here, if it is such an order.
     pub(super) fn heed(&mut self, event: &Event) {
@@ -28,6 +31,9 @@ impl Node {
         let refused = match Roster::ordered(order) {
             Err(error) => error.to_string(),
             Ok(roster) if roster.term <= self.joint.number() => format!("term {} is over", roster.term),
+            Ok(roster) if roster.term - self.joint.number() > MOST_TERMS_AHEAD => {
+                format!("term {} is far ahead: the next is {}", roster.term, self.joint.number() + 1)
+            }
             Ok(roster) => match roster.members.iter().find(|member| !self.knows(member)) {
                 Some(stranger) => format!("{stranger} is not of this fleet"),
                 None => {

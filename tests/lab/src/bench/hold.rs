@@ -43,7 +43,7 @@ impl Task for Holds {
         // Nobody sets out there before everybody is in the air.
         let scenario = Scenario::open("antipodal", &overrides, 1)?;
         let folder = std::env::temp_dir().join(format!("skein-bench-hold-{}", std::process::id()));
-        let setup = Setup { network: Network::Peer, port_offset, launch_on_order: false };
+        let setup = Setup { network: Network::Peer, port_offset, launch_on_order: false, secure: false };
         let mut swarm = Processes::start(&scenario, &folder, setup)?;
         let console = swarm.console();
         let operator = std::thread::spawn(move || measure(console, vehicles, holds));

@@ -131,7 +131,7 @@ pub fn run(
     let vehicles = scenario.vehicles.len();
     let victim = random.random_range(0..vehicles);
     let network = if fault == Fault::NodeCut { Network::Router } else { network };
-    let setup = Setup { network, port_offset, launch_on_order: false };
+    let setup = Setup { network, port_offset, launch_on_order: false, secure: false };
     let cable =
         (fault == Fault::NodeCut).then(|| Cable::lay(configure::router_port(port_offset))).transpose()?;
     let mut swarm = Processes::prepare(&scenario, folder, setup, &Autopilots::default())?;
