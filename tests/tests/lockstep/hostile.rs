@@ -7,7 +7,7 @@ use skein_bp::EventSet;
 use skein_dbp::{BidRecord, Message, NodeName, OnLoss, Presence, RemoteBid};
 use skein_sim::fly::FLEET;
 use skein_tests::Lockstep;
-use skein_wire::{Fleet, Key, Link as _, Payload, State};
+use skein_wire::{Fleet, Key, Payload, State};
 
 /// What a hostile member puts in one tick.
 struct Hostile {

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use skein_sim::autopilots::Autopilots;
 use skein_sim::cli::{Network, Setup};
 use skein_sim::processes::Processes;
 use skein_sim::scenario::{Overrides, Scenario};
@@ -28,7 +29,7 @@ fn who_starts_with_anothers_certificate_is_refused_and_with_its_own_the_fleet_fl
     let overrides = Overrides { vehicles: Some(2), ..Overrides::default() };
     let scenario = Scenario::open("open", &overrides, 1).unwrap();
     let setup = Setup { network: Network::Peer, launch_on_order: false, secure: true, port_offset: 5200 };
-    let mut processes = Processes::prepare(&scenario, folder.path(), setup).unwrap();
+    let mut processes = Processes::prepare(&scenario, folder.path(), setup, &Autopilots::default()).unwrap();
     let [ground, one, two] = ["ground/main", "uav/1", "uav/2"].map(|node| NodeName::new(node).unwrap());
     processes.start_node(&ground).unwrap();
     processes.start_node(&one).unwrap();
