@@ -16,6 +16,8 @@ const MOST_BYTES: usize = 64 << 20;
 pub(crate) struct Inbox {
     waiting: Mutex<Waiting>,
     capacity: usize,
+    /// Whether a message makes the one before under its key void.
+    of_newest: bool,
     /// Rung when a message has come.
     pub(crate) bell: Bell,
     pub(crate) received: AtomicU64,
@@ -43,12 +45,18 @@ impl Inbox {
         Self {
             waiting: Mutex::default(),
             capacity,
+            of_newest: false,
             bell: Bell::default(),
             received: AtomicU64::new(0),
             dropped: AtomicU64::new(0),
             misnamed: AtomicU64::new(0),
             oversized: AtomicU64::new(0),
         }
+    }
+
+    /// An inbox in which of the messages under one key only the newest waits.
+    pub(crate) fn of_newest(capacity: usize) -> Self {
+        Self { of_newest: true, ..Self::new(capacity) }
     }
 
     /// Takes in a message of `bytes` under a key of Skein's; others, and those that are too long, are counted and not
@@ -66,6 +74,14 @@ impl Inbox {
         }
         let payload = payload();
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.of_newest
+            && let Some((_, before)) = waiting.messages.iter_mut().find(|(waiting, _)| *waiting == key)
+        {
+            let length = payload.len();
+            let before = std::mem::replace(before, payload);
+            waiting.bytes = waiting.bytes + length - before.len();
+            return;
+        }
         while waiting.messages.len() >= self.capacity || waiting.bytes + payload.len() > MOST_BYTES {
             if waiting.pop().is_none() {
                 break;
@@ -107,6 +123,18 @@ mod tests {
         assert_eq!((read(&inbox.received), read(&inbox.dropped), read(&inbox.misnamed)), (4, 1, 1));
         let payloads: Vec<_> = std::iter::from_fn(|| inbox.pop()).map(|(_, payload)| payload).collect();
         assert_eq!(payloads, [vec![1], vec![2]]);
+    }
+
+    #[test]
+    fn where_only_the_newest_counts_one_key_takes_one_place() {
+        let inbox = Inbox::of_newest(2);
+        inbox.push("skein/demo/state/uav/2", 1, || vec![7]);
+        for byte in 0..100 {
+            inbox.push(KEY, 2, || vec![byte, byte]);
+        }
+        let payloads: Vec<_> = std::iter::from_fn(|| inbox.pop()).map(|(_, payload)| payload).collect();
+        assert_eq!(payloads, [vec![7], vec![99, 99]]);
+        assert_eq!((read(&inbox.dropped), inbox.waiting.lock().unwrap().bytes), (0, 0));
     }
 
     #[test]

@@ -28,6 +28,7 @@ impl Node {
         let refused = match Roster::ordered(order) {
             Err(error) => error.to_string(),
             Ok(roster) if roster.term <= self.joint.number() => format!("term {} is over", roster.term),
+            Ok(_) if self.joint.is_stuck() => "the disk does not take it: see to its state folder".to_owned(),
             Ok(roster) => match roster.members.iter().find(|member| !self.knows(member)) {
                 Some(stranger) => format!("{stranger} is not of this fleet"),
                 None => {
