@@ -589,8 +589,8 @@ impl Control {
         let readiness = self.readiness();
         let states = |said: &Readiness| said.checks.iter().map(|check| check.state).collect::<Vec<_>>();
         let told = self.told_readiness.as_ref();
-        let is_due = told
-            .is_none_or(|(at, told)| now >= *at + READINESS_PERIOD || states(told) != states(&readiness));
+        let is_due =
+            told.is_none_or(|(at, told)| now >= *at + READINESS_PERIOD || states(told) != states(&readiness));
         is_due.then(|| self.told_readiness.insert((now, readiness)).1.clone())
     }
 

@@ -167,6 +167,7 @@ impl AgentCore {
 
     /// One tick of a vehicle whose mission is silent, as it would be on a thread of its own that hangs.
     pub fn tick_without_mission(&mut self, now: Duration, link: &mut dyn Link) {
+        self.side.speak(self.mission.words(None));
         self.side.tick(now, link);
         for (_, report) in self.side.take_news().reports {
             self.mission.hear(now, report);

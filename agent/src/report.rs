@@ -8,8 +8,8 @@ use skein_dbp::NodeName;
 use skein_mav::FlightMode;
 use skein_wire::event::{
     self, Airborne, Arrived, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed,
-    FenceBreached, FoundAirborne, Landed, Leave, OrderTaken, PathBlocked, PilotTook, Planned, PositionDoubted,
-    PositionTrusted, Ready, Slept, Stuck, TooClose, Unplannable, Unready, What,
+    FenceBreached, FoundAirborne, Landed, Leave, OrderTaken, PathBlocked, PilotTook, Planned,
+    PositionDoubted, PositionTrusted, Ready, Slept, Stuck, TooClose, Unplannable, Unready, What,
 };
 
 use crate::energy::Changed;

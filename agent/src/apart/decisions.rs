@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn an_old_decision_sets_nothing_going_but_brings_down() {
-        let late = |instruction, age| is_too_late(ms(1000 + age), ms(1000), &instruction);
+        let late = |instruction, age: u64| is_too_late(ms(1000 + age), ms(1000), &instruction);
         for going in
             [Instruction::TakeOff, Instruction::TakeBack, Instruction::Resume, Instruction::GrantLeave]
         {

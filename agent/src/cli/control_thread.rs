@@ -138,7 +138,7 @@ impl ControlThread {
         if let Some((at, set_point, motion)) = self.side.last_set_point().filter(|_| self.is_shadow)
             && self.pace.last_set_point.replace(at) != Some(at)
         {
-            self.log.put(Line::SetPoint(at, set_point, motion));
+            self.log.put(Line::SetPoint(Box::new((at, set_point, motion))));
         }
     }
 

@@ -94,3 +94,50 @@ impl Exchange {
         self.to_mission.ring();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::instruction::Instruction;
+    use crate::report::Report;
+
+    fn news() -> News {
+        let mut news = News::default();
+        news.reports.put(Duration::ZERO, Report::Airborne);
+        news
+    }
+
+    #[test]
+    fn control_waits_for_nobody_who_has_a_hand_in_a_tray() {
+        let exchange = Exchange::new(Bell::default());
+        let mut news = news();
+        let (first, second) = (exchange.news.lock().unwrap(), exchange.orders.lock().unwrap());
+        exchange.put_news(&mut news);
+        assert!(!news.reports.is_empty(), "its news are still its own");
+        assert!(exchange.take_orders().is_none());
+        drop((first, second));
+        exchange.put_news(&mut news);
+        assert!(news.reports.is_empty() && exchange.to_mission.wait(Duration::ZERO));
+        assert!(exchange.take_orders().is_some());
+    }
+
+    #[test]
+    fn a_land_stays_among_however_many_orders_nobody_takes() {
+        let exchange = Exchange::new(Bell::default());
+        let give = |ms, instruction| {
+            let at = Duration::from_millis(ms);
+            let mut orders = Orders { decided: at, ..Orders::default() };
+            orders.instructions.put(at, instruction);
+            exchange.put_orders(orders);
+        };
+        give(1, Instruction::Land);
+        (2..10_000).for_each(|ms| give(ms, Instruction::GrantLeave));
+        let orders = exchange.take_orders().unwrap();
+        let left: Vec<_> = orders.instructions.into_iter().collect();
+        let ms = Duration::from_millis;
+        assert_eq!(left, [(ms(1), Instruction::Land), (ms(9999), Instruction::GrantLeave)]);
+        assert_eq!(orders.decided, ms(9999));
+    }
+}

@@ -3,7 +3,7 @@
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
 
-use skein_mav::{Severity, SetPoint, Text};
+use skein_mav::{SetPoint, Severity, Text};
 
 use super::shadow_log::ShadowLog;
 use crate::positioning::Motion;
@@ -17,7 +17,7 @@ pub enum Line {
     Text(Text),
     Warning(String),
     /// For a shadow's log.
-    SetPoint(Duration, SetPoint, Motion),
+    SetPoint(Box<(Duration, SetPoint, Motion)>),
 }
 
 /// Takes lines and never waits. Cloning gives another way to the same log.
@@ -50,7 +50,8 @@ fn write(lines: &Receiver<Line>, mut shadow: Option<ShadowLog>) {
         match line {
             Line::Text(text) => tell(&text),
             Line::Warning(line) => tracing::warn!("{line}"),
-            Line::SetPoint(at, set_point, motion) => {
+            Line::SetPoint(made) => {
+                let (at, set_point, motion) = *made;
                 if let Some(log) = &mut shadow
                     && let Err(error) = log.write(at, &set_point, &motion)
                 {

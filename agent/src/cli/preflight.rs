@@ -70,7 +70,9 @@ impl Vehicle {
         match network {
             Ok(session) => {
                 let lidar = config.lidar;
-                scans = lidar.map(|it| LidarScans::open(&fleet, &config.name, it, &session, Log::open(None)?)).transpose()?;
+                scans = lidar
+                    .map(|it| LidarScans::open(&fleet, &config.name, it, &session, Log::open(None)?))
+                    .transpose()?;
                 let keys = vec![Key::pattern::<State>(&fleet), Key::pattern::<Readiness>(&fleet)];
                 others = Some(session.listen(keys)?);
             }

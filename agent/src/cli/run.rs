@@ -56,20 +56,20 @@ pub fn run(config: Config, is_shadow: bool) -> anyhow::Result<()> {
 }
 
 /// Watches over the threads until control has ended.
-fn watch(
-    exchange: &Exchange,
-    control: JoinHandle<Ended>,
-    mission: &JoinHandle<()>,
-) -> anyhow::Result<Ended> {
+fn watch(exchange: &Exchange, control: JoinHandle<Ended>, mission: &JoinHandle<()>) -> anyhow::Result<Ended> {
     let mut watchdog = Watchdog::default();
     while !control.is_finished() {
         if mission.is_finished() && !exchange.mission_is_gone.swap(true, Ordering::Relaxed) {
-            tracing::error!("the mission's thread has ended by a fault: the vehicle lands, and the program ends");
+            tracing::error!(
+                "the mission's thread has ended by a fault: the vehicle lands, and the program ends"
+            );
         }
         match watchdog.look(exchange.beats.load(Ordering::Relaxed)) {
             Seen::Alive => {}
             Seen::Stalled => {
-                tracing::error!("control hangs: set-points are silent, so that the autopilot's failsafe acts");
+                tracing::error!(
+                    "control hangs: set-points are silent, so that the autopilot's failsafe acts"
+                );
             }
             Seen::Recovered => tracing::warn!("control goes on, and leaves the vehicle to who has it"),
             Seen::Hung => bail!("control has hung for 10 s"),
@@ -103,7 +103,8 @@ fn open(mut config: Config, is_shadow: bool) -> anyhow::Result<(ControlThread, M
         Log::open(shadow).context("the log's thread")?
     };
     let lidar = config.lidar;
-    let scans = lidar.map(|it| LidarScans::open(&fleet, &config.name, it, &session, log.clone())).transpose()?;
+    let scans =
+        lidar.map(|it| LidarScans::open(&fleet, &config.name, it, &session, log.clone())).transpose()?;
     tracing::info!(
         "{} of fleet {fleet}, life {}, Zenoh on {:?}, autopilot {}",
         config.name,

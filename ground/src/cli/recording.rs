@@ -213,7 +213,12 @@ mod tests {
         let line = "x".repeat(1000);
         put.send(Box::new(move |recorder| {
             let write = |second| {
-                recorder.log(Duration::from_secs(second), Level::Info, "ground/main", &format!("{second} {line}"))
+                recorder.log(
+                    Duration::from_secs(second),
+                    Level::Info,
+                    "ground/main",
+                    &format!("{second} {line}"),
+                )
             };
             (0..20).try_for_each(write)
         }))

@@ -78,12 +78,14 @@ pub fn next_incarnation(
     let first_try = take(&path, |last| last.map(|last| last.saturating_add(1)));
     let taken = match first_try {
         Ok(Taken::Unreadable(found)) if by_clock.is_none() => {
-            let trouble = format!("`{}` holds {found:?}, which is no number as it is written there.", path.display());
+            let trouble =
+                format!("`{}` holds {found:?}, which is no number as it is written there.", path.display());
             return Err(IncarnationError { trouble });
         }
         Ok(Taken::Unreadable(found)) => {
             let problem = format!("holds {found:?}, which is no number as it is written there");
-            let what = "the number of this node's lives is kept there. This life's number is taken from the clock";
+            let what =
+                "the number of this node's lives is kept there. This life's number is taken from the clock";
             trouble = Some(Lost::set_aside(&path, problem, what).to_string());
             take(&path, |_| by_clock)
         }

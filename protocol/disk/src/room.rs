@@ -57,11 +57,7 @@ fn disk(path: &Path) -> Option<(u64, u64)> {
 fn scarcity(free: u64, size: u64) -> Option<String> {
     let reserve = RESERVE.min(size / 10);
     (free < reserve).then(|| {
-        format!(
-            "its disk has {} kB left, and {} kB are for what must be kept",
-            free >> 10,
-            reserve >> 10
-        )
+        format!("its disk has {} kB left, and {} kB are for what must be kept", free >> 10, reserve >> 10)
     })
 }
 

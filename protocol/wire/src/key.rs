@@ -133,7 +133,10 @@ impl Key {
 
     /// The patterns of all keys that a node of this name wants to hear.
     pub fn subscriptions(fleet: &Fleet, node: &NodeName) -> Vec<String> {
-        Self::protocol_subscriptions(fleet, node).into_iter().chain(Self::vehicle_subscriptions(fleet)).collect()
+        Self::protocol_subscriptions(fleet, node)
+            .into_iter()
+            .chain(Self::vehicle_subscriptions(fleet))
+            .collect()
     }
 
     /// Those of them under which vehicles tell of their bodies: see [`VehicleLink`](crate::VehicleLink).

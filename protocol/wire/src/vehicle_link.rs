@@ -109,9 +109,13 @@ mod tests {
             let time = Duration::from_millis(ms);
             link.put(&key, Payload::State(State { time, ..State::new(name(node)) }).encode());
         };
-        for (sender, node, ms) in
-            [("uav/2", "uav/2", 1), ("uav/3", "uav/2", 9), ("uav/2", "uav/2", 2), ("uav/9", "uav/9", 1), ("uav/1", "uav/1", 1)]
-        {
+        for (sender, node, ms) in [
+            ("uav/2", "uav/2", 1),
+            ("uav/3", "uav/2", 9),
+            ("uav/2", "uav/2", 2),
+            ("uav/9", "uav/9", 1),
+            ("uav/1", "uav/1", 1),
+        ] {
             say(sender, node, ms);
         }
         let mut vehicle = VehicleLink::new(name("uav/1"), fleet, roster);

@@ -173,3 +173,38 @@ fn a_slow_disk_delays_a_decision_and_nothing_else() {
     assert_eq!(swarm.saw(HOME, "swarm/go").count(), 1, "it is told as soon as it is kept");
     assert!(swarm.members[&name(GROUND)].node.trouble().is_none());
 }
+
+#[test]
+fn a_coordinator_that_has_forgotten_decides_nothing_before_a_new_term() {
+    let mut swarm = Swarm::new(&[HOME, GROUND], NetworkConfig::default(), 1);
+    let mut home = program(1);
+    home.add("listen", Always(Bid::new().wait_for("swarm/**")));
+    swarm.start_with(NodeConfig { joint: joint(), ..swarm.config(HOME, 1) }, home);
+    let mut ground = program(1);
+    ground.add("decide", Requester::new("swarm/go", 1, LEASE / 2));
+    swarm.start_with(NodeConfig { joint: joint(), forgot: true, ..swarm.config(GROUND, 1) }, ground);
+    swarm.run(5 * LEASE);
+    assert_eq!(swarm.saw(HOME, "swarm/go").count(), 0);
+    let roster = Roster { term: 2, ..joint().unwrap() };
+    for node in [HOME, GROUND] {
+        swarm.node(node).enqueue(roster.order(&name(node)));
+    }
+    swarm.run(5 * LEASE);
+    assert_eq!(swarm.saw(HOME, "swarm/go").count(), 1);
+}
+
+#[test]
+fn it_is_told_once_that_a_disk_fails_and_once_that_it_works_again() {
+    let disk = Disk::new(Saving::Failed("no space left".to_owned()));
+    let mut swarm = held(&disk);
+    swarm.run(5 * LEASE);
+    disk.answers(Saving::Done);
+    swarm.run(5 * LEASE);
+    let told = |fact: &str| {
+        let seen = swarm.occurred(HOME, fact).map(|seen| seen.happened.event.to_string());
+        seen.collect::<Vec<_>>()
+    };
+    let fails = told("uav/1/disk_fails");
+    assert!(fails.len() == 1 && fails[0].contains("no space left"), "{fails:?}");
+    assert_eq!(told("uav/1/disk_works").len(), 1);
+}
