@@ -10,8 +10,6 @@ use crate::message::{KINDS, Kind, Payload, Readiness, Record, State};
 
 /// The first chunk of every key.
 const ROOT: &str = "skein";
-/// What vehicles tell of their bodies.
-const OF_VEHICLES: [&Kind; 2] = [&State::KIND, &Readiness::KIND];
 
 /// A key: `skein/<fleet>/<what>/<node>/...`.
 ///
@@ -133,26 +131,24 @@ impl Key {
 
     /// The patterns of all keys that a node of this name wants to hear.
     pub fn subscriptions(fleet: &Fleet, node: &NodeName) -> Vec<String> {
-        Self::protocol_subscriptions(fleet, node)
-            .into_iter()
-            .chain(Self::vehicle_subscriptions(fleet))
-            .collect()
+        let heard = || KINDS.iter().filter(|kind| kind.every_node_listens);
+        let to_all = heard().filter(|kind| kind.may_be_for_all()).map(|kind| pattern(fleet, kind));
+        let to_one = heard().filter(|kind| kind.may_be_for_one());
+        to_all.chain(to_one.map(|kind| format!("{}/{node}", pattern(fleet, kind)))).collect()
     }
 
     /// Those of them under which vehicles tell of their bodies: see [`VehicleLink`](crate::VehicleLink).
     pub fn vehicle_subscriptions(fleet: &Fleet) -> Vec<String> {
-        OF_VEHICLES.iter().map(|kind| pattern(fleet, kind)).collect()
+        vec![Self::pattern::<State>(fleet), Self::pattern::<Readiness>(fleet)]
     }
 
     /// All but those.
     pub fn protocol_subscriptions(fleet: &Fleet, node: &NodeName) -> Vec<String> {
-        let heard = || {
-            let heard = KINDS.iter().filter(|kind| kind.every_node_listens);
-            heard.filter(|kind| OF_VEHICLES.iter().all(|of_vehicles| of_vehicles.word != kind.word))
-        };
-        let to_all = heard().filter(|kind| kind.may_be_for_all()).map(|kind| pattern(fleet, kind));
-        let to_one = heard().filter(|kind| kind.may_be_for_one());
-        to_all.chain(to_one.map(|kind| format!("{}/{node}", pattern(fleet, kind)))).collect()
+        let of_vehicles = Self::vehicle_subscriptions(fleet);
+        Self::subscriptions(fleet, node)
+            .into_iter()
+            .filter(|pattern| !of_vehicles.contains(pattern))
+            .collect()
     }
 
     /// The same for a node that also reads the boards of all.
