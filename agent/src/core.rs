@@ -215,6 +215,9 @@ impl AgentCore {
             }
             for happened in &decided {
                 let instruction = self.mission.follow(happened, control.flight().is_landing());
+                while let Some(trial) = self.mission.next_trial() {
+                    self.mission.note_trial(trial.run());
+                }
                 let report = instruction.and_then(|instruction| control.carry_out(now, now, instruction));
                 if let Some(report) = report {
                     self.mission.hear(now, report);

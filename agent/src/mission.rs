@@ -1,7 +1,7 @@
 //! Mission: what the vehicle is to do. The node with its b-threads and peers, the scripts, and how far the task has
 //! come.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -31,8 +31,7 @@ use crate::{
     verify::check_script,
 };
 
-/// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for
-/// between two ticks. `skein-agent verify --script` looks at all.
+/// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for. `skein-agent verify --script` looks at all.
 const STATES_TRIED: usize = 500;
 
 /// The outcome of a vehicle's mission.
@@ -61,6 +60,46 @@ pub struct Mission {
     /// The revision of the program that these are of.
     limits_of: Option<u64>,
     fault: Option<String>,
+    trials: VecDeque<Trial>,
+    /// The trials that have begun, or are to.
+    trying: usize,
+}
+
+/// So many scripts are tried out at once, or wait for it.
+const MOST_TRIALS: usize = 4;
+
+/// A script that was sent, and is to be tried out before it runs.
+#[derive(Debug)]
+pub struct Trial {
+    assignment: Assignment,
+    from: String,
+    config: Arc<AgentConfig>,
+    /// Whether a script of its name runs, so that there is nothing to be tried.
+    is_known: bool,
+}
+
+/// A script that was tried out.
+#[derive(Debug)]
+pub struct Tried {
+    assignment: Assignment,
+    from: String,
+    outcome: Result<(), String>,
+}
+
+impl Trial {
+    /// Looks for a fault of the script together with the vehicle's program. It takes some tens of milliseconds.
+    #[must_use]
+    pub fn run(self) -> Tried {
+        let Self { assignment, from, config, is_known } = self;
+        let outcome = if is_known { Ok(()) } else { check_script(&config, &assignment, STATES_TRIED) };
+        Tried { assignment, from, outcome }
+    }
+
+    /// The script is not tried, and does not run, because of this.
+    #[must_use]
+    pub fn refused(self, why: &str) -> Tried {
+        Tried { assignment: self.assignment, from: self.from, outcome: Err(why.to_owned()) }
+    }
 }
 
 impl Mission {
@@ -101,6 +140,8 @@ impl Mission {
             limits: Limits::default(),
             limits_of: None,
             fault: None,
+            trials: VecDeque::new(),
+            trying: 0,
             name,
             me,
             config,
@@ -268,56 +309,78 @@ impl Mission {
         };
     }
 
-    /// Runs the scripts that are sent, and answers what cannot be done.
+    /// Has the scripts tried out that are sent, and answers what cannot be done.
     fn look_after_scripts(&mut self, happened: &Happened) {
         let event = &happened.event;
-        let verdict = match self.me.verb(event) {
-            Some(Load::NAME) => {
-                let (name, outcome) = self.load_script(happened);
-                if outcome == Ok(Loaded::Waits) {
-                    return;
-                }
-                self.scripts.verdict(&name, outcome.map(|_| ()))
-            }
+        let refused = match self.me.verb(event) {
+            Some(Load::NAME) => self.begin_trial(happened),
             Some(Unload::NAME) => {
                 let name = Unload::read(event).map(|unload| unload.name).unwrap_or_default();
-                if self.scripts.runs(&name) {
-                    return;
+                match self.scripts.runs(&name) {
+                    true => Ok(()),
+                    false => Err((name.to_string(), "no script of this name runs".to_owned())),
                 }
-                self.scripts.verdict(&name, Err("no script of this name runs".to_owned()))
             }
             Some(ScriptNews::NAME) => return self.scripts.hear(event),
             _ => return,
         };
-        self.node.node_mut().enqueue(verdict);
+        if let Err((name, why)) = refused {
+            self.node.node_mut().enqueue(self.scripts.verdict(&name, Err(why)));
+        }
     }
 
-    /// Runs a script that is sent; gives back its name, and why it is not run if it is not.
-    fn load_script(&mut self, happened: &Happened) -> (String, Result<Loaded, String>) {
+    /// Puts a script that is sent among those to be tried out, or says why not.
+    fn begin_trial(&mut self, happened: &Happened) -> Result<(), (String, String)> {
         let text = Load::read(&happened.event).map(|load| load.script).unwrap_or_default();
-        let assignment = match Assignment::from_json(&text) {
-            Ok(assignment) => assignment,
-            Err(error) => return (String::new(), Err(error.to_string())),
-        };
+        let assignment = Assignment::from_json(&text).map_err(|error| (String::new(), error.to_string()))?;
         let sender = happened.requested_by.iter().find(|bthread| bthread.contains('#'));
         let from = sender.map_or(self.name.as_str(), |bthread| bthread).to_owned();
-        let outcome = self.admit(&assignment, &from, Begins::AtOnce);
-        (assignment.name().to_owned(), outcome)
+        let refused = |why| (assignment.name().to_owned(), why);
+        self.check_sender(&assignment, &from).map_err(refused)?;
+        if self.trying == MOST_TRIALS {
+            return Err(refused(format!("{MOST_TRIALS} scripts are being tried out already; send it again")));
+        }
+        self.trying += 1;
+        let known = self.scripts.runs(assignment.name());
+        self.trials.push_back(Trial { assignment, from, config: self.config.clone(), is_known: known });
+        Ok(())
     }
 
-    /// Runs a script that `from` has sent, now or to a former life of this agent, if it passes all checks.
+    /// The next script that is to be tried out, by whoever has the time for it.
+    pub fn next_trial(&mut self) -> Option<Trial> {
+        self.trials.pop_front()
+    }
+
+    /// Runs a script that has been tried out, or says why not.
+    pub fn note_trial(&mut self, Tried { assignment, from, outcome }: Tried) {
+        self.trying = self.trying.saturating_sub(1);
+        let outcome = match outcome.and_then(|()| self.load(&assignment, &from, Begins::AtOnce)) {
+            Ok(Loaded::Waits) => return,
+            outcome => outcome.map(|_| ()),
+        };
+        self.node.node_mut().enqueue(self.scripts.verdict(assignment.name(), outcome));
+    }
+
+    /// Runs a script that `from` has sent to a former life of this agent, if it passes all checks.
     fn admit(&mut self, assignment: &Assignment, from: &str, begins: Begins) -> Result<Loaded, String> {
-        if !self.may_send(assignment, from)? {
-            let node = from.split_once('#').map_or(from, |(node, _)| node);
-            return Err(format!(
-                "{node} may not send scripts: that is for the ground station and its operators"
-            ));
-        }
+        self.check_sender(assignment, from)?;
         if !self.scripts.runs(assignment.name()) {
             check_script(&self.config, assignment, STATES_TRIED)?;
         }
+        self.load(assignment, from, begins)
+    }
+
+    fn load(&mut self, assignment: &Assignment, from: &str, begins: Begins) -> Result<Loaded, String> {
         self.script_facts.forget();
         self.scripts.load(self.node.node_mut().program_mut(), assignment, from, begins)
+    }
+
+    fn check_sender(&self, assignment: &Assignment, from: &str) -> Result<(), String> {
+        if self.may_send(assignment, from)? {
+            return Ok(());
+        }
+        let node = from.split_once('#').map_or(from, |(node, _)| node);
+        Err(format!("{node} may not send scripts: that is for the ground station and its operators"))
     }
 
     /// Whether `from` has the right to send this script: the vehicle itself, or a b-thread of another node that is a

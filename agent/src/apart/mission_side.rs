@@ -10,7 +10,7 @@ use super::{
     news::{Body, News},
     orders::Orders,
 };
-use crate::mission::{Mission, Outcome};
+use crate::mission::{Mission, Outcome, Trial, Tried};
 
 /// What is decided may be answered by what is selected next, which deserves its turn in the same step; so often.
 const ROUNDS: usize = 4;
@@ -75,6 +75,16 @@ impl MissionSide {
             self.mission.record(decided);
         }
         orders.limits = self.mission.changed_limits().cloned();
+    }
+
+    /// The next script that is to be tried out, by whoever has the time for it.
+    pub fn next_trial(&mut self) -> Option<Trial> {
+        self.mission.next_trial()
+    }
+
+    /// Runs a script that has been tried out, or says why not.
+    pub fn note_trial(&mut self, tried: Tried) {
+        self.mission.note_trial(tried);
     }
 
     /// Everything selected here or heard of since the last call, in order.

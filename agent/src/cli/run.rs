@@ -18,7 +18,7 @@ use super::control_thread::{ControlThread, Ended, Pace};
 use super::exchange::Exchange;
 use super::lidar_scans::LidarScans;
 use super::log::Log;
-use super::mission_thread::MissionThread;
+use super::mission_thread::{MissionThread, Trials};
 use super::watchdog::{LOOK_MS, Seen, Watchdog};
 use crate::autopilot_link::AutopilotLink;
 use crate::cli::shadow_log::ShadowLog;
@@ -140,12 +140,14 @@ fn open(mut config: Config, is_shadow: bool) -> anyhow::Result<(ControlThread, M
         is_shadow,
         pace: Pace::default(),
     };
+    let trials = Trials::start(link.bell()).context("the thread that tries scripts out")?;
     let mission = MissionThread {
         side: mission,
         link,
         exchange,
         incarnation: memory.incarnation,
         complaints: Complaints::default(),
+        trials,
         began,
     };
     Ok((control, mission))
