@@ -12,6 +12,7 @@ use skein_planning::map::MapError;
 use skein_wire::{Limits, Readiness, Scan, State};
 
 use crate::{
+    apart::decisions::{Decisions, Standing, is_too_late},
     config::AgentConfig,
     energy::{Energy, known_charge},
     flight::{Flight, FlightPhase},
@@ -34,6 +35,9 @@ use crate::{
     scripts::Circumstances,
     watches::Watches,
 };
+
+/// The checks before take-off are told this often, for those who have come since.
+const READINESS_PERIOD: Duration = Duration::from_secs(1);
 
 /// What set-points were made from: the keep-alive rule, observed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -80,6 +84,8 @@ pub struct Control {
     set_points: SetPointRecord,
     /// The newest set-point, and when it was made.
     last_set_point: Option<(Duration, SetPoint)>,
+    decisions: Decisions,
+    told_readiness: Option<(Duration, Readiness)>,
 }
 
 impl Control {
@@ -119,6 +125,8 @@ impl Control {
             guidance: Guidance::new(config.envelope, layers),
             set_points: SetPointRecord::default(),
             last_set_point: None,
+            decisions: Decisions::default(),
+            told_readiness: None,
             name,
             config,
         })
@@ -228,6 +236,7 @@ impl Control {
         let mut reports = Vec::new();
         self.follow_autopilot(now, &mut reports);
         self.watch(now, &mut reports);
+        reports.extend(self.heed_silence(now));
         reports.extend(self.guidance.go_on_planning(self.perception.map_mut()));
         reports
     }
@@ -347,6 +356,7 @@ impl Control {
             mode: telemetry.mode.to_string(),
             battery: self.battery(),
             armed: telemetry.armed,
+            incarnation: self.config.incarnation,
             path: self.guidance.course.path_ahead().take(State::MAX_PATH).collect(),
             echo: self.neighbours.echo(now),
             ..State::new(self.name.clone())
@@ -360,8 +370,45 @@ impl Control {
         self.guidance.limit(Allowed::from(limits));
     }
 
-    /// Carries out an instruction.
-    pub fn carry_out(&mut self, now: Duration, instruction: Instruction) -> Option<Report> {
+    /// The mission has decided at this time, even if it was that nothing is to be done.
+    pub fn note_decision(&mut self, at: Duration) {
+        self.decisions.note(at);
+    }
+
+    /// For how long the mission has not decided, if that is too long to fly on.
+    pub fn mission_silence(&mut self, now: Duration) -> Option<Duration> {
+        (self.decisions.standing(now) != Standing::Fresh).then(|| self.decisions.age(now))
+    }
+
+    /// Without fresh decisions there is no leave to move, so that the vehicle hovers and avoids; what does not fly yet
+    /// is called off, and after a while it lands.
+    fn heed_silence(&mut self, now: Duration) -> Option<Report> {
+        let standing = self.decisions.standing(now);
+        let why = format!("nothing was decided on board for {:.1} s", self.decisions.age(now).as_secs_f64());
+        match standing {
+            Standing::Fresh => None,
+            Standing::Old | Standing::TooOld if self.flight.is_on_the_ground() => {
+                self.flight.call_off(now, &why, &mut self.companion)
+            }
+            Standing::Old => None,
+            Standing::TooOld => self.land(now, &why),
+        }
+    }
+
+    /// Lands of its own accord a vehicle that it flies, unless it does already; gives what the mission should hear.
+    pub fn land(&mut self, now: Duration, why: &str) -> Option<Report> {
+        if !self.flight.is_committed() || self.flight.is_landing() || self.flight.is_on_the_ground() {
+            return None;
+        }
+        self.carry_out(now, now, Instruction::Land);
+        Some(Report::Lands(why.to_owned()))
+    }
+
+    /// Carries out an instruction that was decided at `at`.
+    pub fn carry_out(&mut self, now: Duration, at: Duration, instruction: Instruction) -> Option<Report> {
+        if is_too_late(now, at, &instruction) {
+            return self.flight.decline(instruction, self.companion.telemetry().mode);
+        }
         if instruction == Instruction::TakeOff {
             let height_m = self.guidance.takeoff_height_m(self.config.takeoff_height_m, self.config.home[2]);
             self.flight.climb_to(height_m, self.motion().map(|motion| motion.position));
@@ -373,7 +420,7 @@ impl Control {
                 let (motion, map) = (self.motion()?, self.perception.map_mut());
                 return self.guidance.plan(is_stuck, &motion, map, self.neighbours.around());
             }
-            Instruction::GrantLeave => self.guidance.grant_leave(now),
+            Instruction::GrantLeave => self.guidance.grant_leave(at),
             Instruction::Land => self.settle(now),
             Instruction::EndFlight => self.guidance.forget(),
             Instruction::Hold => self.guidance.hold(),
@@ -555,6 +602,16 @@ impl Control {
             datum: degrees(&self.config.datum),
             checks: self.preflight.checks().to_vec(),
         }
+    }
+
+    /// The same, if it is to be told now: every second, and when one has changed its state.
+    pub fn readiness_to_tell(&mut self, now: Duration) -> Option<Readiness> {
+        let readiness = self.readiness();
+        let states = |said: &Readiness| said.checks.iter().map(|check| check.state).collect::<Vec<_>>();
+        let told = self.told_readiness.as_ref();
+        let is_due =
+            told.is_none_or(|(at, told)| now >= *at + READINESS_PERIOD || states(told) != states(&readiness));
+        is_due.then(|| self.told_readiness.insert((now, readiness)).1.clone())
     }
 
     /// Why a vehicle on the ground is not ready to take off.

@@ -11,23 +11,19 @@ use nalgebra::Vector3;
 use skein_dbp::{Happened, NodeName};
 use skein_mav::{SetPoint, Text};
 use skein_wire::event::What;
-use skein_wire::{KeptScript, Link, NodeLink, Scan, Store};
+use skein_wire::{KeptScript, Link, NodeLink, Scan, Store, VehicleLink};
 
 use crate::{
     agent_error::AgentError,
+    apart::{ControlSide, MissionSide},
     config::AgentConfig,
     control::{Control, SetPointRecord},
     mission::{Mission, Outcome},
     parts::Parts,
-    pipeline::set_point::SILENT_AFTER,
     positioning::Motion,
     scripts::RunningScript,
 };
 
-/// An agent that has not run for this long has let its set-points fall silent, and does not take them up by itself.
-const LONGEST_PAUSE: Duration = SILENT_AFTER;
-/// A navigation cycle and a state message to the others begin this often.
-const CYCLE_PERIOD: Duration = Duration::from_millis(100);
 /// Planning answers a decision with a new report, which deserves its turn in the same tick; so often.
 const ROUNDS: usize = 4;
 
@@ -47,10 +43,8 @@ pub struct Status {
 /// One vehicle's agent. Feed it bytes and scans, tick it every 20 ms, carry its bytes away.
 #[derive(Debug)]
 pub struct AgentCore {
-    control: Control,
+    side: ControlSide,
     mission: Mission,
-    next_cycle: Duration,
-    last_tick: Option<Duration>,
 }
 
 impl AgentCore {
@@ -76,7 +70,16 @@ impl AgentCore {
         let Parts { mind, positioning, layers } = parts;
         let mission = Mission::new(config.clone(), mind, store)?;
         let control = Control::new(config, mission.name().clone(), positioning, layers)?;
-        Ok(Self { control, mission, next_cycle: Duration::ZERO, last_tick: None })
+        let members = mission.node().node().peers().map(|(member, _)| member.clone());
+        let vehicles = VehicleLink::new(mission.name().clone(), mission.node().fleet().clone(), members);
+        Ok(Self { side: ControlSide::new(control, vehicles), mission })
+    }
+
+    /// Control and mission, to run each at its own pace.
+    #[must_use]
+    pub fn split(mut self) -> (ControlSide, MissionSide) {
+        self.side.speak(self.mission.words(None));
+        (self.side, MissionSide::new(self.mission))
     }
 
     /// The same agent, which keeps the scripts that are sent to it in `store`. Of those `kept` by a former life, each
@@ -88,40 +91,48 @@ impl AgentCore {
         self
     }
 
+    /// The same agent, whose promises of a former life are lost, and `why`: it stands, or holds, until an operator says
+    /// that it may go on.
+    #[must_use]
+    pub fn having_lost_promises(mut self, why: &str) -> Self {
+        self.mission.forget_promises(why);
+        self
+    }
+
     /// The same agent as the shadow of a pilot: it plans and makes set-points while somebody else flies the
     /// vehicle, and nothing leaves that the vehicle would obey.
     #[must_use]
     pub fn shadowing(mut self) -> Self {
-        self.control.shadow();
+        self.side.control.shadow();
         self
     }
 
     /// The newest set-point, when it was made, and the motion of the vehicle as it is now; none before the first.
     #[must_use]
     pub fn last_set_point(&self) -> Option<(Duration, SetPoint, Motion)> {
-        self.control.last_set_point()
+        self.side.control.last_set_point()
     }
 
     /// Takes in bytes from the autopilot.
     pub fn receive_mavlink(&mut self, now: Duration, bytes: &[u8]) {
-        self.control.receive_mavlink(now, bytes);
+        self.side.control.receive_mavlink(now, bytes);
     }
 
     /// Bytes for the autopilot.
     pub fn take_mavlink(&mut self) -> Vec<u8> {
-        self.control.take_mavlink()
+        self.side.control.take_mavlink()
     }
 
     /// Takes in what another station says to the autopilot through this agent: an order of it takes the vehicle over.
     pub fn overhear(&mut self, now: Duration, bytes: &[u8]) {
-        if let Some(report) = self.control.overhear(bytes) {
+        if let Some(report) = self.side.control.overhear(bytes) {
             self.mission.hear(now, report);
         }
     }
 
     /// Takes the lines that the autopilot has written since the last call.
     pub fn take_texts(&mut self) -> Vec<Text> {
-        self.control.take_texts()
+        self.side.control.take_texts()
     }
 
     /// Takes in an order of whoever is at this vehicle's own computer.
@@ -131,24 +142,36 @@ impl AgentCore {
 
     /// Takes in a lidar scan.
     pub fn sense(&mut self, now: Duration, scan: &Scan) {
-        self.control.sense(now, scan);
+        self.side.control.sense(now, scan);
     }
 
     /// One tick, every 20 ms: hears, decides, and answers with a set-point.
     pub fn tick(&mut self, now: Duration, link: &mut dyn Link) {
-        self.note_pause(now);
+        if let Some(report) = self.side.note_pause(now) {
+            self.mission.hear(now, report);
+            // Before anything that was said meanwhile is heard.
+            self.decide(now);
+        }
         self.hear(now, link);
-        for report in self.control.observe(now) {
+        for report in self.side.control.observe(now) {
             self.mission.hear(now, report);
         }
-        if now >= self.next_cycle {
-            self.next_cycle = now + CYCLE_PERIOD;
+        if self.side.begins_cycle(now) {
             self.begin_cycle(now, link);
         }
         self.decide(now);
-        self.control.steer(now);
+        self.side.control.steer(now);
         self.mission.send(link);
         self.mission.put_board(now, link);
+    }
+
+    /// One tick of a vehicle whose mission is silent, as it would be on a thread of its own that hangs.
+    pub fn tick_without_mission(&mut self, now: Duration, link: &mut dyn Link) {
+        self.side.speak(self.mission.words(None));
+        self.side.tick(now, link);
+        for (_, report) in self.side.take_news().reports {
+            self.mission.hear(now, report);
+        }
     }
 
     /// Between two ticks: answers at once what other nodes say, without a set-point. Makes the swarm quick to hold.
@@ -158,70 +181,69 @@ impl AgentCore {
         self.mission.send(link);
     }
 
-    fn note_pause(&mut self, now: Duration) {
-        let pause = self.last_tick.replace(now).map_or(Duration::ZERO, |last| now.saturating_sub(last));
-        if pause > LONGEST_PAUSE
-            && let Some(report) = self.control.wake(pause)
-        {
-            self.mission.hear(now, report);
-            // Before anything that was said meanwhile is heard.
-            self.decide(now);
-        }
-    }
-
     fn hear(&mut self, now: Duration, link: &mut dyn Link) {
         let states = self.mission.receive(now, link);
-        self.control.hear(now, states);
-        self.control.hear_readiness(now, self.mission.take_readiness());
+        self.side.control.hear(now, states);
+        self.side.control.hear_readiness(now, self.mission.take_readiness());
     }
 
     /// A navigation cycle: looks along the path, and tells the others where this vehicle is.
     fn begin_cycle(&mut self, now: Duration, link: &mut dyn Link) {
-        for report in self.control.look_ahead(now) {
+        let control = &mut self.side.control;
+        for report in control.look_ahead(now) {
             self.mission.hear(now, report);
         }
-        if let Some(circumstances) = self.control.circumstances() {
+        if let Some(circumstances) = control.circumstances() {
             self.mission.tell_scripts(&circumstances);
         }
         self.mission.catch_up(now);
-        self.mission.put_readiness(now, self.control.readiness(), link);
-        if let Some(state) = self.control.state(now) {
-            self.mission.put_state(state, self.control.complaint(), link);
+        if let Some(readiness) = control.readiness_to_tell(now) {
+            self.mission.put_readiness(&readiness, link);
+        }
+        if let Some(state) = control.state(now) {
+            self.mission.put_state(state, control.complaint(), link);
         }
     }
 
     /// Lets whoever decides do so until nothing new comes of it, and carries out what was decided.
     fn decide(&mut self, now: Duration) {
+        let control = &mut self.side.control;
         for _ in 0..ROUNDS {
             let decided = self.mission.decide(now);
             if decided.is_empty() {
                 break;
             }
             for happened in &decided {
-                let instruction = self.mission.follow(happened, self.control.flight().is_landing());
-                let report = instruction.and_then(|instruction| self.control.carry_out(now, instruction));
+                let instruction = self.mission.follow(happened, control.flight().is_landing());
+                while let Some(trial) = self.mission.next_trial() {
+                    self.mission.note_trial(trial.run());
+                }
+                let report = instruction.and_then(|instruction| control.carry_out(now, now, instruction));
                 if let Some(report) = report {
                     self.mission.hear(now, report);
                 }
             }
             self.mission.record(decided);
         }
-        self.control.limit(self.mission.limits());
+        control.note_decision(now);
+        if let Some(limits) = self.mission.changed_limits() {
+            control.limit(limits);
+        }
     }
 
     /// Whether this agent has the vehicle in the air, or on its way there.
     pub fn is_committed(&self) -> bool {
-        self.control.flight().is_committed()
+        self.side.control.flight().is_committed()
     }
 
     /// One line about this vehicle.
     pub fn status(&self, now: Duration) -> Status {
         Status {
-            mode: self.control.mode(),
+            mode: self.side.control.mode(),
             task: self.mission.task().to_owned(),
-            waiting_for: self.mission.waiting_for(self.control.complaint()),
-            battery: self.control.battery(),
-            nearest: self.control.nearest(now),
+            waiting_for: self.mission.waiting_for(self.side.control.complaint()),
+            battery: self.side.control.battery(),
+            nearest: self.side.control.nearest(now),
         }
     }
 
@@ -246,17 +268,17 @@ impl AgentCore {
     }
 
     pub fn set_points(&self) -> SetPointRecord {
-        self.control.set_points()
+        self.side.control.set_points()
     }
 
     /// Standard deviation of the position, as others are told, m; 0 while there is none.
     pub fn position_sigma_m(&self) -> f64 {
-        self.control.position_sigma_m()
+        self.side.control.position_sigma_m()
     }
 
     /// The path ahead, from the vehicle to its waypoint; empty without one.
     pub fn path_ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
-        self.control.guidance().course.path_ahead()
+        self.side.control.guidance().course.path_ahead()
     }
 
     /// The vehicle's node: its program, its peers, and what has come in that was not understood.
@@ -266,7 +288,7 @@ impl AgentCore {
 
     /// Whether a path is being searched for that the last tick was not enough for.
     pub fn is_planning(&self) -> bool {
-        self.control.guidance().planning.is_under_way()
+        self.side.control.guidance().planning.is_under_way()
     }
 
     /// The vehicle's node name.

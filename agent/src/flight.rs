@@ -145,6 +145,12 @@ impl Flight {
         matches!(self.phase, FlightPhase::Arming | FlightPhase::Climbing)
     }
 
+    /// Whether what this agent has begun has not brought the vehicle off the ground yet.
+    #[must_use]
+    pub fn is_on_the_ground(&self) -> bool {
+        self.phase == FlightPhase::Grounded || self.is_taking_off() && !self.left_ground
+    }
+
     /// Whether this agent, and nobody else, has the vehicle off the ground or on its way.
     #[must_use]
     pub fn is_committed(&self) -> bool {
@@ -288,17 +294,42 @@ impl Flight {
     ) -> Option<Report> {
         match self.phase {
             FlightPhase::Arming | FlightPhase::Climbing if !self.left_ground => {
-                self.phase = FlightPhase::Grounded;
-                self.next = None;
-                if companion.telemetry().armed {
-                    companion.command(now, Command::Disarm);
-                }
-                Some(Report::CommandFailed(format!("{command:?}: {why}")))
+                Some(self.stay_down(now, format!("{command:?}: {why}"), companion))
             }
             FlightPhase::Engaging { .. } if command == Command::Offboard => {
                 self.engage(now);
                 None
             }
+            _ => None,
+        }
+    }
+
+    /// Calls off what has not brought the vehicle off the ground yet.
+    pub fn call_off(&mut self, now: Duration, why: &str, companion: &mut Companion) -> Option<Report> {
+        let is_under_way = self.is_taking_off() && !self.left_ground;
+        is_under_way.then(|| self.stay_down(now, why.to_owned(), companion))
+    }
+
+    fn stay_down(&mut self, now: Duration, why: String, companion: &mut Companion) -> Report {
+        self.phase = FlightPhase::Grounded;
+        self.next = None;
+        if companion.telemetry().armed {
+            companion.command(now, Command::Disarm);
+        }
+        Report::CommandFailed(why)
+    }
+
+    /// Does not carry out an instruction that has come too late; gives what the mission should hear, which takes it for
+    /// carried out.
+    pub fn decline(&mut self, instruction: Instruction, mode: FlightMode) -> Option<Report> {
+        match (instruction, self.phase) {
+            (Instruction::TakeOff, FlightPhase::Grounded) => {
+                Some(Report::CommandFailed("the decision to take off has come too late".to_owned()))
+            }
+            (Instruction::TakeBack, FlightPhase::Taken) => {
+                Some(self.leave_to(mode, "its agent: it was given back too late".to_owned()))
+            }
+            (Instruction::Resume, FlightPhase::Adopted) => Some(Report::FoundAirborne),
             _ => None,
         }
     }

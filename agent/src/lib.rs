@@ -7,6 +7,7 @@
 
 mod agent_error;
 mod airspace_table;
+pub mod apart;
 #[cfg(feature = "zenoh")]
 pub mod autopilot_link;
 pub mod bthreads;

@@ -1,7 +1,7 @@
 //! Mission: what the vehicle is to do. The node with its b-threads and peers, the scripts, and how far the task has
 //! come.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -18,6 +18,7 @@ use skein_wire::{
 
 use crate::{
     agent_error::AgentError,
+    apart::Words,
     bthreads,
     config::AgentConfig,
     instruction::Instruction,
@@ -26,15 +27,12 @@ use crate::{
     precedence,
     report::Report,
     safety::safety_events,
-    scripts::{Begins, CONFIGURATION, Circumstances, ScriptFacts, Scripts},
+    scripts::{Begins, CONFIGURATION, Circumstances, Loaded, ScriptFacts, Scripts},
     verify::check_script,
 };
 
-/// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for
-/// between two ticks. `skein-agent verify --script` looks at all.
+/// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for. `skein-agent verify --script` looks at all.
 const STATES_TRIED: usize = 500;
-/// The checks before take-off are told this often, for those who have come since.
-const READINESS_PERIOD: Duration = Duration::from_secs(1);
 
 /// The outcome of a vehicle's mission.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,7 +60,46 @@ pub struct Mission {
     /// The revision of the program that these are of.
     limits_of: Option<u64>,
     fault: Option<String>,
-    told_readiness: Option<(Duration, Readiness)>,
+    trials: VecDeque<Trial>,
+    /// The trials that have begun, or are to.
+    trying: usize,
+}
+
+/// So many scripts are tried out at once, or wait for it.
+const MOST_TRIALS: usize = 4;
+
+/// A script that was sent, and is to be tried out before it runs.
+#[derive(Debug)]
+pub struct Trial {
+    assignment: Assignment,
+    from: String,
+    config: Arc<AgentConfig>,
+    /// Whether a script of its name runs, so that there is nothing to be tried.
+    is_known: bool,
+}
+
+/// A script that was tried out.
+#[derive(Debug)]
+pub struct Tried {
+    assignment: Assignment,
+    from: String,
+    outcome: Result<(), String>,
+}
+
+impl Trial {
+    /// Looks for a fault of the script together with the vehicle's program. It takes some tens of milliseconds.
+    #[must_use]
+    pub fn run(self) -> Tried {
+        let Self { assignment, from, config, is_known } = self;
+        let outcome = if is_known { Ok(()) } else { check_script(&config, &assignment, STATES_TRIED) };
+        Tried { assignment, from, outcome }
+    }
+
+    /// The script is not tried, and does not run, because of this.
+    #[must_use]
+    pub fn refused(self, why: &str) -> Tried {
+        Tried { assignment: self.assignment, from: self.from, outcome: Err(why.to_owned()) }
+    }
 }
 
 impl Mission {
@@ -82,7 +119,7 @@ impl Mission {
         for assignment in &config.scripts {
             scripts
                 .load(&mut program, assignment, CONFIGURATION, Begins::WhenReleased)
-                .and_then(|()| check_script(&config, assignment, STATES_TRIED))
+                .and_then(|_| check_script(&config, assignment, STATES_TRIED))
                 .map_err(|why| AgentError::Script { name: assignment.name().to_owned(), why })?;
         }
         let fleet = Fleet::new(&config.fleet)
@@ -103,7 +140,8 @@ impl Mission {
             limits: Limits::default(),
             limits_of: None,
             fault: None,
-            told_readiness: None,
+            trials: VecDeque::new(),
+            trying: 0,
             name,
             me,
             config,
@@ -115,6 +153,7 @@ impl Mission {
         for KeptScript { from, assignment } in kept {
             let outcome = self
                 .admit(assignment, from, Begins::WhenReleased)
+                .map(|_| ())
                 .map_err(|why| format!("it was kept from the agent's last life, and passes no more: {why}"));
             self.node.node_mut().enqueue(self.scripts.verdict(assignment.name(), outcome));
         }
@@ -137,15 +176,9 @@ impl Mission {
         self.node.take_readiness()
     }
 
-    /// Tells the others of this vehicle's checks before take-off, if that is due: every second, and when one has
-    /// changed its state.
-    pub fn put_readiness(&mut self, now: Duration, readiness: Readiness, link: &mut dyn Link) {
-        let states = |said: &Readiness| said.checks.iter().map(|check| check.state).collect::<Vec<_>>();
-        let told = self.told_readiness.as_ref();
-        if told.is_none_or(|(at, told)| now >= *at + READINESS_PERIOD || states(told) != states(&readiness)) {
-            self.node.put_readiness(&readiness, link);
-            self.told_readiness = Some((now, readiness));
-        }
+    /// Tells the others of this vehicle's checks before take-off.
+    pub fn put_readiness(&mut self, readiness: &Readiness, link: &mut dyn Link) {
+        self.node.put_readiness(readiness, link);
     }
 
     /// Says to other nodes what is due.
@@ -160,8 +193,13 @@ impl Mission {
 
     /// Tells the others where this vehicle is and how far its task has come. `state` is that of its body.
     pub fn put_state(&mut self, state: State, complaint: Option<String>, link: &mut dyn Link) {
-        let state = State {
-            incarnation: self.config.incarnation,
+        let state = self.words(complaint).said_of(state);
+        self.node.put_state(&state, link);
+    }
+
+    /// How far the task has come; `complaint` is control's, why the vehicle is not ready.
+    pub fn words(&self, complaint: Option<String>) -> Words {
+        Words {
             task: self.task.clone(),
             waiting_for: self.waiting_for(complaint),
             mission: match &self.outcome {
@@ -170,9 +208,7 @@ impl Mission {
                 Some(Outcome::Failed(_)) => MissionState::Failed,
             },
             scripts: self.scripts.running().map(|(name, _)| name.to_owned()).collect(),
-            ..state
-        };
-        self.node.put_state(&state, link);
+        }
     }
 
     /// Tells whoever decides what control has found out.
@@ -196,9 +232,12 @@ impl Mission {
         }
     }
 
-    /// Tries again to keep the scripts that could not be kept.
+    /// Goes on with keeping scripts, and tells what has become of those that waited for it.
     pub fn catch_up(&mut self, now: Duration) {
-        self.scripts.catch_up(now);
+        self.node.node_mut().note_disk("scripts", self.scripts.unsaved());
+        for (name, outcome) in self.scripts.catch_up(now, self.node.node_mut().program_mut()) {
+            self.node.node_mut().enqueue(self.scripts.verdict(&name, outcome));
+        }
     }
 
     /// One step of whoever decides: what happened, in order.
@@ -210,14 +249,25 @@ impl Mission {
         self.mind.decide(now, self.node.node_mut())
     }
 
-    /// The limits on the vehicle's motion that its b-threads state now.
-    pub fn limits(&mut self) -> &Limits {
+    /// The limits on the vehicle's motion that its b-threads state now, if they may have changed since the last call.
+    pub fn changed_limits(&mut self) -> Option<&Limits> {
         let program = self.node.node().program();
-        if self.limits_of != Some(program.revision()) {
-            self.limits_of = Some(program.revision());
-            self.limits = Limits::of(self.me.name(), program.stated());
+        if self.limits_of.replace(program.revision()) == Some(program.revision()) {
+            return None;
         }
-        &self.limits
+        self.limits = Limits::of(self.me.name(), program.stated());
+        Some(&self.limits)
+    }
+
+    /// Tells once when the disk does not take `what` must be kept, and once when it does again.
+    pub fn note_disk(&mut self, what: &str, trouble: Option<&str>) {
+        self.node.node_mut().note_disk(what, trouble);
+    }
+
+    /// What this vehicle has promised in a former life is lost, and `why`: it does not go on before an operator says so.
+    pub fn forget_promises(&mut self, why: &str) {
+        let bthread = bthreads::LostPromises::new(self.me.clone(), why);
+        self.node.node_mut().program_mut().add("lost_promises", bthread);
     }
 
     /// Takes in one thing that happened; gives back what control has to do then.
@@ -259,53 +309,78 @@ impl Mission {
         };
     }
 
-    /// Runs the scripts that are sent, and answers what cannot be done.
+    /// Has the scripts tried out that are sent, and answers what cannot be done.
     fn look_after_scripts(&mut self, happened: &Happened) {
         let event = &happened.event;
-        let verdict = match self.me.verb(event) {
-            Some(Load::NAME) => {
-                let (name, outcome) = self.load_script(happened);
-                self.scripts.verdict(&name, outcome)
-            }
+        let refused = match self.me.verb(event) {
+            Some(Load::NAME) => self.begin_trial(happened),
             Some(Unload::NAME) => {
                 let name = Unload::read(event).map(|unload| unload.name).unwrap_or_default();
-                if self.scripts.runs(&name) {
-                    return;
+                match self.scripts.runs(&name) {
+                    true => Ok(()),
+                    false => Err((name.to_string(), "no script of this name runs".to_owned())),
                 }
-                self.scripts.verdict(&name, Err("no script of this name runs".to_owned()))
             }
             Some(ScriptNews::NAME) => return self.scripts.hear(event),
             _ => return,
         };
-        self.node.node_mut().enqueue(verdict);
+        if let Err((name, why)) = refused {
+            self.node.node_mut().enqueue(self.scripts.verdict(&name, Err(why)));
+        }
     }
 
-    /// Runs a script that is sent; gives back its name, and why it is not run if it is not.
-    fn load_script(&mut self, happened: &Happened) -> (String, Result<(), String>) {
+    /// Puts a script that is sent among those to be tried out, or says why not.
+    fn begin_trial(&mut self, happened: &Happened) -> Result<(), (String, String)> {
         let text = Load::read(&happened.event).map(|load| load.script).unwrap_or_default();
-        let assignment = match Assignment::from_json(&text) {
-            Ok(assignment) => assignment,
-            Err(error) => return (String::new(), Err(error.to_string())),
-        };
+        let assignment = Assignment::from_json(&text).map_err(|error| (String::new(), error.to_string()))?;
         let sender = happened.requested_by.iter().find(|bthread| bthread.contains('#'));
         let from = sender.map_or(self.name.as_str(), |bthread| bthread).to_owned();
-        let outcome = self.admit(&assignment, &from, Begins::AtOnce);
-        (assignment.name().to_owned(), outcome)
+        let refused = |why| (assignment.name().to_owned(), why);
+        self.check_sender(&assignment, &from).map_err(refused)?;
+        if self.trying == MOST_TRIALS {
+            return Err(refused(format!("{MOST_TRIALS} scripts are being tried out already; send it again")));
+        }
+        self.trying += 1;
+        let known = self.scripts.runs(assignment.name());
+        self.trials.push_back(Trial { assignment, from, config: self.config.clone(), is_known: known });
+        Ok(())
     }
 
-    /// Runs a script that `from` has sent, now or to a former life of this agent, if it passes all checks.
-    fn admit(&mut self, assignment: &Assignment, from: &str, begins: Begins) -> Result<(), String> {
-        if !self.may_send(assignment, from)? {
-            let node = from.split_once('#').map_or(from, |(node, _)| node);
-            return Err(format!(
-                "{node} may not send scripts: that is for the ground station and its operators"
-            ));
-        }
+    /// The next script that is to be tried out, by whoever has the time for it.
+    pub fn next_trial(&mut self) -> Option<Trial> {
+        self.trials.pop_front()
+    }
+
+    /// Runs a script that has been tried out, or says why not.
+    pub fn note_trial(&mut self, Tried { assignment, from, outcome }: Tried) {
+        self.trying = self.trying.saturating_sub(1);
+        let outcome = match outcome.and_then(|()| self.load(&assignment, &from, Begins::AtOnce)) {
+            Ok(Loaded::Waits) => return,
+            outcome => outcome.map(|_| ()),
+        };
+        self.node.node_mut().enqueue(self.scripts.verdict(assignment.name(), outcome));
+    }
+
+    /// Runs a script that `from` has sent to a former life of this agent, if it passes all checks.
+    fn admit(&mut self, assignment: &Assignment, from: &str, begins: Begins) -> Result<Loaded, String> {
+        self.check_sender(assignment, from)?;
         if !self.scripts.runs(assignment.name()) {
             check_script(&self.config, assignment, STATES_TRIED)?;
         }
+        self.load(assignment, from, begins)
+    }
+
+    fn load(&mut self, assignment: &Assignment, from: &str, begins: Begins) -> Result<Loaded, String> {
         self.script_facts.forget();
         self.scripts.load(self.node.node_mut().program_mut(), assignment, from, begins)
+    }
+
+    fn check_sender(&self, assignment: &Assignment, from: &str) -> Result<(), String> {
+        if self.may_send(assignment, from)? {
+            return Ok(());
+        }
+        let node = from.split_once('#').map_or(from, |(node, _)| node);
+        Err(format!("{node} may not send scripts: that is for the ground station and its operators"))
     }
 
     /// Whether `from` has the right to send this script: the vehicle itself, or a b-thread of another node that is a

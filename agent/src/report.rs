@@ -8,8 +8,8 @@ use skein_dbp::NodeName;
 use skein_mav::FlightMode;
 use skein_wire::event::{
     self, Airborne, Arrived, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed,
-    FenceBreached, FoundAirborne, Landed, Leave, PathBlocked, PilotTook, Planned, PositionDoubted,
-    PositionTrusted, Ready, Slept, Stuck, TooClose, Unplannable, Unready,
+    FenceBreached, FoundAirborne, Landed, Leave, OrderTaken, PathBlocked, PilotTook, Planned,
+    PositionDoubted, PositionTrusted, Ready, Slept, Stuck, TooClose, Unplannable, Unready, What,
 };
 
 use crate::energy::Changed;
@@ -34,6 +34,8 @@ pub enum Report {
     },
     /// The agent has not run for so long that it let go of the vehicle.
     Slept(Duration),
+    /// Control lands the vehicle of its own accord, and this is why; the mission is to see to it that it stays so.
+    Lands(String),
     /// The autopilot does not do what it was told on the ground.
     CommandFailed(String),
     /// The battery holds what the way home needs, or nobody knows what it holds.
@@ -89,6 +91,9 @@ impl Report {
             Self::FoundAirborne => me.event(FoundAirborne),
             Self::Taken { mode, by } => me.event(PilotTook { mode: mode.to_string().into(), by: by.into() }),
             Self::Slept(pause) => me.event(Slept { seconds: pause.as_secs_f64() }),
+            Self::Lands(why) => {
+                me.event(OrderTaken { by: Some(why.into()), ..OrderTaken::plain(What::Land) })
+            }
             Self::CommandFailed(why) => me.event(CommandFailed { why: why.into() }),
             Self::BatteryLow(why) => me.event(BatteryLow { why: why.into() }),
             Self::BatteryChanged(Changed { from, to }) => {

@@ -18,7 +18,7 @@ use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_bp::{Event, Program, ProgramConfig};
 use skein_mav::Datum;
 use skein_wire::event::*;
-use skein_wire::{KeptScript, Limits, MemoryStore, Network, NetworkConfig, Store};
+use skein_wire::{KeptScript, Limits, MemoryStore, Network, NetworkConfig, Saving, Store};
 
 const ME: &str = "uav/1";
 const ROSTER: [&str; 4] = ["uav/1", "uav/2", "ground/main", "script/operator"];
@@ -90,7 +90,7 @@ impl Vehicle {
     }
 
     fn load(&mut self, assignment: &Assignment) -> Result<(), String> {
-        self.scripts.load(&mut self.program, assignment, SENDER, Begins::AtOnce)
+        self.scripts.load(&mut self.program, assignment, SENDER, Begins::AtOnce).map(|_| ())
     }
 
     /// Everything that happens after an event from outside, itself first.
@@ -398,8 +398,8 @@ fn a_script_that_was_sent_is_kept_until_it_is_withdrawn() {
 struct Disk(Arc<AtomicBool>);
 
 impl Store<Vec<KeptScript>> for Disk {
-    fn save(&mut self, _: &Vec<KeptScript>) -> Result<(), String> {
-        if self.0.load(Ordering::Relaxed) { Ok(()) } else { Err("no space left".to_owned()) }
+    fn save(&mut self, _: &Vec<KeptScript>) -> Saving {
+        if self.0.load(Ordering::Relaxed) { Saving::Done } else { Saving::Failed("no space left".to_owned()) }
     }
 }
 
@@ -418,15 +418,15 @@ fn a_script_that_cannot_be_kept_is_refused_and_one_that_cannot_be_forgotten_is_t
     vehicle.hears(mine(Unload::NAME).with("name", "test"));
     assert!(vehicle.moves(), "it is withdrawn all the same");
     assert_eq!(vehicle.scripts.unsaved(), Some("no space left"));
-    vehicle.scripts.catch_up(Duration::ZERO);
+    vehicle.scripts.catch_up(Duration::ZERO, &mut vehicle.program);
     disk.0.store(true, Ordering::Relaxed);
-    vehicle.scripts.catch_up(Duration::from_millis(900));
+    vehicle.scripts.catch_up(Duration::from_millis(900), &mut vehicle.program);
     assert_eq!(
         vehicle.scripts.unsaved(),
         Some("no space left"),
         "a disk that fails is left alone for a while"
     );
-    vehicle.scripts.catch_up(Duration::from_secs(1));
+    vehicle.scripts.catch_up(Duration::from_secs(1), &mut vehicle.program);
     assert_eq!(vehicle.scripts.unsaved(), None);
 }
 

@@ -20,6 +20,8 @@ pub struct Config {
     pub network: NetworkSettings,
     pub console: SocketAddr,
     pub record: PathBuf,
+    /// The greatest size of a recording, bytes.
+    pub record_most_bytes: u64,
     pub state: PathBuf,
 }
 
@@ -42,6 +44,8 @@ pub struct GroundFile {
     pub console: SocketAddr,
     #[serde(default = "record")]
     pub record: PathBuf,
+    #[serde(default = "record_most_mb", skip_serializing)]
+    record_most_mb: u64,
     #[serde(default = "state", skip_serializing)]
     state: PathBuf,
     #[serde(default = "lease_ms", skip_serializing)]
@@ -71,6 +75,10 @@ fn console() -> SocketAddr {
 
 fn record() -> PathBuf {
     "record".into()
+}
+
+fn record_most_mb() -> u64 {
+    4096
 }
 
 fn state() -> PathBuf {
@@ -107,6 +115,7 @@ impl GroundFile {
             muster: station.muster,
             console,
             record: record(),
+            record_most_mb: record_most_mb(),
             state: state(),
             lease_ms: lease_ms(),
             behaviours: station.behaviours.settings(station.name.as_str()),
@@ -144,6 +153,7 @@ impl GroundFile {
             network: self.network.relative_to(folder),
             console: self.console,
             record: folder.join(self.record),
+            record_most_bytes: self.record_most_mb.saturating_mul(1 << 20),
             state: folder.join(self.state),
         })
     }
@@ -169,6 +179,7 @@ mod tests {
             .collect();
         let full = check(&all.join("\n")).unwrap();
         assert_eq!((full.console, full.record, full.state), (config.console, config.record, config.state));
+        assert_eq!(full.record_most_bytes, config.record_most_bytes);
         assert_eq!(full.network.mode, config.network.mode);
         assert!(full.network.security.is_some());
         assert_eq!(full.station.lease, config.station.lease);

@@ -64,6 +64,7 @@ impl GroundCore {
             joint: Some(joint_roster(config.name.clone(), &roster)),
             durable: store.is_some(),
             kept: config.kept,
+            forgot: config.forgot,
             ..NodeConfig::new(config.name.clone(), config.incarnation, roster)
         };
         config.orders.sort_by_key(|(at, _)| *at);
@@ -109,6 +110,11 @@ impl GroundCore {
             self.node.node_mut().enqueue(event);
         }
         Ok(self.order_log.give(self.now, order.clone(), concerned.into_iter().map(|(vehicle, _)| vehicle)))
+    }
+
+    /// Tells once when the disk does not take `what` must be kept, and once when it does again.
+    pub fn note_disk(&mut self, what: &str, trouble: Option<&str>) {
+        self.node.node_mut().note_disk(what, trouble);
     }
 
     /// Hears, decides and answers.

@@ -6,6 +6,8 @@ use anyhow::Context as _;
 use skein_wire::{Fleet, Key, Link as _, NodeName, Payload, Scan};
 use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohLink, ZenohSession};
 
+use super::log::Log;
+
 /// A scan from further in the future comes from a clock that is wrong.
 const CLOCK_TOLERANCE: Duration = Duration::from_millis(50);
 /// Of more scans that wait, only the newest are read: a lidar turns ten or twenty times a second.
@@ -15,6 +17,7 @@ const MOST_WAITING: usize = 4;
 pub struct LidarScans {
     link: ZenohLink,
     strange: u64,
+    log: Log,
 }
 
 impl LidarScans {
@@ -24,13 +27,14 @@ impl LidarScans {
         vehicle: &NodeName,
         (sensor, network): (NodeName, Option<NetworkSettings>),
         session: &ZenohSession,
+        log: Log,
     ) -> anyhow::Result<Self> {
         let key = Key::to_one::<Scan>(fleet, sensor.clone(), vehicle.clone());
         let own = network.map(|network| ZenohConfig::new(fleet.clone(), network).of(vehicle, [sensor]));
         let own = own.map(ZenohSession::open);
         let session = own.transpose()?.unwrap_or_else(|| session.clone());
         let link = session.listen(vec![key.to_string()]).context("`lidar`")?;
-        Ok(Self { link, strange: 0 })
+        Ok(Self { link, strange: 0, log })
     }
 
     /// Takes the next scan that has come, if there is one; `now` is this program's clock.
@@ -64,7 +68,7 @@ impl LidarScans {
     fn complain(&mut self, what: &str) {
         self.strange += 1;
         if self.strange.is_power_of_two() {
-            tracing::warn!("{} {what}", self.strange);
+            self.log.warn(format!("{} {what}", self.strange));
         }
     }
 }

@@ -1,10 +1,15 @@
 //! The program of one vehicle: see `skein-agent --help`.
 
+mod control_thread;
+mod exchange;
 mod lidar_scans;
+mod log;
+mod mission_thread;
 mod preflight;
 mod run;
 mod shadow_log;
 mod verify;
+mod watchdog;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -10,6 +10,7 @@ use skein_wire::{Check, CheckState, Fleet, Key, Link as _, Payload, Readiness, S
 use skein_zenoh::{ZenohConfig, ZenohLink, ZenohSession};
 
 use super::lidar_scans::LidarScans;
+use super::log::Log;
 use crate::autopilot_link::{Address, AutopilotLink};
 use crate::config_file::Config;
 use crate::control::Control;
@@ -71,7 +72,9 @@ impl Vehicle {
         match network {
             Ok(session) => {
                 let lidar = config.lidar;
-                scans = lidar.map(|it| LidarScans::open(&fleet, &config.name, it, &session)).transpose()?;
+                scans = lidar
+                    .map(|it| LidarScans::open(&fleet, &config.name, it, &session, Log::open(None)?))
+                    .transpose()?;
                 let keys = vec![Key::pattern::<State>(&fleet), Key::pattern::<Readiness>(&fleet)];
                 others = Some(session.listen(keys)?);
             }

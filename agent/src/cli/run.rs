@@ -1,189 +1,157 @@
-//! `run`: the agent's loop around its core.
+//! `run`: one vehicle's threads around its core.
+//!
+//! [Control](ControlThread) and [mission](MissionThread) have a thread each; a third writes control's lines, and the
+//! program's first watches over them. The program never flies on with half of itself: without its mission it lands and
+//! ends, without control it ends at once, and the autopilot's own failsafe acts.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::Ordering;
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant, SystemTime};
 
-use anyhow::Context as _;
-use skein_disk::{PromiseStore, ScriptStore, next_incarnation};
-use skein_mav::{Severity, Text};
-use skein_wire::Fleet;
-use skein_wire::event::{Advance, Declared as _, Homeward, What};
-use skein_zenoh::{Bell, Complaints, ZenohConfig, ZenohLink, ZenohSession};
+use anyhow::{Context as _, bail};
+use skein_disk::{Background, Memory, ScriptStore};
+use skein_wire::{Fleet, Key};
+use skein_zenoh::{Complaints, ZenohConfig, ZenohSession};
 
+use super::control_thread::{ControlThread, Ended, Pace};
+use super::exchange::Exchange;
 use super::lidar_scans::LidarScans;
+use super::log::Log;
+use super::mission_thread::{MissionThread, Trials};
+use super::watchdog::{LOOK_MS, Seen, Watchdog};
 use crate::autopilot_link::AutopilotLink;
 use crate::cli::shadow_log::ShadowLog;
 use crate::config_file::Config;
 use crate::core::AgentCore;
 
-/// The control loop's period.
-const TICK: Duration = Duration::from_millis(20);
-/// The autopilot's link is looked at this often. What has come since the last look counts as that old: so nothing that
-/// waited while the agent did not run passes for fresh.
-const LOOK: Duration = Duration::from_millis(5);
+/// Patience with the mission's thread when the program ends: it may hang.
+const TIME_TO_END: Duration = Duration::from_secs(1);
 
 /// Flies until Ctrl-C, which lands the vehicle first; as a shadow, while a pilot does.
+///
+/// # Errors
+/// It cannot begin, or one of its threads has ended by a fault.
 pub fn run(config: Config, is_shadow: bool) -> anyhow::Result<()> {
-    let mut driver = Driver::open(config, is_shadow)?;
-    let interruptions = Arc::new(AtomicU32::new(0));
+    let (control, mission) = open(config, is_shadow)?;
+    let exchange = control.exchange.clone();
     ctrlc::set_handler({
-        let (interruptions, bell) = (interruptions.clone(), driver.bell.clone());
-        move || {
-            interruptions.fetch_add(1, Ordering::Relaxed);
-            bell.ring();
-        }
+        let exchange = exchange.clone();
+        move || exchange.interrupt()
     })
     .context("Ctrl-C cannot be caught")?;
-    let mut landing = false;
-    loop {
-        driver.go_on()?;
-        match interruptions.load(Ordering::Relaxed) {
-            0 => {}
-            1 if driver.core.is_committed() && !is_shadow => {
-                if !std::mem::replace(&mut landing, true) {
-                    tracing::warn!("landing, then ending; Ctrl-C again ends at once");
-                    driver.core.order(What::Land);
-                }
-            }
-            _ => return Ok(()),
-        }
+    let named = |name: &str| thread::Builder::new().name(name.to_owned());
+    let mission = named("mission").spawn(move || mission.run()).context("the mission's thread")?;
+    let control = named("control").spawn(move || control.run()).context("control's thread")?;
+    let ended = watch(&exchange, control, &mission);
+    exchange.end();
+    let asked = Instant::now();
+    while !mission.is_finished() && asked.elapsed() < TIME_TO_END {
+        thread::sleep(Duration::from_millis(5));
+    }
+    match ended? {
+        Ended::Asked => Ok(()),
+        Ended::WithoutMission => bail!("the mission's thread has ended by a fault"),
     }
 }
 
-struct Driver {
-    core: AgentCore,
-    autopilot: AutopilotLink,
-    /// Others that the autopilot's line is shared with.
-    stations: Vec<AutopilotLink>,
-    shadow: Option<ShadowLog>,
-    link: ZenohLink,
-    scans: Option<LidarScans>,
-    bell: Bell,
-    complaints: Complaints,
-    began: Instant,
-    looked: Duration,
-    next_tick: Duration,
-    /// Whether it has been told that what runs could not be written down.
-    told_unsaved: bool,
-}
-
-impl Driver {
-    fn open(mut config: Config, is_shadow: bool) -> anyhow::Result<Self> {
-        config.agent.incarnation = next_incarnation(&config.state, &config.name, config.agent.incarnation)?;
-        let (store, kept) = PromiseStore::open(&config.state, &config.name)?;
-        config.agent.kept = kept;
-        let (script_store, scripts) = ScriptStore::open(&config.state, &config.name);
-        let scripts = scripts.unwrap_or_else(|lost| {
-            tracing::warn!("{lost}");
-            Vec::new()
-        });
-        let fleet = Fleet::new(&config.agent.fleet).context("`fleet`")?;
-        let known = config.known();
-        let session =
-            ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network).of(&config.name, known))?;
-        let link = session.link(&config.name)?;
-        let lidar = config.lidar;
-        let scans = lidar.map(|it| LidarScans::open(&fleet, &config.name, it, &session)).transpose()?;
-        tracing::info!(
-            "{} of fleet {fleet}, life {}, Zenoh on {:?}, autopilot {}",
-            config.name,
-            config.agent.incarnation,
-            session.locators(),
-            config.autopilot
-        );
-        let shadow = is_shadow.then(|| ShadowLog::create(&config.state, &config.name)).transpose()?;
-        let core = AgentCore::durable(config.agent, Box::new(store))?
-            .keeping_scripts(Box::new(script_store), &scripts);
-        Ok(Self {
-            core: if is_shadow { core.shadowing() } else { core },
-            autopilot: AutopilotLink::new(config.autopilot),
-            stations: config.stations.into_iter().map(AutopilotLink::new).collect(),
-            shadow,
-            bell: link.bell(),
-            link,
-            scans,
-            complaints: Complaints::default(),
-            began: Instant::now(),
-            looked: Duration::ZERO,
-            next_tick: Duration::ZERO,
-            told_unsaved: false,
-        })
-    }
-
-    /// Waits for something to do, and does it.
-    fn go_on(&mut self) -> anyhow::Result<()> {
-        let to_tick = self.next_tick.saturating_sub(self.began.elapsed());
-        self.bell.wait(to_tick.min(LOOK));
-        let now = self.began.elapsed();
-        let core = &mut self.core;
-        let looked = std::mem::replace(&mut self.looked, now);
-        let (stations, autopilot) = (&mut self.stations, &mut self.autopilot);
-        autopilot.receive(|bytes| {
-            core.receive_mavlink(looked, bytes);
-            stations.iter_mut().for_each(|station| station.send(bytes));
-        });
-        for station in stations {
-            station.receive(|bytes| {
-                core.overhear(now, bytes);
-                autopilot.send(bytes);
-            });
-        }
-        self.take_in_scans(now);
-        if now >= self.next_tick {
-            // Ticks that were missed are not made up for.
-            self.next_tick = (self.next_tick + TICK).max(now);
-            self.core.tick(now, &mut self.link);
-            if let Some(line) = self.complaints.check(now, self.core.node(), &self.link) {
-                tracing::warn!("{line}");
-            }
-            self.tell_unsaved();
-            if let Some(shadow) = &mut self.shadow {
-                shadow.write(&self.core)?;
-            }
-        } else if !self.link.is_empty() {
-            self.core.respond(now, &mut self.link);
-        }
-        self.autopilot.send(&self.core.take_mavlink());
-        self.tell();
-        Ok(())
-    }
-
-    fn take_in_scans(&mut self, now: Duration) {
-        let Some(scans) = &mut self.scans else { return };
-        while let Some(scan) = scans.poll(now) {
-            self.core.sense(now, &scan);
-        }
-    }
-
-    /// Warns once when another life of the agent would not run the scripts that run now.
-    fn tell_unsaved(&mut self) {
-        let unsaved = self.core.unsaved_scripts();
-        if let (false, Some(why)) = (self.told_unsaved, unsaved) {
-            tracing::warn!(
-                "which scripts run cannot be written down, so the agent would run others if it started again now: {why}"
+/// Watches over the threads until control has ended.
+fn watch(exchange: &Exchange, control: JoinHandle<Ended>, mission: &JoinHandle<()>) -> anyhow::Result<Ended> {
+    let mut watchdog = Watchdog::default();
+    while !control.is_finished() {
+        if mission.is_finished() && !exchange.mission_is_gone.swap(true, Ordering::Relaxed) {
+            tracing::error!(
+                "the mission's thread has ended by a fault: the vehicle lands, and the program ends"
             );
         }
-        self.told_unsaved = unsaved.is_some();
+        match watchdog.look(exchange.beats.load(Ordering::Relaxed)) {
+            Seen::Alive => {}
+            Seen::Stalled => {
+                tracing::error!(
+                    "control hangs: set-points are silent, so that the autopilot's failsafe acts"
+                );
+            }
+            Seen::Recovered => tracing::warn!("control goes on, and leaves the vehicle to who has it"),
+            Seen::Hung => bail!("control has hung for 10 s"),
+        }
+        thread::sleep(Duration::from_millis(LOOK_MS));
     }
+    // Its panic has been reported where it happened.
+    control.join().map_err(|_| anyhow::anyhow!("control's thread has ended by a fault"))
+}
 
-    /// Writes down what the autopilot says, and what the vehicle itself has decided or met.
-    fn tell(&mut self) {
-        for Text { severity, text } in self.core.take_texts() {
-            match severity {
-                Severity::Emergency | Severity::Alert | Severity::Critical | Severity::Error => {
-                    tracing::error!("autopilot: {text}");
-                }
-                Severity::Warning => tracing::warn!("autopilot: {text}"),
-                Severity::Notice | Severity::Info => tracing::info!("autopilot: {text}"),
-                Severity::Debug => tracing::debug!("autopilot: {text}"),
-            }
-        }
-        for happened in self.core.take_selections() {
-            let repeated = matches!(happened.event.kind(), Advance::NAME | Homeward::NAME);
-            if happened.home == *self.core.name() && !repeated {
-                tracing::info!("{}", happened.event);
-            }
-        }
+fn open(mut config: Config, is_shadow: bool) -> anyhow::Result<(ControlThread, MissionThread)> {
+    let fleet = Fleet::new(&config.agent.fleet).context("`fleet`")?;
+    let known = config.known();
+    let session =
+        ZenohSession::open(ZenohConfig::new(fleet.clone(), config.network).of(&config.name, known))?;
+    let link = session.listen(Key::protocol_subscriptions(&fleet, &config.name))?;
+    let vehicles = session.listen_to_newest(Key::vehicle_subscriptions(&fleet))?;
+    let wake = {
+        let bell = link.bell();
+        move || bell.ring()
+    };
+    let memory =
+        Memory::open(&config.state, &config.name, config.agent.incarnation, SystemTime::now(), wake.clone())?;
+    config.agent.incarnation = memory.incarnation.number;
+    config.agent.kept = memory.kept;
+    let (script_store, scripts) = ScriptStore::open(&config.state, &config.name);
+    let (scripts, lost_scripts) = match scripts {
+        Ok(scripts) => (scripts, None),
+        Err(lost) => (Vec::new(), Some(lost.to_string())),
+    };
+    let script_store = Background::new(script_store, wake).context("the disk's thread")?;
+    let log = {
+        let shadow = is_shadow.then(|| ShadowLog::create(&config.state, &config.name)).transpose()?;
+        Log::open(shadow).context("the log's thread")?
+    };
+    let lidar = config.lidar;
+    let scans =
+        lidar.map(|it| LidarScans::open(&fleet, &config.name, it, &session, log.clone())).transpose()?;
+    tracing::info!(
+        "{} of fleet {fleet}, life {}, Zenoh on {:?}, autopilot {}",
+        config.name,
+        config.agent.incarnation,
+        session.locators(),
+        config.autopilot
+    );
+    let mut core =
+        AgentCore::durable(config.agent, memory.promises)?.keeping_scripts(Box::new(script_store), &scripts);
+    if let Some(lost) = memory.lost {
+        tracing::error!("{lost}");
+        core = core.having_lost_promises(&lost);
     }
+    if is_shadow {
+        core = core.shadowing();
+    }
+    let (control, mut mission) = core.split();
+    if let Some(lost) = lost_scripts {
+        tracing::error!("{lost}");
+        mission.note_disk("former scripts", Some(&lost));
+    }
+    let exchange = Arc::new(Exchange::new(link.bell()));
+    let began = Instant::now();
+    let control = ControlThread {
+        side: control,
+        autopilot: AutopilotLink::new(config.autopilot),
+        stations: config.stations.into_iter().map(AutopilotLink::new).collect(),
+        scans,
+        vehicles,
+        exchange: exchange.clone(),
+        log,
+        began,
+        is_shadow,
+        pace: Pace::default(),
+    };
+    let trials = Trials::start(link.bell()).context("the thread that tries scripts out")?;
+    let mission = MissionThread {
+        side: mission,
+        link,
+        exchange,
+        incarnation: memory.incarnation,
+        complaints: Complaints::default(),
+        trials,
+        began,
+    };
+    Ok((control, mission))
 }

@@ -77,9 +77,9 @@ impl Guidance {
         self.planning.abandon();
     }
 
-    /// Gives leave to move for one navigation cycle.
-    pub fn grant_leave(&mut self, now: Duration) {
-        self.leave_until = now + LEAVE_LASTS;
+    /// Gives leave to move for one navigation cycle, from when that was decided.
+    pub fn grant_leave(&mut self, at: Duration) {
+        self.leave_until = at + LEAVE_LASTS;
         self.is_held = false;
     }
 

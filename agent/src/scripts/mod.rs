@@ -15,7 +15,7 @@ use std::{collections::BTreeMap, time::Duration};
 use skein_bp::script::{Argument, Assignment, BoundScript};
 use skein_bp::{Event, EventSet, Program};
 use skein_wire::event::{Advance, Ahead, Catalogue, Declared as _, SCRIPT_FACTS, ScriptNews, ScriptState};
-use skein_wire::{KeptScript, Store};
+use skein_wire::{KeptScript, Saver, Store};
 
 pub use self::{
     facts::{Circumstances, ScriptFacts},
@@ -26,9 +26,6 @@ use crate::me::Me;
 
 /// The most scripts that may run at once.
 const MOST_SCRIPTS: usize = skein_wire::State::MAX_SCRIPTS;
-
-/// Scripts that could not be kept are tried again after so long.
-const RETRY_AFTER: Duration = Duration::from_secs(1);
 
 /// The sender of the scripts that come with the vehicle's configuration.
 pub const CONFIGURATION: &str = "configuration";
@@ -60,11 +57,18 @@ pub struct Scripts {
     me: Me,
     rights: ScriptRights,
     running: BTreeMap<String, RunningScript>,
-    store: Option<Box<dyn Store<Vec<KeptScript>>>>,
-    /// Why the store does not hold what runs.
-    unsaved: Option<String>,
-    /// When to try that again.
-    retry_at: Duration,
+    store: Option<Saver<Vec<KeptScript>>>,
+    /// Those that run once they are kept.
+    waiting: Vec<(String, Runner)>,
+    now: Duration,
+}
+
+/// What has become of a script that was taken in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loaded {
+    Runs,
+    /// It runs once it is kept: see [`Scripts::catch_up`].
+    Waits,
 }
 
 /// How many states of a script a vehicle looks at: no more than there is time for between two ticks. The ground looks
@@ -79,29 +83,30 @@ impl Scripts {
             me,
             running: BTreeMap::new(),
             store: None,
-            unsaved: None,
-            retry_at: Duration::ZERO,
+            waiting: Vec::new(),
+            now: Duration::ZERO,
         }
     }
 
     /// Keeps in `store` from now on which scripts were sent and run.
     pub fn keep_in(&mut self, store: Box<dyn Store<Vec<KeptScript>>>) {
-        self.store = Some(store);
-        self.note_unsaved();
+        self.store = Some(Saver::new(store));
+        self.save();
     }
 
-    /// Adds a script that `from` has sent to the vehicle's program, once it is kept.
+    /// Adds a script that `from` has sent to the vehicle's program; if it is not kept at once, [as soon as it
+    /// is](Self::catch_up).
     pub fn load(
         &mut self,
         program: &mut Program,
         assignment: &Assignment,
         from: &str,
         begins: Begins,
-    ) -> Result<(), String> {
+    ) -> Result<Loaded, String> {
         let name = assignment.name();
         match self.running.get(name) {
             // It was sent twice, and arrived twice.
-            Some(running) if running.assignment == *assignment => return Ok(()),
+            Some(running) if running.assignment == *assignment => return Ok(self.state_of(name)),
             Some(_) => return Err("another script of this name runs; withdraw it first".to_owned()),
             None if self.running.len() >= MOST_SCRIPTS => {
                 return Err(format!("{MOST_SCRIPTS} scripts run already; withdraw one first"));
@@ -116,16 +121,32 @@ impl Scripts {
         let BoundScript { name, about, with, bthread } = script;
         let listens =
             SCRIPT_FACTS.iter().map(|fact| fact.name).filter(|fact| self.listens(&bthread, fact)).collect();
-        let bthread = Runner::bthread_name(&name);
         let from = from.to_owned();
         let running = RunningScript { about, with, from, assignment: assignment.clone(), listens };
         self.running.insert(name.clone(), running);
-        if let Err(why) = self.save() {
-            self.running.remove(&name);
-            return Err(format!("it cannot be kept for the agent's next life: {why}"));
+        if self.save() {
+            program.add(Runner::bthread_name(&name), runner);
+            return Ok(Loaded::Runs);
         }
-        program.add(bthread, runner);
-        Ok(())
+        if let Some(why) = self.unsaved() {
+            let why = cannot_be_kept(why);
+            self.give_up(&name);
+            return Err(why);
+        }
+        self.waiting.push((name, runner));
+        Ok(Loaded::Waits)
+    }
+
+    fn state_of(&self, name: &str) -> Loaded {
+        match self.waiting.iter().any(|(waiting, _)| waiting == name) {
+            true => Loaded::Waits,
+            false => Loaded::Runs,
+        }
+    }
+
+    fn give_up(&mut self, name: &str) {
+        self.running.remove(name);
+        self.save();
     }
 
     /// A script with its parameters, once it has passed what can be said of it alone: its rights, and that it neither
@@ -159,37 +180,50 @@ impl Scripts {
             && matches!(news.state, ScriptState::Withdrawn | ScriptState::Ended)
         {
             self.running.remove(&*news.name);
-            self.note_unsaved();
+            self.save();
         }
     }
 
-    /// Tries again to keep what could not be kept, once a second: a disk that fails may take its time about it.
-    pub fn catch_up(&mut self, now: Duration) {
-        if self.unsaved.is_some() && now >= self.retry_at {
-            self.retry_at = now + RETRY_AFTER;
-            self.note_unsaved();
+    /// Goes on with keeping. Adds the scripts that waited for it to the program, or gives them up; gives what has
+    /// become of each.
+    pub fn catch_up(&mut self, now: Duration, program: &mut Program) -> Vec<(String, Result<(), String>)> {
+        self.now = now;
+        let is_kept = self.store.as_mut().is_none_or(|store| store.go_on(now));
+        if !is_kept && self.unsaved().is_none() {
+            return Vec::new();
         }
+        let why = self.unsaved().map(cannot_be_kept);
+        let waiting = std::mem::take(&mut self.waiting).into_iter();
+        let outcomes = waiting.map(|(name, runner)| {
+            let outcome = match &why {
+                None => {
+                    program.add(Runner::bthread_name(&name), runner);
+                    Ok(())
+                }
+                Some(why) => {
+                    self.give_up(&name);
+                    Err(why.clone())
+                }
+            };
+            (name, outcome)
+        });
+        outcomes.collect()
     }
 
     /// Why the agent's next life would not run the scripts that run now, if so: the store does not take them in.
     pub fn unsaved(&self) -> Option<&str> {
-        self.unsaved.as_deref()
+        self.store.as_ref().and_then(Saver::trouble)
     }
 
-    fn note_unsaved(&mut self) {
-        self.unsaved = self.save().err();
-    }
-
-    /// Keeps the scripts that were sent and run.
-    fn save(&mut self) -> Result<(), String> {
-        let Some(store) = &mut self.store else { return Ok(()) };
+    /// Keeps the scripts that were sent; gives whether they are kept by now.
+    fn save(&mut self) -> bool {
+        let Some(store) = &mut self.store else { return true };
         let sent = self.running.values().filter(|script| script.from != CONFIGURATION);
         let kept = sent
             .map(|script| KeptScript { from: script.from.clone(), assignment: script.assignment.clone() })
             .collect();
-        store.save(&kept)?;
-        self.unsaved = None;
-        Ok(())
+        store.put(self.now, kept);
+        store.go_on(self.now)
     }
 
     /// The event that says what has become of a script.
@@ -213,6 +247,10 @@ impl Scripts {
     pub fn running(&self) -> impl Iterator<Item = (&str, &RunningScript)> {
         self.running.iter().map(|(name, script)| (name.as_str(), script))
     }
+}
+
+fn cannot_be_kept(why: &str) -> String {
+    format!("it cannot be kept for the agent's next life: {why}")
 }
 
 /// `uav/3/script{name, state, why}`.

@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::Context as _;
-use skein_disk::{PromiseStore, next_incarnation};
+use skein_dbp::Happened;
+use skein_dbp::facts::{DiskFails, DiskWorks};
+use skein_disk::{Memory, Number};
+use skein_wire::event::Declared as _;
 use skein_wire::{Key, Payload, Scene};
 use skein_zenoh::{Complaints, ZenohConfig, ZenohLink, ZenohSession};
 
@@ -38,7 +41,7 @@ pub fn run(config: Config, until_over: bool) -> anyhow::Result<Option<MissionOut
         }
     }
     let outcome = station.core.finished();
-    station.recording.finish()?;
+    station.recording.finish();
     Ok(outcome)
 }
 
@@ -49,6 +52,7 @@ struct Station {
     scenes: ZenohLink,
     scene: Option<Scene>,
     recording: Recording,
+    incarnation: Number,
     console: Console,
     complaints: Complaints,
     began: Instant,
@@ -56,11 +60,6 @@ struct Station {
 
 impl Station {
     fn open(mut config: Config, stopping: &Arc<AtomicBool>) -> anyhow::Result<Self> {
-        let recording = Recording::create(&config.record)?;
-        let station = &mut config.station;
-        station.incarnation = next_incarnation(&config.state, &station.name, station.incarnation)?;
-        let (store, kept) = PromiseStore::open(&config.state, &config.station.name)?;
-        config.station.kept = kept;
         let fleet = config.station.fleet.clone();
         let station = &config.station;
         let known = station.vehicles.iter().chain(&station.operators).cloned();
@@ -69,6 +68,24 @@ impl Station {
         let link = session.listen(Key::subscriptions_with_boards(&fleet, &config.station.name))?;
         let scenes = session.listen(vec![Key::pattern::<Scene>(&fleet)])?;
         let bell = link.bell();
+        let recording = Recording::begin(config.record, config.record_most_bytes)?;
+        let wake = {
+            let bell = bell.clone();
+            move || bell.ring()
+        };
+        let memory = Memory::open(
+            &config.state,
+            &config.station.name,
+            config.station.incarnation,
+            SystemTime::now(),
+            wake,
+        )?;
+        config.station.incarnation = memory.incarnation.number;
+        config.station.kept = memory.kept;
+        if memory.lost.is_some() {
+            config.station.forgot = true;
+            config.station.launch_on_order = true;
+        }
         let mut console = Console::serve(config.console, {
             let bell = bell.clone();
             move || bell.ring()
@@ -89,10 +106,27 @@ impl Station {
             config.station.vehicles.len()
         );
         tracing::info!("console: {}", console.url());
-        let core = GroundCore::durable(config.station, Box::new(store));
+        let mut core = GroundCore::durable(config.station, memory.promises);
+        if let Some(lost) = memory.lost {
+            tracing::error!("{lost}");
+            let why = format!(
+                "{lost}. Nobody takes off before an operator orders it, and nothing is decided together before a new roster"
+            );
+            core.note_disk("former promises", Some(&why));
+        }
         console.show_scene(&core, None);
         let complaints = Complaints::default();
-        Ok(Self { core, link, scenes, scene: None, recording, console, complaints, began: Instant::now() })
+        Ok(Self {
+            core,
+            link,
+            scenes,
+            scene: None,
+            recording,
+            incarnation: memory.incarnation,
+            console,
+            complaints,
+            began: Instant::now(),
+        })
     }
 
     /// Waits for something to do, and does it.
@@ -104,11 +138,15 @@ impl Station {
             let given = self.core.order(&wish.order);
             wish.answer(given);
         }
+        self.incarnation.go_on(now);
+        self.core.note_disk("incarnation", self.incarnation.trouble());
+        self.core.note_disk("recording", self.recording.trouble().as_deref());
         if let Err(error) = self.core.tick(now, &mut self.link) {
             tracing::error!("{error}");
             self.recording.note(now, Level::Error, self.core.name().as_str(), &error.to_string());
         }
         let happened = self.core.take_selections();
+        happened.iter().for_each(tell_disk);
         self.recording.take_in(now, &self.core, &happened);
         self.console.publish(now, &self.core, &happened);
         self.look_at_scene(now);
@@ -128,5 +166,14 @@ impl Station {
                 self.scene = Some(scene);
             }
         }
+    }
+}
+
+/// Writes down that a disk fails, here or at a vehicle, and that it works again.
+fn tell_disk(happened: &Happened) {
+    match happened.event.kind() {
+        DiskFails::NAME => tracing::error!("{}", happened.event),
+        DiskWorks::NAME => tracing::warn!("{}", happened.event),
+        _ => {}
     }
 }

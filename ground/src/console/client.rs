@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use axum::extract::ws::{self, WebSocket};
 use tokio::sync::{broadcast::error::RecvError, watch};
+use tokio::task::JoinSet;
 use tokio::time::timeout;
 
 use super::feed::Message;
@@ -15,6 +16,12 @@ use crate::order::Order;
 /// A browser that takes nothing for this long is let go.
 const PATIENCE: Duration = Duration::from_secs(10);
 
+/// So many scripts of one browser are looked at at once.
+const MOST_READINGS: usize = 2;
+
+/// A request, and the tag under which it is to be answered.
+type Read = (Option<String>, Result<Request, String>);
+
 /// Why a browser is no longer attended.
 struct Gone;
 
@@ -24,25 +31,25 @@ pub(super) async fn attend(mut socket: WebSocket, mut subscription: Subscription
     let mut outcome = say(&mut socket, &Message::events(history.iter())).await;
     let mut shown = Pictures::new();
     let mut question: Option<Question> = None;
+    let mut readings = JoinSet::new();
     while outcome.is_ok() {
         outcome = tokio::select! {
             // Orders before pictures.
             biased;
             message = socket.recv() => match message {
-                Some(Ok(message)) => match read(&message) {
-                    Some((_, Ok(Request::Why(vehicle)))) => {
-                        question = vehicle.map(|vehicle| subscription.ask_about(vehicle));
-                        Ok(())
+                Some(Ok(message)) => match text(&message) {
+                    Some(text) if request::takes_long(&text) => look_at(text, &mut readings, &mut socket).await,
+                    Some(text) => {
+                        let request = request::read(&text);
+                        answer(request, &mut socket, &mut question, &subscription, mailbox).await
                     }
-                    Some((tag, Ok(Request::Script(script)))) => {
-                        say(&mut socket, &Message::Script { tag, script }).await
-                    }
-                    Some((tag, Ok(Request::Order(order)))) => give(&mut socket, tag, order, mailbox).await,
-                    Some((tag, Err(message))) => say(&mut socket, &Message::Error { tag, message }).await,
                     None if matches!(message, ws::Message::Close(_)) => Err(Gone),
                     None => Ok(()),
                 },
                 Some(Err(_)) | None => Err(Gone),
+            },
+            Some(Ok(request)) = readings.join_next() => {
+                answer(request, &mut socket, &mut question, &subscription, mailbox).await
             },
             pictures = newest(&mut subscription.pictures) => match pictures {
                 Ok(pictures) => show(&mut socket, pictures, &mut shown).await,
@@ -98,12 +105,41 @@ async fn send(socket: &mut WebSocket, text: &str) -> Result<(), Gone> {
     }
 }
 
-/// The request of a browser, and the tag under which it is to be answered; none if it says nothing.
-fn read(message: &ws::Message) -> Option<(Option<String>, Result<Request, String>)> {
+/// The text of a message; none if it says nothing.
+fn text(message: &ws::Message) -> Option<String> {
     match message {
-        ws::Message::Text(text) => Some(request::read(text)),
-        ws::Message::Binary(_) => Some(request::read("a binary message")),
+        ws::Message::Text(text) => Some(text.to_string()),
+        ws::Message::Binary(_) => Some("a binary message".to_owned()),
         ws::Message::Close(_) | ws::Message::Ping(_) | ws::Message::Pong(_) => None,
+    }
+}
+
+/// Reads what may take long on a thread that has time for it, so that orders are heard meanwhile.
+async fn look_at(text: String, readings: &mut JoinSet<Read>, socket: &mut WebSocket) -> Result<(), Gone> {
+    if readings.len() < MOST_READINGS {
+        readings.spawn_blocking(move || request::read(&text));
+        return Ok(());
+    }
+    let message = format!("{MOST_READINGS} scripts are being looked at already; wait for an answer");
+    say(socket, &Message::Error { tag: request::tag(&text), message }).await
+}
+
+/// Does what a browser asks for.
+async fn answer(
+    (tag, request): Read,
+    socket: &mut WebSocket,
+    question: &mut Option<Question>,
+    subscription: &Subscription,
+    mailbox: &Mailbox,
+) -> Result<(), Gone> {
+    match request {
+        Ok(Request::Why(vehicle)) => {
+            *question = vehicle.map(|vehicle| subscription.ask_about(vehicle));
+            Ok(())
+        }
+        Ok(Request::Script(script)) => say(socket, &Message::Script { tag, script }).await,
+        Ok(Request::Order(order)) => give(socket, tag, order, mailbox).await,
+        Err(message) => say(socket, &Message::Error { tag, message }).await,
     }
 }
 

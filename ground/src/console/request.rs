@@ -109,6 +109,33 @@ enum To {
     Names(Vec<String>),
 }
 
+/// The beginning of a message: enough to know how long it may take to read the rest.
+#[derive(Deserialize)]
+struct Heading {
+    #[serde(rename = "type")]
+    kind: String,
+    what: Option<String>,
+    tag: Option<String>,
+}
+
+fn heading(text: &str) -> Option<Heading> {
+    serde_json::from_str(text).ok()
+}
+
+/// Whether a message holds a script, which is looked at all around before anything is done with it.
+pub(super) fn takes_long(text: &str) -> bool {
+    heading(text).is_some_and(|heading| match heading.kind.as_str() {
+        "read_script" => true,
+        "order" => heading.what.as_deref() == Some(What::Load.word()),
+        _ => false,
+    })
+}
+
+/// The tag under which a message is to be answered.
+pub(super) fn tag(text: &str) -> Option<String> {
+    heading(text)?.tag
+}
+
 /// Reads a message: its tag, and what is asked for or what is wrong with it.
 pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
     match serde_json::from_str::<Message>(text) {
@@ -167,6 +194,19 @@ mod tests {
         let (_, goto) = read(r#"{"type":"order","what":"goto","to":["uav/3"],"point":[1,-2.5,null]}"#);
         let who = Who::only(NodeName::new("uav/3").unwrap());
         assert_eq!(goto, Ok(Request::Order(Order::GoTo(who, Destination { x: 1.0, y: -2.5, z: None }))));
+    }
+
+    #[test]
+    fn only_what_holds_a_script_takes_long() {
+        for (text, long) in [
+            (r#"{"type":"order","tag":"7","what":"hold","to":"all"}"#, false),
+            (r#"{"type":"order","tag":"7","what":"load","to":"all","script":{}}"#, true),
+            (r#"{"type":"read_script","tag":"7","file":"a.toml","text":""}"#, true),
+            ("[", false),
+        ] {
+            assert_eq!(takes_long(text), long, "{text}");
+            assert!(text == "[" || tag(text).as_deref() == Some("7"));
+        }
     }
 
     #[test]

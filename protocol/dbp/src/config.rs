@@ -42,6 +42,9 @@ pub struct NodeConfig {
     pub durable: bool,
     /// The promises of a former life of this node.
     pub kept: Kept,
+    /// Whether what a former life has kept is lost. As coordinator it then decides nothing before an operator begins a new
+    /// term, since it does not know what it has decided in this one.
+    pub forgot: bool,
     /// The band that priorities of remote bids are brought into.
     pub remote_priority: RangeInclusive<i32>,
     /// The number of occurrences that are kept for those who missed them; at least 1.
@@ -70,6 +73,7 @@ impl NodeConfig {
             joint: None,
             durable: false,
             kept: Kept::default(),
+            forgot: false,
             remote_priority: i32::MIN..=i32::MAX,
             history: 1024,
             settle_limit: 1000,

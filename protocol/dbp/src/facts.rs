@@ -115,6 +115,16 @@ skein_bp::events! {
         /// The other's incarnation.
         incarnation: u64,
     }
+    /// The disk does not take what must be kept; what depends on that does not happen, and all else does.
+    DiskFails = "disk_fails", Own {
+        /// The thing to be kept.
+        what: Arc<str>,
+        why: Arc<str>,
+    }
+    /// The disk takes it again.
+    DiskWorks = "disk_works", Own {
+        what: Arc<str>,
+    }
     /// A b-thread requests an event whose home is not in the roster.
     Unroutable = "unroutable", Own {
         /// Its name.

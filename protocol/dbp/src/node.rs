@@ -18,7 +18,7 @@ use crate::channel::peers::Peer;
 use crate::clock::Clock;
 use crate::config::NodeConfig;
 use crate::error::NodeError;
-use crate::facts::Misdirected;
+use crate::facts::{DiskFails, DiskWorks, Misdirected};
 use crate::guest::Guest;
 use crate::home::Home;
 use crate::home::table::RemoteParty;
@@ -60,6 +60,8 @@ pub struct Node {
     joint: Joint,
     /// The others, and what is heard from and sent to them.
     pub(crate) channel: Channel,
+    /// What the disk does not take, as far as it has been told.
+    disk_fails: BTreeSet<String>,
     stats: NodeStats,
 }
 
@@ -95,6 +97,7 @@ impl Node {
             guest: Guest::new(&config),
             joint: Joint::default(),
             channel: Channel::new(&config),
+            disk_fails: BTreeSet::new(),
             stats: NodeStats::default(),
             run,
             config,
@@ -145,11 +148,61 @@ impl Node {
         self.channel.take_outgoing()
     }
 
-    /// The promises that must outlive this node, if they have changed since the last call: to be on disk before
-    /// [`take_outgoing`](Self::take_outgoing) is sent.
+    /// The promises that must outlive this node, if they have changed since the last call: to be on disk before what
+    /// depends on them is [sent](Self::sort_out).
     pub fn take_unsaved(&mut self) -> Option<Kept> {
         let blocks = self.home.table.take_unsaved();
         (self.joint.take_unsaved() || blocks).then(|| self.kept())
+    }
+
+    /// All that [`take_unsaved`](Self::take_unsaved) gave is on disk; the store works.
+    pub fn saved(&mut self) {
+        self.home.table.saved();
+        self.joint.saved();
+    }
+
+    /// The store does not take what it is given. From now until it has [`saved`](Self::saved), no new promise is given:
+    /// a block that would have to be kept is refused, nothing is decided together, and no new roster is taken on. What
+    /// was on disk before stays promised.
+    pub fn store_fails(&mut self) {
+        let proxies = self.home.table.store_fails();
+        self.run.change_proxies(proxies);
+        self.joint.store_fails(&self.clock, self.config.lease, &mut self.run);
+    }
+
+    /// Tells the program once when the disk does not take `what` must be kept, and once when it does again.
+    pub fn note_disk(&mut self, what: &str, trouble: Option<&str>) {
+        let was_told = self.disk_fails.contains(what);
+        match trouble {
+            Some(why) if !was_told => {
+                self.disk_fails.insert(what.to_owned());
+                self.run.fact(DiskFails { what: what.into(), why: why.into() });
+            }
+            None if was_told => {
+                self.disk_fails.remove(what);
+                self.run.fact(DiskWorks { what: what.into() });
+            }
+            _ => {}
+        }
+    }
+
+    /// Sorts out of some messages those that would let others rely on what is not on disk yet: they are left in
+    /// `messages`, and the rest is given back, to be sent at once. A sign of life is sent without its word about joint
+    /// events.
+    pub fn sort_out(&self, messages: &mut Vec<(Recipient, Message)>) -> Vec<(Recipient, Message)> {
+        let (depending, mut free): (Vec<_>, Vec<_>) =
+            std::mem::take(messages).into_iter().partition(|(_, message)| match message {
+                Message::Ack(ack) => self.home.table.owes(&ack.node),
+                Message::Occurrence(occurrence) => occurrence.term > 0 && self.joint.owes(),
+                Message::Bid(_) | Message::Repair(_) | Message::Presence(_) => false,
+            });
+        *messages = depending;
+        for (_, message) in free.iter_mut().filter(|_| self.joint.owes()) {
+            if let Message::Presence(presence) = message {
+                presence.joint = None;
+            }
+        }
+        free
     }
 
     /// The promises that must outlive this node.

@@ -4,13 +4,24 @@
 //! - [`PromiseStore`]: what a node has promised to others ([`skein_dbp::Kept`]);
 //! - [`ScriptStore`]: the scripts that a vehicle was sent ([`skein_wire::KeptScript`]).
 //!
-//! Libraries read no file: they know the seam [`skein_wire::Store`]. Programs open these files and hand them over.
+//! [`Memory`] opens all that a life begins with. Libraries read no file: they know the seam [`skein_wire::Store`]. Programs open these files and hand them over, each
+//! behind a thread of its own ([`Background`]): who keeps something never waits for the disk.
+//!
+//! A file that is damaged is [set aside](Lost), and its node starts without it.
 
+mod background;
 mod incarnation;
+mod lost;
+mod memory;
 mod node_file;
 mod promises;
+mod room;
 mod scripts;
 
-pub use incarnation::{IncarnationError, next_incarnation};
-pub use promises::{PromiseStore, PromisesError};
-pub use scripts::{ScriptStore, ScriptsLost};
+pub use background::Background;
+pub use incarnation::{Incarnation, IncarnationError, IncarnationStore, next_incarnation};
+pub use lost::Lost;
+pub use memory::{Memory, MemoryError, Number};
+pub use promises::PromiseStore;
+pub use room::{RESERVE, Room};
+pub use scripts::ScriptStore;

@@ -1,45 +1,37 @@
 //! The promises that a node has made to others.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use skein_dbp::Kept;
-use skein_wire::{NodeName, Store};
+use skein_wire::{NodeName, Saving, Store};
 
+use crate::lost::Lost;
 use crate::node_file;
-
-/// The promises that were kept cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum PromisesError {
-    #[error("`{}`: {source}; what this node must not forget is kept there", path.display())]
-    File { path: PathBuf, source: io::Error },
-    #[error("`{}`: {source}; it should hold the blocks that this node must keep, as JSON. Remove it only if none of them is to hold any more", path.display())]
-    Content { path: PathBuf, source: serde_json::Error },
-}
 
 /// Keeps a node's promises in `<folder>/<node>.kept.json`, written whole each time.
 #[derive(Debug)]
 pub struct PromiseStore(PathBuf);
 
 impl PromiseStore {
-    /// The store of `node` in `folder`, and what a former life has kept there.
-    ///
-    /// # Errors
-    /// [`PromisesError`] when there is a file that cannot be understood: it is left alone.
-    pub fn open(folder: &Path, node: &NodeName) -> Result<(Self, Kept), PromisesError> {
+    /// The store of `node` in `folder`, and what a former life has kept there. A file that cannot be understood is set
+    /// aside as `<node>.kept.json.damaged`: the node starts, and does not move on before somebody who has been told
+    /// says so.
+    pub fn open(folder: &Path, node: &NodeName) -> (Self, Result<Kept, Lost>) {
         let path = node_file::path_of(folder, node, "kept.json");
         let kept = match node_file::read(&path) {
-            Ok(Some(text)) => serde_json::from_slice(&text)
-                .map_err(|source| PromisesError::Content { path: path.clone(), source })?,
-            Ok(None) => Kept::default(),
-            Err(source) => return Err(PromisesError::File { path, source }),
+            Ok(Some(text)) => serde_json::from_slice(&text).map_err(|error| error.to_string()),
+            Ok(None) => Ok(Kept::default()),
+            Err(error) => Err(error.to_string()),
         };
-        Ok((Self(path), kept))
+        let what = "what this node has promised to others is kept there, as JSON: blocks that must outlive their \
+                    holders, and what was decided together";
+        let kept = kept.map_err(|problem| Lost::set_aside(&path, problem, what));
+        (Self(path), kept)
     }
 }
 
 impl Store for PromiseStore {
-    fn save(&mut self, kept: &Kept) -> Result<(), String> {
+    fn save(&mut self, kept: &Kept) -> Saving {
         node_file::replace(&self.0, kept)
     }
 }
@@ -53,12 +45,11 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn what_is_kept_is_there_in_the_next_life() {
-        let folder = tempfile::tempdir().unwrap();
-        let node = NodeName::new("uav/1").unwrap();
-        let (mut store, nothing) = PromiseStore::open(folder.path(), &node).unwrap();
-        assert_eq!(nothing, Kept::default());
+    fn node() -> NodeName {
+        NodeName::new("uav/1").unwrap()
+    }
+
+    fn kept() -> Kept {
         let block = KeptBlock {
             node: NodeName::new("ground/main").unwrap(),
             incarnation: 4,
@@ -66,21 +57,45 @@ mod tests {
             sync: 7,
             block: EventSet::from("uav/*/enter").and(EventSet::region([0.0; 3], [f64::INFINITY, 2.0, 3.0])),
         };
-        let roster = Some(Roster::first(node.clone(), [NodeName::new("uav/2").unwrap()]));
+        let roster = Some(Roster::first(node(), [NodeName::new("uav/2").unwrap()]));
         let decisions = vec![skein_bp::Event::new("swarm/launch").with("n", 1)];
-        let kept = Kept { blocks: vec![block], roster, term: 1, decisions };
-        store.save(&kept).unwrap();
-        assert_eq!(PromiseStore::open(folder.path(), &node).unwrap().1, kept);
+        Kept { blocks: vec![block], roster, term: 1, decisions }
     }
 
     #[test]
-    fn a_file_that_is_not_understood_is_named_and_left_alone() {
+    fn what_is_kept_is_there_in_the_next_life() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut store, nothing) = PromiseStore::open(folder.path(), &node());
+        assert_eq!(nothing.unwrap(), Kept::default());
+        assert_eq!(store.save(&kept()), Saving::Done);
+        assert_eq!(PromiseStore::open(folder.path(), &node()).1.unwrap(), kept());
+    }
+
+    #[test]
+    fn a_damaged_file_is_named_and_set_aside_and_the_next_promise_is_kept() {
+        let whole = serde_json::to_string(&kept()).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("uav-1.kept.json");
-        fs::write(&path, "{\"blocks\": 3}").unwrap();
-        let error =
-            PromiseStore::open(folder.path(), &NodeName::new("uav/1").unwrap()).unwrap_err().to_string();
-        assert!(error.contains("uav-1.kept.json") && error.contains("line 1"), "{error}");
-        assert!(path.exists());
+        let aside = |number: usize| {
+            let end = if number == 0 { String::new() } else { format!("-{}", number + 1) };
+            folder.path().join(format!("uav-1.kept.json.damaged{end}"))
+        };
+        let damages = [&whole[..whole.len() / 2], "", "\u{0}\u{0}", "{\"version\": 2}", "{\"blocks\": 3}"];
+        for (number, text) in damages.into_iter().enumerate() {
+            fs::write(&path, text).unwrap();
+            let (mut store, lost) = PromiseStore::open(folder.path(), &node());
+            let lost = lost.unwrap_err().to_string();
+            for part in [path.to_str().unwrap(), aside(number).to_str().unwrap()] {
+                assert!(lost.contains(part), "{lost} does not say {part}");
+            }
+            assert_eq!(fs::read_to_string(aside(number)).unwrap(), text);
+            assert_eq!(store.save(&kept()), Saving::Done);
+        }
+        fs::remove_file(&path).unwrap();
+        fs::create_dir(&path).unwrap();
+        let (mut store, lost) = PromiseStore::open(folder.path(), &node());
+        assert!(lost.is_err() && aside(damages.len()).is_dir());
+        assert_eq!(store.save(&kept()), Saving::Done);
+        assert_eq!(PromiseStore::open(folder.path(), &node()).1.unwrap(), kept());
     }
 }

@@ -1,11 +1,11 @@
 //! The scripts that a vehicle was sent.
 
 use std::path::{Path, PathBuf};
-use std::{fs, io};
 
 use serde::{Deserialize, Serialize};
-use skein_wire::{KeptScript, NodeName, Store};
+use skein_wire::{KeptScript, NodeName, Saving, Store};
 
+use crate::lost::Lost;
 use crate::node_file;
 
 /// The version of the file's form.
@@ -14,23 +14,6 @@ const VERSION: u32 = 1;
 /// Keeps the scripts that were sent to a vehicle in `<folder>/<node>.scripts.json`, written whole each time.
 #[derive(Debug)]
 pub struct ScriptStore(PathBuf);
-
-/// Scripts that were kept cannot be had: what is wrong with their file, and what has become of it.
-#[derive(Debug, thiserror::Error)]
-#[error("`{}`: {problem}; the scripts that this vehicle had been sent are kept there, as JSON. {fate}", path.display())]
-pub struct ScriptsLost {
-    pub path: PathBuf,
-    pub problem: String,
-    fate: Fate,
-}
-
-#[derive(Debug, thiserror::Error)]
-enum Fate {
-    #[error("It is `{}` now, and the vehicle flies without them: send them again", .0.display())]
-    SetAside(PathBuf),
-    #[error("The vehicle flies without them: send them again. It could not be set aside: {0}")]
-    Left(io::Error),
-}
 
 #[derive(Serialize)]
 struct Content<'a> {
@@ -55,27 +38,22 @@ impl ScriptStore {
     /// The store of `node` in `folder`, and the scripts that a former life has kept there. A file that cannot be
     /// understood is set aside as `<node>.scripts.json.damaged` and told of: for its sake no vehicle stays on the
     /// ground, or in the air without its agent.
-    pub fn open(folder: &Path, node: &NodeName) -> (Self, Result<Vec<KeptScript>, ScriptsLost>) {
+    pub fn open(folder: &Path, node: &NodeName) -> (Self, Result<Vec<KeptScript>, Lost>) {
         let path = node_file::path_of(folder, node, "scripts.json");
         let kept = match node_file::read(&path) {
             Ok(Some(text)) => parse(&text),
             Ok(None) => Ok(Vec::new()),
             Err(error) => Err(error.to_string()),
         };
-        let kept = kept.map_err(|problem| {
-            let aside = path.with_extension("json.damaged");
-            let fate = match fs::rename(&path, &aside) {
-                Ok(()) => Fate::SetAside(aside),
-                Err(error) => Fate::Left(error),
-            };
-            ScriptsLost { path: path.clone(), problem, fate }
-        });
+        let what = "the scripts that this vehicle had been sent are kept there, as JSON: it flies without them, send them \
+                    again";
+        let kept = kept.map_err(|problem| Lost::set_aside(&path, problem, what));
         (Self(path), kept)
     }
 }
 
 impl Store<Vec<KeptScript>> for ScriptStore {
-    fn save(&mut self, scripts: &Vec<KeptScript>) -> Result<(), String> {
+    fn save(&mut self, scripts: &Vec<KeptScript>) -> Saving {
         node_file::replace(&self.0, &Content { version: VERSION, scripts })
     }
 }
@@ -92,6 +70,8 @@ fn parse(text: &[u8]) -> Result<Vec<KeptScript>, String> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use skein_bp::script::{Argument, Assignment, ScriptFile};
 
     use super::*;
@@ -118,7 +98,7 @@ mod tests {
         let (mut store, nothing) = ScriptStore::open(&state, &node());
         assert_eq!(nothing.unwrap(), []);
         for kept in [vec![patrol()], vec![]] {
-            store.save(&kept).unwrap();
+            assert_eq!(store.save(&kept), Saving::Done);
             assert_eq!(ScriptStore::open(&state, &node()).1.unwrap(), kept);
         }
         assert_eq!(fs::read_dir(state).unwrap().count(), 1, "nothing is left beside it");
@@ -145,7 +125,7 @@ mod tests {
                 assert!(lost.contains(part), "{lost} does not say {part}");
             }
             assert_eq!(fs::read_to_string(aside).unwrap(), text);
-            store.save(&vec![patrol()]).unwrap();
+            assert_eq!(store.save(&vec![patrol()]), Saving::Done);
             assert_eq!(ScriptStore::open(folder.path(), &node()).1.unwrap(), [patrol()]);
         }
     }
@@ -156,6 +136,7 @@ mod tests {
         let file_not_folder = folder.path().join("state");
         fs::write(&file_not_folder, "").unwrap();
         let (mut store, _) = ScriptStore::open(&file_not_folder, &node());
-        assert!(store.save(&vec![]).unwrap_err().contains("uav-1.scripts.json"));
+        let saving = store.save(&vec![]);
+        assert!(matches!(&saving, Saving::Failed(why) if why.contains("uav-1.scripts.json")), "{saving:?}");
     }
 }

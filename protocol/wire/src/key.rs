@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use skein_dbp::{Board, NodeName, is_chunk};
 
-use crate::message::{KINDS, Kind, Payload, Record};
+use crate::message::{KINDS, Kind, Payload, Readiness, Record, State};
 use crate::proto::MAX_PAYLOAD;
 
 /// The first chunk of every key.
@@ -158,6 +158,20 @@ impl Key {
     /// The pattern of all keys of a fleet.
     pub fn of_fleet(fleet: &Fleet) -> String {
         format!("{ROOT}/{fleet}/**")
+    }
+
+    /// Those of them under which vehicles tell of their bodies: see [`VehicleLink`](crate::VehicleLink).
+    pub fn vehicle_subscriptions(fleet: &Fleet) -> Vec<String> {
+        vec![Self::pattern::<State>(fleet), Self::pattern::<Readiness>(fleet)]
+    }
+
+    /// All but those.
+    pub fn protocol_subscriptions(fleet: &Fleet, node: &NodeName) -> Vec<String> {
+        let of_vehicles = Self::vehicle_subscriptions(fleet);
+        Self::subscriptions(fleet, node)
+            .into_iter()
+            .filter(|pattern| !of_vehicles.contains(pattern))
+            .collect()
     }
 
     /// The same for a node that also reads the boards of all.

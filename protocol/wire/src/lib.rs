@@ -39,9 +39,11 @@ mod message;
 mod network;
 mod node_link;
 pub mod proto;
+mod saver;
 mod share;
 mod store;
 mod trace;
+mod vehicle_link;
 
 /// The compiled `proto/skein.proto`, a `FileDescriptorSet`: the schema to put beside recorded messages.
 pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/skein.bin"));
@@ -56,5 +58,7 @@ pub use message::*;
 pub use network::{MemoryLink, Network, NetworkConfig, NetworkStats};
 pub use node_link::{NodeLink, NodeLinkStats, SenderStats};
 pub use proto::{MAX_PAYLOAD, VERSION};
+pub use saver::Saver;
 pub use skein_dbp::{NodeName, NodeNameError};
-pub use store::{KeptScript, MemoryStore, Store};
+pub use store::{KeptScript, MemoryStore, Saving, Store};
+pub use vehicle_link::VehicleLink;

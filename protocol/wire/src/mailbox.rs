@@ -69,6 +69,20 @@ impl Mailbox {
         }
     }
 
+    /// The same, in place of the message under the same key that waits, if one does.
+    pub fn push_newest(&mut self, key: Key, payload: Vec<u8>) {
+        let owner = self.owner(key.sender());
+        let numbers = self.queues.get(&owner).map(|queue| queue.numbers.clone()).unwrap_or_default();
+        let same =
+            numbers.into_iter().find(|number| self.waiting.get(number).is_some_and(|(_, at, _)| *at == key));
+        if let Some((number, (.., before))) =
+            same.and_then(|number| Some((number, self.waiting.remove(&number)?)))
+        {
+            self.note_gone(&owner, number, before.len());
+        }
+        self.push(key, payload);
+    }
+
     /// The oldest message.
     pub fn pop(&mut self) -> Option<(Key, Vec<u8>)> {
         let (number, (owner, key, payload)) = self.waiting.pop_first()?;

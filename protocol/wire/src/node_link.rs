@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use skein_dbp::{Board, Caused, Kept, Node, NodeError, NodeName, Recipient};
+use skein_dbp::{Board, Caused, Kept, Message, Node, NodeError, NodeName, Recipient};
 
 use crate::decode_error::DecodeError;
 use crate::key::{Fleet, Key};
 use crate::link::Link;
 use crate::mailbox::{Mailbox, Owner};
 use crate::message::{Payload, Readiness, Record, State};
+use crate::saver::Saver;
 use crate::share::Shares;
 use crate::store::Store;
 
@@ -35,9 +36,11 @@ const BOARD_UNCHANGED: Duration = Duration::from_secs(3);
 pub struct NodeLink {
     node: Node,
     fleet: Fleet,
-    store: Option<Box<dyn Store>>,
-    /// Promises that the store has not taken yet.
-    unsaved: Option<Kept>,
+    store: Option<Saver<Kept>>,
+    /// Messages that depend on what the store has not taken yet.
+    withheld: Vec<(Recipient, Message)>,
+    /// When it last took something in.
+    now: Duration,
     states: Vec<State>,
     readiness: Vec<Readiness>,
     /// Other members' newest boards, for who reads them.
@@ -115,7 +118,7 @@ pub struct NodeLinkStats {
     pub implausible: u64,
     /// Own messages that were not put, because no other node would take in one so long.
     pub unsendable: u64,
-    /// Times that the store did not take what must be kept; what it bears on was not sent.
+    /// Messages that were not sent because the store did not take what they depend on.
     pub unsaved: u64,
 }
 
@@ -126,7 +129,8 @@ impl NodeLink {
             node,
             fleet,
             store: None,
-            unsaved: None,
+            withheld: Vec::new(),
+            now: Duration::ZERO,
             states: Vec::new(),
             readiness: Vec::new(),
             boards: None,
@@ -144,7 +148,7 @@ impl NodeLink {
 
     /// Couples a node that is configured to be durable to its fleet and to where it keeps what it promises.
     pub fn durable(node: Node, fleet: Fleet, store: Box<dyn Store>) -> Self {
-        Self { store: Some(store), ..Self::new(node, fleet) }
+        Self { store: Some(Saver::new(store)), ..Self::new(node, fleet) }
     }
 
     /// A node that also reads what other nodes have on their boards.
@@ -239,6 +243,7 @@ impl NodeLink {
 
     /// Takes in what has arrived, of each sender as much as is its share; the rest waits.
     pub fn receive(&mut self, now: Duration, link: &mut dyn Link) {
+        self.now = now;
         if !std::mem::replace(&mut self.has_met, true) {
             let members: Vec<NodeName> = self.node.peers().map(|(name, _)| name.clone()).collect();
             link.meet(&members);
@@ -345,14 +350,13 @@ impl NodeLink {
         }
     }
 
-    /// Sends what the node has to say, once what it promises with that is kept.
+    /// Sends what the node has to say; what depends on a promise, once that is kept.
     pub fn send(&mut self, link: &mut dyn Link) {
-        if !self.keep() {
-            // To the others it is as if the network had lost it: they ask again.
-            self.node.take_outgoing();
-            return;
-        }
-        for (recipient, message) in self.node.take_outgoing() {
+        let is_kept = self.keep();
+        let mut outgoing = std::mem::take(&mut self.withheld);
+        outgoing.extend(self.node.take_outgoing());
+        let free = if is_kept { outgoing } else { self.withhold(outgoing) };
+        for (recipient, message) in free {
             let recipient = match recipient {
                 Recipient::Node(recipient) => Some(recipient),
                 Recipient::All => None,
@@ -368,18 +372,39 @@ impl NodeLink {
             self.stats.sent += 1;
         }
     }
-}
 
-impl NodeLink {
-    /// Saves the promises; returns whether all of them are kept.
+    /// Why the node's promises are not kept, if the store is in trouble. It gives none meanwhile.
+    pub fn trouble(&self) -> Option<&str> {
+        self.store.as_ref().and_then(Saver::trouble)
+    }
+
+    /// Keeps the promises; returns whether all of them are kept.
     fn keep(&mut self) -> bool {
-        self.unsaved = self.node.take_unsaved().or_else(|| self.unsaved.take());
-        let (Some(kept), Some(store)) = (&self.unsaved, &mut self.store) else { return true };
-        match store.save(kept) {
-            Ok(()) => self.unsaved = None,
-            Err(_) => self.stats.unsaved += 1,
+        let Some(store) = &mut self.store else { return true };
+        if let Some(kept) = self.node.take_unsaved() {
+            store.put(self.now, kept);
         }
-        self.unsaved.is_none()
+        let had_to = !store.is_done();
+        let is_kept = store.go_on(self.now);
+        self.node.note_disk("promises", store.trouble());
+        if is_kept && had_to {
+            self.node.saved();
+        } else if store.trouble().is_some() {
+            self.node.store_fails();
+        }
+        is_kept
+    }
+
+    /// Holds back what depends on what is not kept, and gives the rest. If the store is in trouble, it is to the others
+    /// as if the network had lost it: they ask again.
+    fn withhold(&mut self, mut outgoing: Vec<(Recipient, Message)>) -> Vec<(Recipient, Message)> {
+        let free = self.node.sort_out(&mut outgoing);
+        if self.trouble().is_some() {
+            self.stats.unsaved += outgoing.len() as u64;
+        } else {
+            self.withheld = outgoing;
+        }
+        free
     }
 }
 

@@ -9,11 +9,20 @@ use skein_dbp::Kept;
 
 /// Keeps what must not be forgotten: a node's promises ([`Kept`]), or the scripts that it was sent ([`KeptScript`]).
 pub trait Store<T = Kept>: Debug + Send {
-    /// Keeps `kept` in place of what was kept before, so that it is still there after a crash.
-    ///
-    /// # Errors
-    /// A text for people that names what could not be written. The node then does not say what it could not keep.
-    fn save(&mut self, kept: &T) -> Result<(), String>;
+    /// Keeps `kept` in place of what was kept before, so that it is still there after a crash. One that takes its time
+    /// is asked again with the same value until it is done, or has failed; asked after that, it tries again.
+    fn save(&mut self, kept: &T) -> Saving;
+}
+
+/// How far a store has come with what it was given last.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Saving {
+    /// It would be there after a crash.
+    Done,
+    /// It is not known yet.
+    UnderWay,
+    /// A text for people that names what could not be written, and why.
+    Failed(String),
 }
 
 /// A script that a vehicle was sent and has taken in.
@@ -38,8 +47,8 @@ impl<T: Clone> MemoryStore<T> {
 }
 
 impl<T: Clone + Debug + Send> Store<T> for MemoryStore<T> {
-    fn save(&mut self, kept: &T) -> Result<(), String> {
+    fn save(&mut self, kept: &T) -> Saving {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = kept.clone();
-        Ok(())
+        Saving::Done
     }
 }

@@ -5,6 +5,7 @@
 mod boards;
 mod catalogue;
 mod determinism;
+mod failing_disk;
 mod g1_order;
 mod g2_cause;
 mod g3_confirmed_block;

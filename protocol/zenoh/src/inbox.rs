@@ -12,6 +12,8 @@ use crate::bell::Bell;
 #[derive(Debug)]
 pub(crate) struct Inbox {
     waiting: Mutex<Mailbox>,
+    /// Whether a message makes the one before under its key void.
+    of_newest: bool,
     /// Rung when a message has come.
     pub(crate) bell: Bell,
     pub(crate) received: AtomicU64,
@@ -23,11 +25,17 @@ impl Inbox {
     pub(crate) fn new(capacity: usize) -> Self {
         Self {
             waiting: Mutex::new(Mailbox::new(capacity)),
+            of_newest: false,
             bell: Bell::default(),
             received: AtomicU64::new(0),
             misnamed: AtomicU64::new(0),
             oversized: AtomicU64::new(0),
         }
+    }
+
+    /// An inbox in which of the messages under one key only the newest waits.
+    pub(crate) fn of_newest(capacity: usize) -> Self {
+        Self { of_newest: true, ..Self::new(capacity) }
     }
 
     /// Takes in a message of `bytes` under a key of Skein's; others, and those that are too long, are counted and not
@@ -44,7 +52,13 @@ impl Inbox {
             return;
         }
         let payload = payload();
-        self.waiting().push(key, payload);
+        let mut waiting = self.waiting();
+        if self.of_newest {
+            waiting.push_newest(key, payload);
+        } else {
+            waiting.push(key, payload);
+        }
+        drop(waiting);
         self.bell.ring();
     }
 
@@ -97,6 +111,18 @@ mod tests {
         assert_eq!((read(&inbox.received), dropped, read(&inbox.misnamed)), (4, 1, 1));
         let payloads: Vec<_> = std::iter::from_fn(|| inbox.pop()).map(|(_, payload)| payload).collect();
         assert_eq!(payloads, [vec![1], vec![2]]);
+    }
+
+    #[test]
+    fn where_only_the_newest_counts_one_key_takes_one_place() {
+        let inbox = Inbox::of_newest(2);
+        inbox.push("skein/demo/state/uav/2", 1, || vec![7]);
+        for byte in 0..100 {
+            inbox.push(KEY, 2, || vec![byte, byte]);
+        }
+        let payloads: Vec<_> = std::iter::from_fn(|| inbox.pop()).map(|(_, payload)| payload).collect();
+        assert_eq!(payloads, [vec![7], vec![99, 99]]);
+        assert_eq!((read(&inbox.dropped), inbox.waiting.lock().unwrap().bytes), (0, 0));
     }
 
     #[test]

@@ -110,8 +110,17 @@ impl ZenohSession {
 
     /// A link that hears what is put under keys of these patterns: a sensor's scans, a world's scene.
     pub fn listen(&self, patterns: Vec<String>) -> Result<ZenohLink, ZenohError> {
+        self.listen_with(patterns, Inbox::new(self.0.incoming_capacity))
+    }
+
+    /// The same, but of the messages under one key only the newest waits: one who says much takes nobody's place.
+    pub fn listen_to_newest(&self, patterns: Vec<String>) -> Result<ZenohLink, ZenohError> {
+        self.listen_with(patterns, Inbox::of_newest(self.0.incoming_capacity))
+    }
+
+    fn listen_with(&self, patterns: Vec<String>, inbox: Inbox) -> Result<ZenohLink, ZenohError> {
         let port = self.0.next_port.fetch_add(1, Ordering::Relaxed);
-        let inbox = Arc::new(Inbox::new(self.0.incoming_capacity));
+        let inbox = Arc::new(inbox);
         let (answer, joined) = sync_channel(1);
         self.0.entry.ask(Command::Join { port, patterns, inbox: inbox.clone(), answer })?;
         // A client joins once its router is there.

@@ -43,6 +43,7 @@ struct Vehicle {
     link: Box<dyn Link>,
     /// Its agent was killed.
     is_dead: bool,
+    has_mission: bool,
 }
 
 /// The events and messages of one step, for a recording.
@@ -93,6 +94,7 @@ impl Swarm {
                     agent: AgentCore::with_parts(config, parts, Some(store))?,
                     link,
                     is_dead: false,
+                    has_mission: true,
                 })
             })
             .collect::<Result<_, AgentError>>()?;
@@ -123,6 +125,13 @@ impl Swarm {
     pub fn kill_agent(&mut self, index: usize) {
         if let Some(vehicle) = self.vehicles.get_mut(index) {
             vehicle.is_dead = true;
+        }
+    }
+
+    /// From now on the mission of vehicle `index` is silent, or decides again, as if its thread hung or went on.
+    pub fn halt_mission(&mut self, index: usize, is_silent: bool) {
+        if let Some(vehicle) = self.vehicles.get_mut(index) {
+            vehicle.has_mission = !is_silent;
         }
     }
 
@@ -165,7 +174,10 @@ impl Swarm {
         selections.append(&mut heard);
         for (index, vehicle) in self.vehicles.iter_mut().enumerate().filter(|(_, vehicle)| !vehicle.is_dead) {
             let began = Instant::now();
-            timed(&mut self.stopwatch, || vehicle.agent.tick(now, vehicle.link.as_mut()));
+            timed(&mut self.stopwatch, || match vehicle.has_mission {
+                true => vehicle.agent.tick(now, vehicle.link.as_mut()),
+                false => vehicle.agent.tick_without_mission(now, vehicle.link.as_mut()),
+            });
             let mut heard = vehicle.agent.take_selections();
             self.plan_times.take_in(index, began, &heard, vehicle.agent.is_planning());
             self.simulation.send(index, &vehicle.agent.take_mavlink());

@@ -141,3 +141,62 @@ fn a_goal_that_cannot_be_reached_is_given_up_and_the_vehicle_lands() {
         assert!(summary.per_vehicle[0].flight_time_s > 1.0, "it flew, and landed");
     }
 }
+
+/// A vehicle among others that cross its way, whose mission falls silent in flight.
+fn without_mission(seed: u64) -> Lockstep {
+    let mut lockstep = Lockstep::new("antipodal", Some(4), seed);
+    while lockstep.swarm.simulation().vehicle(0).unwrap().motion.velocity.xy().norm() < 1.0 {
+        lockstep.step();
+    }
+    lockstep.swarm.halt_mission(0, true);
+    lockstep
+}
+
+fn speed_m_s(lockstep: &Lockstep) -> f64 {
+    lockstep.swarm.simulation().vehicle(0).unwrap().motion.velocity.norm()
+}
+
+#[test]
+fn a_vehicle_whose_mission_falls_silent_hovers_and_avoids_and_lands() {
+    for seed in 1..=3 {
+        let mut lockstep = without_mission(seed);
+        let silent = lockstep.swarm.now();
+        let after = |seconds| silent + Duration::from_secs_f64(seconds);
+        lockstep.run_until(after(2.5));
+        let mut fastest_m_s: f64 = 0.0;
+        while lockstep.swarm.now() < after(9.9) {
+            lockstep.step();
+            fastest_m_s = fastest_m_s.max(speed_m_s(&lockstep));
+            assert!(
+                lockstep.swarm.simulation().vehicle(0).unwrap().airborne,
+                "seed {seed}: it is down early"
+            );
+        }
+        // Others that come near may push it a little.
+        assert!(fastest_m_s < 1.5, "seed {seed}: {fastest_m_s} m/s without leave");
+        let told = &lockstep.swarm.ground().roster().next().unwrap().1.unwrap().waiting_for;
+        assert!(told.contains("no decision for 9."), "seed {seed}: {told}");
+        lockstep.run_until(after(60.0));
+        assert!(!lockstep.swarm.simulation().vehicle(0).unwrap().airborne, "seed {seed}: it does not land");
+        assert_eq!(lockstep.swarm.truth().collisions_vehicle, 0, "seed {seed}");
+        let others = lockstep.swarm.outcomes().skip(1);
+        assert!(others.into_iter().all(|outcome| outcome == Some(&Outcome::Complete)), "seed {seed}");
+    }
+}
+
+#[test]
+fn a_mission_that_decides_again_in_time_goes_on_and_later_stays_down() {
+    for (seconds, outcome) in [(5.0, Outcome::Complete), (12.0, Outcome::Failed("landed".to_owned()))] {
+        let mut lockstep = without_mission(1);
+        lockstep.run_until(lockstep.swarm.now() + Duration::from_secs_f64(seconds));
+        lockstep.swarm.halt_mission(0, false);
+        lockstep.run_until(lockstep.swarm.now() + Duration::from_secs(120));
+        let ended = lockstep.swarm.outcomes().next().unwrap().cloned();
+        let is_same = matches!(
+            (&ended, &outcome),
+            (Some(Outcome::Complete), Outcome::Complete) | (Some(Outcome::Failed(_)), Outcome::Failed(_))
+        );
+        assert!(is_same, "silent for {seconds} s: {ended:?}");
+        assert!(!lockstep.swarm.simulation().vehicle(0).unwrap().airborne);
+    }
+}

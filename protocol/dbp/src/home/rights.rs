@@ -37,6 +37,8 @@ pub(super) struct Rights {
     longest_lease: Duration,
     /// Whether blocks may outlive their holders, since they are kept on disk.
     durable: bool,
+    /// Whether the disk takes them.
+    pub(super) store_works: bool,
     #[cfg(feature = "mutants")]
     pub(super) mutant: Option<Mutant>,
 }
@@ -55,6 +57,7 @@ impl Rights {
             priority: config.remote_priority.clone(),
             longest_lease: config.longest_lease,
             durable: config.durable,
+            store_works: true,
             #[cfg(feature = "mutants")]
             mutant: config.mutant,
         }
@@ -80,13 +83,15 @@ impl Rights {
         self.home = home;
     }
 
-    /// The part of a bid that is honoured, by its place in a record, and why not the rest.
+    /// The part of a bid that is honoured, by its place in a record, and why not the rest; whether its block is kept
+    /// already and `stays` as it is.
     pub(super) fn judge(
         &self,
         node: &NodeName,
         bid: &RemoteBid,
         place: usize,
         lease: Duration,
+        stays: bool,
     ) -> (Option<TakenBid>, Vec<RefusalReason>) {
         if !bid.is_within_quota(place) {
             return (None, vec![RefusalReason::Quota]);
@@ -100,16 +105,19 @@ impl Rights {
             denial(event)
                 .filter(|why| self.mutant != Some(Mutant::G7) || *why != RefusalReason::MayNotRequest)
         };
+        let lapses = bid.on_loss == OnLoss::Hold && !(self.durable && (self.store_works || stays));
         let mut reasons: Vec<_> = bid.requests.iter().filter_map(denial).collect();
         // A b-thread blocks with one set what it wants to block at all homes together.
         let block = match self.authority.may_block(node, &bid.bthread, &bid.block.about(&self.home)) {
-            true => self.honoured_block(bid),
+            true if lapses || bid.block.is_none() => EventSet::None,
+            // Without what may not be blocked from afar.
+            true => bid.block.clone().and(self.blockable.clone()),
             false => {
                 reasons.push(RefusalReason::MayNotBlock);
                 EventSet::None
             }
         };
-        if bid.on_loss == OnLoss::Hold && !self.durable {
+        if lapses {
             reasons.push(RefusalReason::HoldUnsupported);
         }
         reasons.sort_unstable();
@@ -139,13 +147,5 @@ impl Rights {
         } else {
             None
         }
-    }
-
-    /// The block without what may not be blocked from afar.
-    fn honoured_block(&self, bid: &RemoteBid) -> EventSet {
-        if bid.block.is_none() || (bid.on_loss == OnLoss::Hold && !self.durable) {
-            return EventSet::None;
-        }
-        bid.block.clone().and(self.blockable.clone())
     }
 }

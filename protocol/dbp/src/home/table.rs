@@ -45,6 +45,9 @@ pub(crate) struct BidTable {
     pub(super) bidders: BTreeMap<NodeName, Bidder>,
     /// Whether the blocks to be kept are not saved as they are.
     unsaved: bool,
+    /// The holders whose blocks are not on disk as they are, and all blocks that are.
+    owed: BTreeSet<NodeName>,
+    on_disk: Vec<KeptBlock>,
 }
 
 /// A remote b-thread that stands behind a proxy.
@@ -75,7 +78,10 @@ impl BidTable {
         let nothing = BTreeMap::new();
         let proxies =
             bidders.iter().flat_map(|(node, bidder)| changes(node, &nothing, &bidder.bids)).collect();
-        (Self { incarnation, rights, bidders, unsaved: false }, proxies)
+        let mut table =
+            Self { incarnation, rights, bidders, unsaved: false, owed: BTreeSet::new(), on_disk: Vec::new() };
+        table.saved();
+        (table, proxies)
     }
 
     /// From now on, these events have their home here.
@@ -103,11 +109,43 @@ impl BidTable {
         std::mem::take(&mut self.unsaved)
     }
 
+    /// All that must be kept is on disk.
+    pub(crate) fn saved(&mut self) {
+        self.owed.clear();
+        self.on_disk = self.kept();
+        self.rights.store_works = true;
+    }
+
+    /// Whether a block of `node` is not on disk as it is.
+    pub(crate) fn owes(&self, node: &NodeName) -> bool {
+        self.owed.contains(node)
+    }
+
+    /// From now on no block is kept that is not on disk already, and those that are not are void.
+    pub(crate) fn store_fails(&mut self) -> Vec<ProxyChange> {
+        self.rights.store_works = false;
+        let mut gone = Vec::new();
+        for node in &self.owed {
+            let Some(bidder) = self.bidders.get_mut(node) else { continue };
+            let before = bidder.bids.clone();
+            for (bthread, bid) in bidder.bids.iter_mut().filter(|(_, bid)| bid.keep && !bid.orphaned) {
+                if !is_on_disk(&self.on_disk, node, bthread, &bid.block) {
+                    bid.block = EventSet::None;
+                    bid.keep = false;
+                }
+            }
+            gone.extend(changes(node, &before, &bidder.bids));
+        }
+        self.unsaved |= !gone.is_empty();
+        gone
+    }
+
     /// An authority lifts the block of `bthread` at `node`.
     pub(crate) fn lift(&mut self, node: &NodeName, bthread: &str) -> Vec<ProxyChange> {
         let Some(bidder) = self.bidders.get_mut(node) else { return Vec::new() };
         let Some(bid) = bidder.bids.get_mut(bthread).filter(|bid| bid.keep) else { return Vec::new() };
         self.unsaved = true;
+        self.owed.insert(node.clone());
         bidder.lifted.insert(bthread.into(), bid.sync);
         let before = bidder.bids.clone();
         bidder.bids.remove(bthread);
@@ -151,7 +189,9 @@ impl BidTable {
             taken = bidder.bids.clone();
         }
         for (place, bid) in record.bids.iter().enumerate() {
-            let (honoured, reasons) = self.rights.judge(&record.node, bid, place, bidder.lease);
+            let known = bidder.bids.get(&bid.bthread).filter(|known| known.keep);
+            let stays = known.is_some_and(|known| known.asked_block == bid.block);
+            let (honoured, reasons) = self.rights.judge(&record.node, bid, place, bidder.lease, stays);
             bidder.refuse(bid, reasons);
             let Some(mut honoured) = honoured else { continue };
             // What has occurred since the bidder stated this resumes its b-thread, which asks no more (G4).
@@ -189,7 +229,14 @@ impl BidTable {
                 heir.orphaned = true;
             }
         }
-        self.unsaved |= kept_blocks(&bidder.bids).ne(kept_blocks(&taken));
+        if kept_blocks(&bidder.bids).ne(kept_blocks(&taken)) {
+            self.unsaved = true;
+            self.owed.insert(record.node.clone());
+        }
+        if !self.rights.store_works {
+            // What is kept now is on disk: what is withdrawn may come back in this home's next life, but nothing is lost.
+            self.owed.remove(&record.node);
+        }
         let before = std::mem::replace(&mut bidder.bids, taken);
         let denied = bidder.refused.iter().filter(|refusal| !refused_before.contains(refusal));
         let proxies = changes(&record.node, &before, &bidder.bids);
@@ -335,6 +382,10 @@ impl BidTable {
             lease: bidder.lease,
         })
     }
+}
+
+fn is_on_disk(on_disk: &[KeptBlock], node: &NodeName, bthread: &str, block: &EventSet) -> bool {
+    on_disk.iter().any(|kept| kept.node == *node && kept.bthread == bthread && kept.block == *block)
 }
 
 /// The events of both sets; no larger a tree each time that the same ones are joined.

@@ -31,6 +31,12 @@ pub(crate) struct Joint {
     asking: bool,
     /// Whether roster or decisions are not saved as they are.
     unsaved: bool,
+    /// Whether they are not on disk yet.
+    owed: bool,
+    /// Whether the disk does not take them.
+    store_fails: bool,
+    /// Whether it is not known what was decided in this term.
+    forgot: bool,
 }
 
 impl Joint {
@@ -80,6 +86,7 @@ impl Joint {
         run: &mut Run,
     ) {
         let mut term = Term::new(roster, config);
+        self.forgot = config.forgot;
         if term.leads() {
             for (seq, event) in (1..).zip(decisions) {
                 let decision = Occurrence {
@@ -103,6 +110,8 @@ impl Joint {
     /// Begins a new term by an operator's order; gives the coordinator of the former one, if that is another node.
     pub(crate) fn adopt(&mut self, roster: Roster, config: &NodeConfig) -> Option<NodeName> {
         self.unsaved = true;
+        self.owed = true;
+        self.forgot = false;
         let former = self.term.replace(Term::new(roster, config));
         former.filter(|former| !former.leads()).map(|former| former.roster.coordinator)
     }
@@ -116,7 +125,30 @@ impl Joint {
         if let Some(term) = &mut self.term {
             term.decisions.push(decision);
             self.unsaved = true;
+            self.owed = true;
         }
+    }
+
+    /// Roster and decisions are on disk.
+    pub(crate) fn saved(&mut self) {
+        self.owed = false;
+        self.store_fails = false;
+    }
+
+    /// Whether roster or decisions are not on disk yet, so that nobody may rely on them.
+    pub(crate) fn owes(&self) -> bool {
+        self.owed
+    }
+
+    /// Nothing is decided until all is saved.
+    pub(crate) fn store_fails(&mut self, clock: &Clock, lease: Duration, run: &mut Run) {
+        self.store_fails = true;
+        self.guard(clock, lease, run);
+    }
+
+    /// Whether the disk takes what is decided.
+    pub(crate) fn is_stuck(&self) -> bool {
+        self.store_fails
     }
 
     /// Whether roster or decisions have changed since the last call.
@@ -179,7 +211,9 @@ impl Joint {
 
     /// Keeps joint events back, or lets them happen, as the members' last words allow; none may be older than `lease`.
     pub(crate) fn guard(&mut self, clock: &Clock, lease: Duration, run: &mut Run) {
-        let guards = self.led().is_some_and(|term| !term.may_decide(clock.up(), lease));
+        let is_able = !self.store_fails && !self.forgot;
+        let may_decide = |term: &Term| is_able && term.may_decide(clock.up(), lease);
+        let guards = self.led().is_some_and(|term| !may_decide(term));
         if std::mem::replace(&mut self.guards, guards) != guards {
             let block = guards.then(|| Bid::new().block(Roster::joint_events()));
             run.change_proxies(vec![(JOINT_GUARD.into(), block)]);

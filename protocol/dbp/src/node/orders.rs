@@ -34,6 +34,7 @@ impl Node {
             Ok(roster) if roster.term - self.joint.number() > MOST_TERMS_AHEAD => {
                 format!("term {} is far ahead: the next is {}", roster.term, self.joint.number() + 1)
             }
+            Ok(_) if self.joint.is_stuck() => "the disk does not take it: see to its state folder".to_owned(),
             Ok(roster) => match roster.members.iter().find(|member| !self.knows(member)) {
                 Some(stranger) => format!("{stranger} is not of this fleet"),
                 None => {

@@ -2,7 +2,7 @@
 
 mod bp;
 mod fleet;
-mod hold;
+pub mod hold;
 mod link;
 mod nav;
 pub mod plan;

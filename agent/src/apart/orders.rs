@@ -1,0 +1,48 @@
+//! What the mission tells control.
+
+use std::time::Duration;
+
+use skein_wire::{Limits, MissionState, State};
+
+use super::newest::Newest;
+use crate::instruction::Instruction;
+
+/// What the mission has decided.
+#[derive(Clone, Debug, Default)]
+pub struct Orders {
+    /// When it has decided last, even if it was that nothing is to be done.
+    pub decided: Duration,
+    /// What is to be done, each with the time when that was decided.
+    pub instructions: Newest<Instruction>,
+    /// The newest, if they have changed; as the rest.
+    pub limits: Option<Limits>,
+    pub words: Option<Words>,
+}
+
+/// The mission's part of what a vehicle tells the others.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Words {
+    pub task: String,
+    pub waiting_for: String,
+    pub mission: MissionState,
+    pub scripts: Vec<String>,
+}
+
+impl Orders {
+    /// Adds what is newer.
+    pub fn merge(&mut self, newer: Self) {
+        self.decided = self.decided.max(newer.decided);
+        self.instructions.extend(newer.instructions);
+        self.limits = newer.limits.or(self.limits.take());
+        self.words = newer.words.or(self.words.take());
+    }
+}
+
+impl Words {
+    /// The state of a body, with these words.
+    #[must_use]
+    pub fn said_of(&self, body: State) -> State {
+        let Self { task, waiting_for, mission, scripts } = self.clone();
+        State { task, waiting_for, mission, scripts, ..body }
+    }
+}
