@@ -36,6 +36,9 @@ const STATES_TRIED: usize = 500;
 /// The checks before take-off are told this often, for those who have come since.
 const READINESS_PERIOD: Duration = Duration::from_secs(1);
 
+/// Why a script is not taken in that nobody sends.
+const UNNAMED: &str = "the request names nobody: set `by` to the name of the person or program that makes it";
+
 /// The outcome of a vehicle's mission.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -123,7 +126,7 @@ impl Mission {
 
     /// Takes in an order of whoever is at this vehicle's own computer.
     pub fn order(&mut self, what: What) {
-        self.node.node_mut().enqueue(OrderTaken::plain(what).at(&self.name));
+        self.node.node_mut().enqueue(OrderTaken::plain(what, "the vehicle's own computer").given_aboard().at(&self.name));
     }
 
     /// Takes in what other nodes say; gives back what vehicles say of themselves.
@@ -160,7 +163,11 @@ impl Mission {
 
     /// Tells the others where this vehicle is and how far its task has come. `state` is that of its body.
     pub fn put_state(&mut self, state: State, complaint: Option<String>, link: &mut dyn Link) {
+        let holder = self.node.node().program().state_of::<bthreads::Holder>(bthreads::Holder::NAME);
+        let name = |name: Option<&str>| name.unwrap_or_default().to_owned();
         let state = State {
+            holder: name(holder.and_then(bthreads::Holder::holder)),
+            asked_by: name(holder.and_then(bthreads::Holder::asked_by)),
             incarnation: self.config.incarnation,
             task: self.task.clone(),
             waiting_for: self.waiting_for(complaint),
@@ -268,11 +275,13 @@ impl Mission {
                 self.scripts.verdict(&name, outcome)
             }
             Some(Unload::NAME) => {
-                let name = Unload::read(event).map(|unload| unload.name).unwrap_or_default();
-                if self.scripts.runs(&name) {
-                    return;
-                }
-                self.scripts.verdict(&name, Err("no script of this name runs".to_owned()))
+                let Some(Unload { name, by }) = Unload::read(event) else { return };
+                let why = match (self.scripts.runs(&name), by) {
+                    (true, Some(_)) => return,
+                    (true, None) => UNNAMED,
+                    (false, _) => "no script of this name runs",
+                };
+                self.scripts.verdict(&name, Err(why.to_owned()))
             }
             Some(ScriptNews::NAME) => return self.scripts.hear(event),
             _ => return,
@@ -282,11 +291,16 @@ impl Mission {
 
     /// Runs a script that is sent; gives back its name, and why it is not run if it is not.
     fn load_script(&mut self, happened: &Happened) -> (String, Result<(), String>) {
-        let text = Load::read(&happened.event).map(|load| load.script).unwrap_or_default();
-        let assignment = match Assignment::from_json(&text) {
+        let Some(Load { script, by, .. }) = Load::read(&happened.event) else {
+            return (String::new(), Err("it holds no script".to_owned()));
+        };
+        let assignment = match Assignment::from_json(&script) {
             Ok(assignment) => assignment,
             Err(error) => return (String::new(), Err(error.to_string())),
         };
+        if by.is_none() {
+            return (assignment.name().to_owned(), Err(UNNAMED.to_owned()));
+        }
         let sender = happened.requested_by.iter().find(|bthread| bthread.contains('#'));
         let from = sender.map_or(self.name.as_str(), |bthread| bthread).to_owned();
         let outcome = self.admit(&assignment, &from, Begins::AtOnce);
@@ -313,7 +327,7 @@ impl Mission {
     fn may_send(&self, assignment: &Assignment, from: &str) -> Result<bool, String> {
         let Some((node, bthread)) = from.split_once('#') else { return Ok(from == self.name.as_str()) };
         let text = assignment.to_json().map_err(|error| error.to_string())?;
-        let load = self.me.event(Load { name: None, script: text.into() });
+        let load = self.me.event(Load { name: None, script: text.into(), by: None });
         let is_member = self.config.roster.iter().any(|member| member == node);
         let may_request = |node| self.config.authority.may_request(&node, bthread, &load);
         Ok(is_member && !node.starts_with("uav/") && NodeName::new(node).is_ok_and(may_request))

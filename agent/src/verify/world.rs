@@ -215,17 +215,17 @@ pub(super) fn peer(me: &Me, node: &NodeName) -> Part {
     ])
 }
 
-/// An operator who gives these orders.
+/// An operator who gives these orders. They count as given aboard: who holds the vehicle is not looked at.
 pub(super) fn operator(me: &Me, config: &AgentConfig, orders: &[What]) -> Part {
     let [x, y, z] = config.fence.max;
     let offers = orders.iter().fold(Place::new("there"), |place, what| {
         let place = match what {
             What::GoTo => place
-                .keeps_offering(me.event(OrderTaken::go_to(config.home)))
-                .keeps_offering(me.event(OrderTaken::go_to([x + 10.0, y, z]))),
+                .keeps_offering(me.event(OrderTaken::go_to(config.home, "operator").given_aboard()))
+                .keeps_offering(me.event(OrderTaken::go_to([x + 10.0, y, z], "operator").given_aboard())),
             _ => place,
         };
-        place.keeps_offering(me.event(OrderTaken::plain(*what)))
+        place.keeps_offering(me.event(OrderTaken::plain(*what, "operator").given_aboard()))
     });
     Part::of_one(offers)
 }
