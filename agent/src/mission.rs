@@ -126,7 +126,9 @@ impl Mission {
 
     /// Takes in an order of whoever is at this vehicle's own computer.
     pub fn order(&mut self, what: What) {
-        self.node.node_mut().enqueue(OrderTaken::plain(what, "the vehicle's own computer").given_aboard().at(&self.name));
+        self.node
+            .node_mut()
+            .enqueue(OrderTaken::plain(what, "the vehicle's own computer").given_aboard().at(&self.name));
     }
 
     /// Takes in what other nodes say; gives back what vehicles say of themselves.

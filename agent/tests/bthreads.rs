@@ -838,7 +838,10 @@ mod return_home {
         assert_eq!(vehicle.reports(BatteryLow::NAME), home);
         assert_eq!(vehicle.reports(Airborne::NAME), ["airborne"]);
         let why = "declined: it is not free to go: on the ground, landing or returning";
-        assert_eq!(vehicle.hears(OrderTaken::go_to([4.0, 3.0, 2.0], "the operator").given_aboard().at(ME)), ["order goto", why]);
+        assert_eq!(
+            vehicle.hears(OrderTaken::go_to([4.0, 3.0, 2.0], "the operator").given_aboard().at(ME)),
+            ["order goto", why]
+        );
     }
 }
 
@@ -873,7 +876,10 @@ mod holder {
         for what in What::those(|what| what.needs_holder() && what.reaches_vehicle()) {
             assert!(!vehicle.allows(order(what, "Ben")), "{what} of another");
             assert!(vehicle.allows(order(what, "Anna")), "{what} of the holder");
-            assert!(vehicle.allows(OrderTaken::plain(what, "script/x").given_aboard().at(ME)), "{what} aboard");
+            assert!(
+                vehicle.allows(OrderTaken::plain(what, "script/x").given_aboard().at(ME)),
+                "{what} aboard"
+            );
         }
         let load = |by: &str| Load { name: None, script: "{}".into(), by: Some(by.into()) }.at(ME);
         assert!(!vehicle.allows(load("Ben")) && vehicle.allows(load("Anna")));
@@ -897,14 +903,18 @@ mod holder {
         let mut vehicle = annas();
         assert_eq!(vehicle.hears(handover(What::Ask, "Ben")), ["handover ask", "held: Ben asks for it"]);
         assert_eq!(holder(&vehicle), Some("Anna"));
-        let give = |by: &str, to: &str| Handover { what: What::Give, by: by.into(), to: Some(to.into()) }.at(ME);
+        let give =
+            |by: &str, to: &str| Handover { what: What::Give, by: by.into(), to: Some(to.into()) }.at(ME);
         assert_eq!(vehicle.hears(give("Ben", "Ben")), ["handover give"], "it is not his to give");
         assert_eq!(vehicle.hears(give("Anna", "Ben")), ["handover give", "held: Anna has given it"]);
         assert!(vehicle.allows(order(What::Resume, "Ben")) && !vehicle.allows(order(What::Resume, "Anna")));
         let taken = ["handover take", "held: Anna has taken it from Ben"];
         assert_eq!(vehicle.hears(handover(What::Take, "Anna")), taken);
         assert_eq!(vehicle.hears(handover(What::Ask, "Ben")), ["handover ask", "held: Ben asks for it"]);
-        assert_eq!(vehicle.hears(handover(What::Release, "Anna")), ["handover release", "held: Anna has let it go"]);
+        assert_eq!(
+            vehicle.hears(handover(What::Release, "Anna")),
+            ["handover release", "held: Anna has let it go"]
+        );
         assert_eq!(holder(&vehicle), Some("Ben"), "whoever asks for it is next");
     }
 
@@ -976,7 +986,10 @@ mod reposition {
     #[test]
     fn a_point_outside_the_fence_is_declined_and_the_mission_goes_on() {
         let mut vehicle = Vehicle::on_its_way();
-        assert_eq!(vehicle.hears(OrderTaken::go_to([1e4, 0.0, 2.0], "the operator").given_aboard().at(ME)), ["order goto"]);
+        assert_eq!(
+            vehicle.hears(OrderTaken::go_to([1e4, 0.0, 2.0], "the operator").given_aboard().at(ME)),
+            ["order goto"]
+        );
         let declined = vehicle.after(2 * SECOND);
         assert!(declined.iter().any(|event| event.starts_with("declined: ")), "{declined:?}");
         assert!(vehicle.may(Advance::NAME));

@@ -444,8 +444,14 @@ fn a_script_of_a_former_life_begins_when_the_vehicle_is_let_go_on() {
         blocks(&vehicle)
     };
     assert!(begins_with(Vehicle::on_the_ground(), mine(Ready::NAME)));
-    assert!(begins_with(Vehicle::in_the_air(), OrderTaken::plain(What::Resume, "the operator").given_aboard().at(ME)));
-    assert!(!begins_with(Vehicle::in_the_air(), OrderTaken::plain(What::Hold, "the operator").given_aboard().at(ME)));
+    assert!(begins_with(
+        Vehicle::in_the_air(),
+        OrderTaken::plain(What::Resume, "the operator").given_aboard().at(ME)
+    ));
+    assert!(!begins_with(
+        Vehicle::in_the_air(),
+        OrderTaken::plain(What::Hold, "the operator").given_aboard().at(ME)
+    ));
 }
 
 #[test]
@@ -455,9 +461,7 @@ fn a_script_that_is_there_from_the_start_does_not_end_the_hold_of_a_vehicle_foun
         {"sync": {"wait": "uav/1/landed"}},
     ]));
     let by_script = |events: &[Event]| {
-        events.iter().any(|event| {
-            OrderTaken::read(event).is_some_and(|order| &*order.by == "script/test")
-        })
+        events.iter().any(|event| OrderTaken::read(event).is_some_and(|order| &*order.by == "script/test"))
     };
     let found = |begins| {
         let mut vehicle = Vehicle::on_the_ground();
@@ -473,7 +477,10 @@ fn a_script_that_is_there_from_the_start_does_not_end_the_hold_of_a_vehicle_foun
     let (mut vehicle, _) = found(Begins::WhenReleased);
     let events = vehicle.hears(mine(Unload::NAME).with("name", "test").with("by", "the operator"));
     assert_eq!(states(&events), [ScriptState::Withdrawn]);
-    assert!(!by_script(&vehicle.hears(OrderTaken::plain(What::Resume, "the operator").given_aboard().at(ME))), "withdrawn before it began");
+    assert!(
+        !by_script(&vehicle.hears(OrderTaken::plain(What::Resume, "the operator").given_aboard().at(ME))),
+        "withdrawn before it began"
+    );
 
     // So are those of the configuration.
     let mut core = AgentCore::new(AgentConfig { scripts: vec![onward], ..config() }).unwrap();

@@ -62,7 +62,8 @@ impl Runner {
 
     /// What the script itself calls an event that has happened, if it has requested it.
     fn own_word(&self, event: &Event) -> Event {
-        let requested = |bid: Bid| bid.requests().iter().find(|request| self.named(request) == *event).cloned();
+        let requested =
+            |bid: Bid| bid.requests().iter().find(|request| self.named(request) == *event).cloned();
         let is_order = self.me.heard::<OrderTaken>(event);
         is_order.then(|| self.script.bid().and_then(requested)).flatten().unwrap_or_else(|| event.clone())
     }

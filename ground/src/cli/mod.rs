@@ -1,6 +1,8 @@
 //! The program of a ground station: see `skein-ground --help`.
 
+mod caller;
 mod explain;
+mod order;
 mod recording;
 mod serve;
 
@@ -19,7 +21,7 @@ use crate::config_file::Config;
     name = "skein-ground",
     version,
     max_term_width = 80,
-    after_help = "Exit codes: 0 done, 1 the mission failed or nothing can be explained, 2 wrong usage or input."
+    after_help = "Exit codes: 0 done, 1 the mission failed, an order was not taken in by all or nothing can be explained, 2 wrong usage or input."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -40,6 +42,8 @@ enum Command {
         #[arg(long)]
         until_over: bool,
     },
+    #[command(flatten)]
+    Order(order::OrderCommand),
     /// Explain why vehicles of a recorded mission moved or stood still: who requested what, who blocked it, and what
     /// would have to change.
     Explain {
@@ -71,6 +75,7 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
     let cli = Cli::parse();
     let outcome = match &cli.command {
         Command::Serve { config, until_over } => serve(config, &known, *until_over, cli.json),
+        Command::Order(order) => order::run(order, cli.json),
         Command::Explain { file, at, vehicle } => explain::run(file, *at, vehicle.as_deref(), cli.json),
     };
     match outcome {

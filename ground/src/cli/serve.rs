@@ -65,7 +65,7 @@ impl Station {
         let link = session.listen(Key::subscriptions_with_boards(&fleet, &config.station.name))?;
         let scenes = session.listen(vec![Key::pattern::<Scene>(&fleet)])?;
         let bell = link.bell();
-        let mut console = Console::serve(config.console, {
+        let mut console = Console::serve(config.console, config.console_security.as_ref(), {
             let bell = bell.clone();
             move || bell.ring()
         })?;
@@ -96,10 +96,10 @@ impl Station {
         self.link.bell().wait(TICK);
         let now = self.began.elapsed();
         for wish in self.console.take_orders() {
-            tracing::info!("ordered: {} for {}", wish.order.what(), wish.order.who());
-            let given = self.core.order(&wish.order);
-            wish.answer(given);
+            tracing::info!("{wish}");
+            wish.carry_out(&mut self.core);
         }
+        self.core.attend(self.console.present());
         if let Err(error) = self.core.tick(now, &mut self.link) {
             tracing::error!("{error}");
             self.recording.note(now, Level::Error, self.core.name().as_str(), &error.to_string());

@@ -8,9 +8,10 @@ use tokio::sync::{broadcast::error::RecvError, watch};
 use tokio::time::timeout;
 
 use super::feed::Message;
-use super::request::{self, Mailbox, Request};
+use super::request::{self, Granted, Mailbox, OrderMessage, Request};
+use super::session::Session;
 use super::subscription::{Pictures, Question, Reasons, Subscription, Text};
-use crate::order::Order;
+use super::token;
 
 /// A browser that takes nothing for this long is let go.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -19,9 +20,17 @@ const PATIENCE: Duration = Duration::from_secs(10);
 struct Gone;
 
 /// Attends a browser until it goes.
-pub(super) async fn attend(mut socket: WebSocket, mut subscription: Subscription, mailbox: &Mailbox) {
+pub(super) async fn attend(
+    mut socket: WebSocket,
+    mut session: Session,
+    mut subscription: Subscription,
+    mailbox: &Mailbox,
+) {
     let history = subscription.history();
-    let mut outcome = say(&mut socket, &Message::events(history.iter())).await;
+    let mut outcome = say(&mut socket, &Message::you(&session, None)).await;
+    if outcome.is_ok() {
+        outcome = say(&mut socket, &Message::events(history.iter())).await;
+    }
     let mut shown = Pictures::new();
     let mut question: Option<Question> = None;
     while outcome.is_ok() {
@@ -37,7 +46,16 @@ pub(super) async fn attend(mut socket: WebSocket, mut subscription: Subscription
                     Some((tag, Ok(Request::Script(script)))) => {
                         say(&mut socket, &Message::Script { tag, script }).await
                     }
-                    Some((tag, Ok(Request::Order(order)))) => give(&mut socket, tag, order, mailbox).await,
+                    Some((tag, Ok(Request::Order(order)))) => {
+                        give(&mut socket, &session, tag, *order, mailbox).await
+                    }
+                    Some((tag, Ok(Request::Hello(name)))) => {
+                        let answer = match session.introduce(&name) {
+                            Ok(()) => Message::you(&session, tag),
+                            Err(message) => Message::Error { tag, message },
+                        };
+                        say(&mut socket, &answer).await
+                    }
                     Some((tag, Err(message))) => say(&mut socket, &Message::Error { tag, message }).await,
                     None if matches!(message, ws::Message::Close(_)) => Err(Gone),
                     None => Ok(()),
@@ -109,16 +127,21 @@ fn read(message: &ws::Message) -> Option<(Option<String>, Result<Request, String
 
 async fn give(
     socket: &mut WebSocket,
+    session: &Session,
     tag: Option<String>,
-    order: Order,
+    order: OrderMessage,
     mailbox: &Mailbox,
 ) -> Result<(), Gone> {
-    let given = match mailbox.put(order) {
-        Ok(given) => given.await.map_err(|_| "the station is ending".to_owned()),
-        Err(why) => Err(why.to_owned()),
-    };
-    match given.and_then(|given| given.map_err(|stranger| stranger.to_string())) {
-        Ok(id) => say(socket, &Message::Ordered { tag, id }).await,
+    match wish(session, order, mailbox).await {
+        Ok(Granted::Ordered(id)) => say(socket, &Message::Ordered { tag, id }).await,
+        Ok(Granted::Offered(offer)) => say(socket, &Message::offer(tag, &offer)).await,
         Err(message) => say(socket, &Message::Error { tag, message }).await,
     }
+}
+
+/// What the station makes of a request. Rights are looked at before anything else is.
+async fn wish(session: &Session, order: OrderMessage, mailbox: &Mailbox) -> Result<Granted, String> {
+    let by = session.giver(order.what)?;
+    let given = mailbox.put(by, order.wanted(token::random)?)?.await;
+    given.map_err(|_| "the station is ending".to_owned())?.map_err(|refusal| refusal.to_string())
 }

@@ -22,14 +22,15 @@ pub fn joint_roster<'a>(ground: NodeName, fleet: impl IntoIterator<Item = &'a No
 /// claim passages from one another, keep a joint launch back until they are ready, and may call one off.
 pub fn standard_authority() -> Authority {
     let joint = || EventSet::from(format!("{SWARM}/**"));
-    let orders = of_every_vehicle::<(OrderTaken, Handover, Load, Unload)>()
-        .or(NewRoster::any_of("*/*"))
-        .or(Lift::any_of("*/*"));
+    let orders = |of_vehicle: EventSet| of_vehicle.or(NewRoster::any_of("*/*")).or(Lift::any_of("*/*"));
     let station = Grant {
-        request: of_every_vehicle::<Takeoff>().or(orders.clone()).or(joint()),
+        request: orders(of_every_vehicle::<(Takeoff, OrderTaken, Handover, Load, Unload)>()).or(joint()),
         block: of_every_vehicle::<(Takeoff, Goto, Advance)>().or(Enter::any_of("*/*")).or(joint()),
     };
-    let operator = Grant { request: orders.or(Abort::any_of(SWARM)), ..station.clone() };
+    let operator = Grant {
+        request: orders(of_every_vehicle::<(OrderTaken, Handover, Load, Unload)>()).or(Abort::any_of(SWARM)),
+        ..station.clone()
+    };
     let vehicle = Grant {
         request: Abort::any_of(SWARM),
         // Whoever claims a passage asks the ground station too.
