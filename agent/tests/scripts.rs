@@ -455,6 +455,26 @@ fn a_script_of_a_former_life_begins_when_the_vehicle_is_let_go_on() {
 }
 
 #[test]
+fn a_script_cannot_order_in_anothers_name() {
+    let land = json!({"name": "uav/1/order", "data": {"what": "land", "by": "Anna"}});
+    let ordered = |request: Value| {
+        let mut vehicle = Vehicle::in_the_air();
+        vehicle
+            .load(&script(
+                json!([{"sync": {"request": request}}, {"sync": {"request": "uav/1/script/done"}}]),
+            ))
+            .unwrap();
+        let events = vehicle.hears(mine("clear"));
+        assert!(events.iter().any(|event| event.name() == "uav/1/script/done"), "it goes on: {events:?}");
+        events.iter().find_map(OrderTaken::read).unwrap()
+    };
+    for request in [land, json!({"name": "uav/1/order", "data": {"what": "land"}})] {
+        let order = ordered(request);
+        assert_eq!((&*order.by, order.aboard), ("script/test", Some(true)));
+    }
+}
+
+#[test]
 fn a_script_that_is_there_from_the_start_does_not_end_the_hold_of_a_vehicle_found_in_the_air() {
     let onward = script(json!([
         {"sync": {"request": {"name": "uav/1/order", "data": {"what": "resume", "by": "script/test"}}}},

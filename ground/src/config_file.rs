@@ -268,16 +268,15 @@ mod tests {
 
     #[test]
     fn the_console_is_an_address_or_a_table_and_uses_the_networks_certificates_beyond_this_computer() {
-        let short = EXAMPLE.replace("launch =", "console = \"127.0.0.1:9000\"\nlaunch =");
+        let short = EXAMPLE.replace("[console]\n", "console = \"127.0.0.1:9000\"\n");
         let config = check(&short).unwrap();
         assert_eq!((config.console.port(), config.console_security), (9000, None));
         let secured = EXAMPLE.replace("#[network.security]", "[network.security]");
         let secured = ["authority", "certificate", "key"]
             .iter()
             .fold(secured, |text, key| text.replace(&format!("\n#{key} ="), &format!("\n{key} =")));
-        let table =
-            "[console]\nlisten = \"0.0.0.0:8700\"\nkey = \"k.pem\"\nroles = { anna = \"safety\" }\n[network]";
-        let config = check(&secured.replacen("[network]", table, 1)).unwrap();
+        let table = "[console]\nlisten = \"0.0.0.0:8700\"\nkey = \"k.pem\"\nroles = { anna = \"safety\" }\n";
+        let config = check(&secured.replacen("[console]\n", table, 1)).unwrap();
         let security = config.console_security.unwrap();
         assert_eq!(security.authority, Path::new("/etc/skein/certificates/authority.pem"));
         assert_eq!(
@@ -296,10 +295,10 @@ mod tests {
             ("fleet = \"demo\"", "fleet = \"a b\"", "`fleet`"),
             ("#lease_ms = 1000", "lease_ms = 1", "`lease_ms` is 1"),
             ("#muster = false", "mustard = true", "unknown field `mustard`"),
-            ("#[console]", "[console]\nlisten = \"0.0.0.0:8700\"", "over TLS only"),
-            ("#[console]", "[console]\nlisten = \"8700\"", "invalid socket address"),
-            ("#[console]", "[console.roles]\nanna = \"king\"", "unknown variant `king`"),
-            ("launch =", "console = \"here\"\nlaunch =", "an address such as"),
+            ("[console]", "[console]\nlisten = \"0.0.0.0:8700\"", "over TLS only"),
+            ("[console]", "[console]\nlisten = \"8700\"", "invalid socket address"),
+            ("[console]", "[console.roles]\nanna = \"king\"", "unknown variant `king`"),
+            ("[console]\n", "console = \"here\"\n", "an address such as"),
             ("[network]", "[behaviours]\nwell = {}\n[network]", "`behaviours.well`"),
         ] {
             let text = EXAMPLE.replace(from, to);

@@ -48,7 +48,7 @@ export class LaunchDialog {
       ),
     );
     const ready = doubtful === 0 ? 'All checks pass.' : `${doubtful} of ${offer.vehicles.length} do not pass all checks; those wait on the ground until they do.`;
-    this.say(`${TITLES[offer.what]}: ${offer.vehicles.length} of the fleet`, list, html('p', { class: doubtful ? 'doubt' : 'muted' }, ready));
+    this.say(`${TITLES[offer.what]}: ${offer.vehicles.length === 1 ? 'one vehicle' : `${offer.vehicles.length} vehicles`}`, list, html('p', { class: doubtful ? 'doubt' : 'muted' }, ready));
     const go = this.button('', () => {
       this.dialog.close();
       this.confirm(offer.what, offer.token);

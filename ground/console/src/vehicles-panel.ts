@@ -116,12 +116,12 @@ class Row {
       'li',
       { class: 'vehicle', role: 'option', tabindex: '-1', 'aria-selected': 'false', 'data-vehicle': name },
       badge(look),
-      html('span', { class: 'who' }, html('span', { class: 'name' }, name), this.mode, this.holder),
+      html('span', { class: 'who' }, html('span', { class: 'name' }, name), this.mode),
       this.height,
       this.speed,
       this.battery,
       this.link,
-      html('span', { class: 'doing' }, this.task, this.waiting),
+      html('span', { class: 'doing' }, this.task, this.waiting, this.holder),
       this.notes,
     );
   }

@@ -9,8 +9,9 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use serde::Serialize;
-use skein_bp::Value;
 use skein_bp::script::ScriptFile;
+use skein_bp::{Event, Value};
+use skein_dbp::facts::Stalled;
 use skein_dbp::{Happened, NodeName, Peer};
 use skein_wire::event::{Advance, Declared as _, Homeward, What};
 use skein_wire::{Check, Form, MissionState, Scene, State};
@@ -433,6 +434,11 @@ fn order_view(record: &OrderRecord) -> OrderView<'_> {
     }
 }
 
+/// Who blocks what is stalled; in other events `by` is somebody else.
+fn stalled_by(event: &Event) -> Option<&str> {
+    event.text("by").filter(|_| event.kind() == Stalled::NAME)
+}
+
 fn event_view(happened: &Happened) -> EventView<'_> {
     EventView {
         time_s: happened.at.as_secs_f64(),
@@ -441,6 +447,6 @@ fn event_view(happened: &Happened) -> EventView<'_> {
         name: happened.event.name(),
         data: happened.event.data().collect(),
         requested_by: &happened.requested_by,
-        blocked_by: happened.event.text("by").into_iter().collect(),
+        blocked_by: stalled_by(&happened.event).into_iter().collect(),
     }
 }
