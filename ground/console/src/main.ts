@@ -68,7 +68,7 @@ const commands = new Commands(part('commands'), {
   everyone: () => selection.set([]),
 });
 
-const person: Person = new Person(part('person'), (name) => send({ type: 'hello', tag: newTag(), name }));
+const person: Person = new Person(part('person'), (name) => send({ type: 'hello', tag: newTag(), name }), (why) => notices.show(`${why}.`));
 const holders = new HolderPanel(part('holders'), (what, to, name) =>
   person.named(what, () => send({ type: 'order', tag: newTag(), what, to, ...(name && { name }) })),
 );

@@ -10,19 +10,20 @@ const KEY = 'skein-name';
 const LONGEST = 48;
 
 const ROLES: Record<You['role'], string> = {
-  observer: 'observer: sees, and orders nothing',
-  safety: 'safety: holds, returns and lands',
-  operator: 'operator',
+  observer: 'an observer, who sees and orders nothing',
+  safety: 'there for safety: to hold, to return and to land',
+  operator: 'an operator',
 };
 
 export class Person {
   private you: You = { type: 'you', tag: '', name: null, role: 'operator', certified: false };
   private readonly button = html('button', { type: 'button', class: 'person' });
 
-  /** `say` tells the station a name. */
+  /** `say` tells the station a name, `refuse` whoever sits here why they may not do something. */
   constructor(
     root: HTMLElement,
     private readonly say: (name: string) => void,
+    private readonly refuse: (why: string) => void,
   ) {
     this.button.addEventListener('click', () => this.ask(() => {}));
     root.append(this.button);
@@ -48,12 +49,14 @@ export class Person {
   mayNot(what: What): string | null {
     const { role } = this.you;
     if (role === 'operator' || (role === 'safety' && FOR_SAFETY.has(what))) return null;
-    return `Your certificate is for ${ROLES[role]}`;
+    return `By your certificate you are ${ROLES[role]}`;
   }
 
-  /** Does `then` once the station can know by whom; what is for safety waits for no name. */
+  /** Does `then`, if they may, once the station can know by whom; what is for safety waits for no name. */
   named(what: What, then: () => void): void {
-    if (this.you.name || FOR_SAFETY.has(what)) then();
+    const why = this.mayNot(what);
+    if (why) this.refuse(why);
+    else if (this.you.name || FOR_SAFETY.has(what)) then();
     else this.ask(then);
   }
 
@@ -61,7 +64,7 @@ export class Person {
     const { name, role, certified } = this.you;
     setText(this.button, certified ? `${name ?? ''} · ${role}` : (name ?? 'Who are you?'));
     this.button.disabled = certified;
-    this.button.title = certified ? `By your certificate: ${ROLES[role]}` : 'Your name, which every order of yours tells';
+    this.button.title = certified ? `By your certificate you are ${ROLES[role]}` : 'Your name, which every order of yours tells';
   }
 
   private ask(then: () => void): void {
