@@ -21,7 +21,7 @@ await drive({}, async (console) => {
   assert.equal(ordered.data.who, ONE);
   assert.equal(ordered.data.by, NAME);
   await console.until(`${ONE} is held by whoever ordered it`, () => console.vehicle(ONE).holder === NAME);
-  await console.until('the page says so', async () => /You hold/.test(await console.page.locator('#holders').textContent()));
+  await console.until('the page says so', async () => /In command: you/.test(await console.page.locator('#holders').textContent()));
   const { x, y, z } = ordered.data;
   assert.ok(apart([x, y], PLACE) < 0.5, `ordered to ${[x, y]}, clicked at ${PLACE}`);
 

@@ -33,7 +33,7 @@ export class HolderPanel {
 
   private line(holding: Holding, named: boolean, me: string | null, mayNot: string | null): HTMLLIElement {
     const { holder, vehicles, askers } = holding;
-    const which = named ? ` ${nameWords(vehicles, 3)}` : '';
+    const which = named ? ` of ${nameWords(vehicles, 3)}` : '';
     const button = (words: string, title: string, press: () => void) => {
       const made = html('button', { type: 'button', class: 'link-button', title: mayNot ?? title, disabled: mayNot !== null }, words);
       made.addEventListener('click', press);
@@ -41,17 +41,17 @@ export class HolderPanel {
     };
     const line = (words: string, ...buttons: HTMLElement[]) =>
       html('li', { class: 'holding', 'data-holder': holder }, html('span', {}, words), ...buttons);
-    if (!holder) return line(`Nobody holds${which || ' them'}: the first order takes them`);
+    if (!holder) return line(`In command${which}: nobody, until the first order`);
     if (holder === me) {
       const gives = askers.map((asker) => button(`Give to ${asker}`, `${asker} asks for it`, () => this.handOver(What.give, vehicles, asker)));
       const asked = askers.length > 0 ? ` · ${askers.join(', ')} asks` : '';
-      return line(`You hold${which || ' them'}${asked}`, ...gives, button('Release', 'Hold them no more', () => this.handOver(What.release, vehicles)));
+      return line(`In command${which}: you${asked}`, ...gives, button('Release', 'Command them no more', () => this.handOver(What.release, vehicles)));
     }
     const asking = me !== null && askers.includes(me);
     return line(
-      `${holder} holds${which || ' them'}`,
+      `In command${which}: ${holder}`,
       asking ? html('span', { class: 'muted' }, 'asked') : button('Ask', `Ask ${holder} for it`, () => this.handOver(What.ask, vehicles)),
-      button('Take over', `Hold it yourself; ${holder} is told`, () => this.handOver(What.take, vehicles)),
+      button('Take over', `Command it yourself; ${holder} is told`, () => this.handOver(What.take, vehicles)),
     );
   }
 }

@@ -28,8 +28,8 @@ export function holdings(vehicles: readonly Pick<Vehicle, 'name' | 'holder' | 'a
 export function holdingNews(before: Vehicle | undefined, now: Vehicle, me: string | null): string | null {
   if (!before || !me) return null;
   if (before.holder !== now.holder) {
-    if (before.holder === me) return now.holder ? `${now.holder} holds ${now.name} now.` : `You hold ${now.name} no more.`;
-    if (now.holder === me && before.holder) return `You hold ${now.name} now.`;
+    if (before.holder === me) return now.holder ? `${now.holder} commands ${now.name} now.` : `You command ${now.name} no more.`;
+    if (now.holder === me && before.holder) return `You command ${now.name} now.`;
   }
   return now.holder === me && now.asked_by && now.asked_by !== before.asked_by ? `${now.asked_by} asks for ${now.name}.` : null;
 }

@@ -135,7 +135,7 @@ class Row {
     setText(this.mode, vehicle.heard ? spaced(vehicle.mode) : '');
 
     setText(this.holder, vehicle.holder);
-    setAttribute(this.holder, 'title', vehicle.holder ? `${vehicle.holder} holds it${vehicle.asked_by && `; ${vehicle.asked_by} asks for it`}` : null);
+    setAttribute(this.holder, 'title', vehicle.holder ? `${vehicle.holder} commands it${vehicle.asked_by && `; ${vehicle.asked_by} asks for it`}` : null);
     setAttribute(this.holder, 'data-asked', vehicle.asked_by || null);
     this.holder.hidden = !vehicle.holder;
 

@@ -20,10 +20,10 @@ test('each holder is named once, with their vehicles and who asks for them', () 
 test('one notices when a vehicle is taken, asked for, given or lost, and nothing else', () => {
   const news = (before: Vehicle, now: Vehicle) => holdingNews(before, now, 'Anna');
   const mine = vehicle('uav/1', 'Anna');
-  assert.equal(news(mine, vehicle('uav/1', 'Ben')), 'Ben holds uav/1 now.');
-  assert.equal(news(mine, vehicle('uav/1', '')), 'You hold uav/1 no more.');
+  assert.equal(news(mine, vehicle('uav/1', 'Ben')), 'Ben commands uav/1 now.');
+  assert.equal(news(mine, vehicle('uav/1', '')), 'You command uav/1 no more.');
   assert.equal(news(mine, vehicle('uav/1', 'Anna', 'Ben')), 'Ben asks for uav/1.');
-  assert.equal(news(vehicle('uav/1', 'Ben'), mine), 'You hold uav/1 now.');
+  assert.equal(news(vehicle('uav/1', 'Ben'), mine), 'You command uav/1 now.');
   assert.equal(news(vehicle('uav/1', ''), mine), null, 'the first order took it');
   assert.equal(news(mine, mine), null);
   assert.equal(news(vehicle('uav/1', 'Ben'), vehicle('uav/1', 'Carl')), null);
