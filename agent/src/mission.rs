@@ -34,6 +34,9 @@ use crate::{
 /// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for. `skein-agent verify --script` looks at all.
 const STATES_TRIED: usize = 500;
 
+/// Why a script is not taken in that nobody sends.
+const UNNAMED: &str = "the request names nobody: set `by` to the name of the person or program that makes it";
+
 /// The outcome of a vehicle's mission.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -162,7 +165,9 @@ impl Mission {
 
     /// Takes in an order of whoever is at this vehicle's own computer.
     pub fn order(&mut self, what: What) {
-        self.node.node_mut().enqueue(OrderTaken::plain(what).at(&self.name));
+        self.node
+            .node_mut()
+            .enqueue(OrderTaken::plain(what, "the vehicle's own computer").given_aboard().at(&self.name));
     }
 
     /// Takes in what other nodes say; gives back what vehicles say of themselves.
@@ -199,7 +204,11 @@ impl Mission {
 
     /// How far the task has come; `complaint` is control's, why the vehicle is not ready.
     pub fn words(&self, complaint: Option<String>) -> Words {
+        let holder = self.node.node().program().state_of::<bthreads::Holder>(bthreads::Holder::NAME);
+        let name = |name: Option<&str>| name.unwrap_or_default().to_owned();
         Words {
+            holder: name(holder.and_then(bthreads::Holder::holder)),
+            asked_by: name(holder.and_then(bthreads::Holder::asked_by)),
             task: self.task.clone(),
             waiting_for: self.waiting_for(complaint),
             mission: match &self.outcome {
@@ -315,10 +324,11 @@ impl Mission {
         let refused = match self.me.verb(event) {
             Some(Load::NAME) => self.begin_trial(happened),
             Some(Unload::NAME) => {
-                let name = Unload::read(event).map(|unload| unload.name).unwrap_or_default();
-                match self.scripts.runs(&name) {
-                    true => Ok(()),
-                    false => Err((name.to_string(), "no script of this name runs".to_owned())),
+                let Some(Unload { name, by }) = Unload::read(event) else { return };
+                match (self.scripts.runs(&name), by) {
+                    (true, Some(_)) => Ok(()),
+                    (true, None) => Err((name.to_string(), UNNAMED.to_owned())),
+                    (false, _) => Err((name.to_string(), "no script of this name runs".to_owned())),
                 }
             }
             Some(ScriptNews::NAME) => return self.scripts.hear(event),
@@ -331,8 +341,12 @@ impl Mission {
 
     /// Puts a script that is sent among those to be tried out, or says why not.
     fn begin_trial(&mut self, happened: &Happened) -> Result<(), (String, String)> {
-        let text = Load::read(&happened.event).map(|load| load.script).unwrap_or_default();
-        let assignment = Assignment::from_json(&text).map_err(|error| (String::new(), error.to_string()))?;
+        let nameless = |why: String| (String::new(), why);
+        let sent = Load::read(&happened.event).ok_or_else(|| nameless("it holds no script".to_owned()))?;
+        let assignment = Assignment::from_json(&sent.script).map_err(|error| nameless(error.to_string()))?;
+        if sent.by.is_none() {
+            return Err((assignment.name().to_owned(), UNNAMED.to_owned()));
+        }
         let sender = happened.requested_by.iter().find(|bthread| bthread.contains('#'));
         let from = sender.map_or(self.name.as_str(), |bthread| bthread).to_owned();
         let refused = |why| (assignment.name().to_owned(), why);
@@ -388,7 +402,7 @@ impl Mission {
     fn may_send(&self, assignment: &Assignment, from: &str) -> Result<bool, String> {
         let Some((node, bthread)) = from.split_once('#') else { return Ok(from == self.name.as_str()) };
         let text = assignment.to_json().map_err(|error| error.to_string())?;
-        let load = self.me.event(Load { name: None, script: text.into() });
+        let load = self.me.event(Load { name: None, script: text.into(), by: None });
         let is_member = self.config.roster.iter().any(|member| member == node);
         let may_request = |node| self.config.authority.may_request(&node, bthread, &load);
         Ok(is_member && !node.starts_with("uav/") && NodeName::new(node).is_ok_and(may_request))

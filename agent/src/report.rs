@@ -91,9 +91,7 @@ impl Report {
             Self::FoundAirborne => me.event(FoundAirborne),
             Self::Taken { mode, by } => me.event(PilotTook { mode: mode.to_string().into(), by: by.into() }),
             Self::Slept(pause) => me.event(Slept { seconds: pause.as_secs_f64() }),
-            Self::Lands(why) => {
-                me.event(OrderTaken { by: Some(why.into()), ..OrderTaken::plain(What::Land) })
-            }
+            Self::Lands(why) => me.event(OrderTaken::plain(What::Land, &why)),
             Self::CommandFailed(why) => me.event(CommandFailed { why: why.into() }),
             Self::BatteryLow(why) => me.event(BatteryLow { why: why.into() }),
             Self::BatteryChanged(Changed { from, to }) => {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use skein_agent::{
     AgentConfig, Envelope, Fence, Me, Planners,
-    bthreads::{self, LinkLossPolicy},
+    bthreads::{self, HOLDING_LASTS, Holder, LinkLossPolicy},
 };
 use skein_bp::{Bid, Event, EventSet, Program, ProgramConfig};
 use skein_dbp::NodeName;
@@ -135,7 +135,7 @@ impl Vehicle {
     }
 
     fn is_ordered(&mut self, what: What) -> Vec<String> {
-        self.hears(OrderTaken::plain(what).at(ME))
+        self.hears(OrderTaken::plain(what, "the operator").given_aboard().at(ME))
     }
 
     /// A fact of the fleet, or an event of another home.
@@ -838,7 +838,118 @@ mod return_home {
         assert_eq!(vehicle.reports(BatteryLow::NAME), home);
         assert_eq!(vehicle.reports(Airborne::NAME), ["airborne"]);
         let why = "declined: it is not free to go: on the ground, landing or returning";
-        assert_eq!(vehicle.hears(OrderTaken::go_to([4.0, 3.0, 2.0]).at(ME)), ["order goto", why]);
+        assert_eq!(
+            vehicle.hears(OrderTaken::go_to([4.0, 3.0, 2.0], "the operator").given_aboard().at(ME)),
+            ["order goto", why]
+        );
+    }
+}
+
+mod holder {
+    use super::*;
+
+    const KEPT: &str = "held: nobody held it";
+
+    fn order(what: What, by: &str) -> Event {
+        OrderTaken::plain(what, by).at(ME)
+    }
+
+    fn handover(what: What, by: &str) -> Event {
+        Handover { what, by: by.into(), to: None }.at(ME)
+    }
+
+    fn holder(vehicle: &Vehicle) -> Option<&str> {
+        vehicle.program.state_of::<Holder>(Holder::NAME).unwrap().holder()
+    }
+
+    /// On its way, held by Anna.
+    fn annas() -> Vehicle {
+        let mut vehicle = Vehicle::on_its_way();
+        assert_eq!(vehicle.hears(order(What::Resume, "Anna")), ["order resume", KEPT]);
+        assert_eq!(holder(&vehicle), Some("Anna"));
+        vehicle
+    }
+
+    #[test]
+    fn whoever_orders_first_holds_the_vehicle_and_others_do_not_set_it_going() {
+        let vehicle = annas();
+        for what in What::those(|what| what.needs_holder() && what.reaches_vehicle()) {
+            assert!(!vehicle.allows(order(what, "Ben")), "{what} of another");
+            assert!(vehicle.allows(order(what, "Anna")), "{what} of the holder");
+            assert!(
+                vehicle.allows(OrderTaken::plain(what, "script/x").given_aboard().at(ME)),
+                "{what} aboard"
+            );
+        }
+        let load = |by: &str| Load { name: None, script: "{}".into(), by: Some(by.into()) }.at(ME);
+        assert!(!vehicle.allows(load("Ben")) && vehicle.allows(load("Anna")));
+        assert!(!vehicle.allows(mine(OrderTaken::NAME).with("what", "resume")), "one that names nobody");
+    }
+
+    #[test]
+    fn anybody_holds_returns_and_lands_it_and_does_not_hold_it_for_that() {
+        for what in What::those(|what| what.is_for_safety() && !what.is_for_all()) {
+            let mut vehicle = annas();
+            assert!(vehicle.hears(order(what, "Ben")).iter().any(|event| event.ends_with("ordered by Ben")));
+            assert_eq!(holder(&vehicle), Some("Anna"));
+            let mut unheld = Vehicle::on_its_way();
+            unheld.hears(order(what, "Ben"));
+            assert_eq!(holder(&unheld), None);
+        }
+    }
+
+    #[test]
+    fn it_is_asked_for_and_given_and_taken() {
+        let mut vehicle = annas();
+        assert_eq!(vehicle.hears(handover(What::Ask, "Ben")), ["handover ask", "held: Ben asks for it"]);
+        assert_eq!(holder(&vehicle), Some("Anna"));
+        let give =
+            |by: &str, to: &str| Handover { what: What::Give, by: by.into(), to: Some(to.into()) }.at(ME);
+        assert_eq!(vehicle.hears(give("Ben", "Ben")), ["handover give"], "it is not his to give");
+        assert_eq!(vehicle.hears(give("Anna", "Ben")), ["handover give", "held: Anna has given it"]);
+        assert!(vehicle.allows(order(What::Resume, "Ben")) && !vehicle.allows(order(What::Resume, "Anna")));
+        let taken = ["handover take", "held: Anna has taken it from Ben"];
+        assert_eq!(vehicle.hears(handover(What::Take, "Anna")), taken);
+        assert_eq!(vehicle.hears(handover(What::Ask, "Ben")), ["handover ask", "held: Ben asks for it"]);
+        assert_eq!(
+            vehicle.hears(handover(What::Release, "Anna")),
+            ["handover release", "held: Anna has let it go"]
+        );
+        assert_eq!(holder(&vehicle), Some("Ben"), "whoever asks for it is next");
+    }
+
+    #[test]
+    fn a_holder_who_is_not_heard_of_holds_it_no_more() {
+        let mut vehicle = annas();
+        let nearly = HOLDING_LASTS - SECOND;
+        vehicle.after(nearly);
+        vehicle.hears(handover(What::Keep, "Ben"));
+        vehicle.hears(handover(What::Keep, "Anna"));
+        vehicle.after(nearly);
+        assert_eq!(holder(&vehicle), Some("Anna"), "she has been heard of meanwhile");
+        let gone = vehicle.after(2 * SECOND);
+        assert!(gone.contains(&"held: Anna was not heard of for 30 s".to_owned()), "{gone:?}");
+        assert_eq!(holder(&vehicle), None);
+        assert!(vehicle.allows(order(What::Resume, "Ben")));
+    }
+
+    #[test]
+    fn an_order_that_names_nobody_is_declined_and_does_nothing() {
+        let mut vehicle = Vehicle::on_its_way();
+        let goto = at(mine(OrderTaken::NAME), [4.0, 3.0, 2.0]).with("what", "goto");
+        let [order, declined] = &vehicle.hears(goto)[..] else { panic!("it did more than decline") };
+        assert_eq!(order, "order goto");
+        assert!(declined.starts_with("declined: it names nobody: set `by`"), "{declined}");
+    }
+
+    #[test]
+    fn nobody_holds_it_by_a_name_that_is_none() {
+        let mut vehicle = Vehicle::on_its_way();
+        for name in ["", &"x".repeat(65)] {
+            vehicle.hears(order(What::Resume, name));
+            vehicle.hears(handover(What::Take, name));
+            assert_eq!(holder(&vehicle), None);
+        }
     }
 }
 
@@ -848,7 +959,7 @@ mod reposition {
     const POINT: [f64; 3] = [4.0, 3.0, 2.0];
 
     fn goto() -> Event {
-        OrderTaken::go_to(POINT).at(ME)
+        OrderTaken::go_to(POINT, "the operator").given_aboard().at(ME)
     }
 
     #[test]
@@ -875,7 +986,10 @@ mod reposition {
     #[test]
     fn a_point_outside_the_fence_is_declined_and_the_mission_goes_on() {
         let mut vehicle = Vehicle::on_its_way();
-        assert_eq!(vehicle.hears(OrderTaken::go_to([1e4, 0.0, 2.0]).at(ME)), ["order goto"]);
+        assert_eq!(
+            vehicle.hears(OrderTaken::go_to([1e4, 0.0, 2.0], "the operator").given_aboard().at(ME)),
+            ["order goto"]
+        );
         let declined = vehicle.after(2 * SECOND);
         assert!(declined.iter().any(|event| event.starts_with("declined: ")), "{declined:?}");
         assert!(vehicle.may(Advance::NAME));

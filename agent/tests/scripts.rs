@@ -264,7 +264,7 @@ fn the_way_home_stays_open_whatever_a_script_blocks() {
         ))
         .unwrap();
     assert!(!vehicle.moves());
-    let verbs = vehicle.verbs_after(OrderTaken::plain(What::Return).at(ME));
+    let verbs = vehicle.verbs_after(OrderTaken::plain(What::Return, "the operator").given_aboard().at(ME));
     assert_eq!(verbs, ["order", "return", "goto", "plan"]);
     let planned = Planned { leg: bthreads::HOME_LEG, length_m: 9.0 }.at(ME);
     assert_eq!(vehicle.verbs_after(planned), ["planned", "homeward"]);
@@ -301,7 +301,7 @@ fn a_script_is_explained_withdrawn_and_may_come_again() {
     assert!(explained.blocked.iter().any(|(bthread, _)| &**bthread == "script/test"), "{explained:?}");
     let other = script(json!([{"sync": {}}]));
     assert!(vehicle.load(&other).unwrap_err().contains("withdraw it first"));
-    let happened = vehicle.hears(mine(Unload::NAME).with("name", "test"));
+    let happened = vehicle.hears(mine(Unload::NAME).with("name", "test").with("by", "the operator"));
     assert_eq!(states(&happened), [ScriptState::Withdrawn]);
     assert!(vehicle.moves());
     assert_eq!(vehicle.scripts.running().count(), 0);
@@ -373,7 +373,7 @@ fn facts_are_told_only_to_those_who_listen() {
     assert_eq!(listened(&vehicle), [true, false, false, true]);
     vehicle.load(&shipped("curfew", json!({"min": [0, 0, 0], "max": [1, 1, 1], "for_s": 9}))).unwrap();
     assert_eq!(listened(&vehicle), [true, true, false, true]);
-    vehicle.hears(OrderTaken::plain(What::Resume).at(ME));
+    vehicle.hears(OrderTaken::plain(What::Resume, "the operator").given_aboard().at(ME));
     assert_eq!(listened(&vehicle), [true, true, false, false], "the patrol has ended");
 }
 
@@ -389,7 +389,7 @@ fn a_script_that_was_sent_is_kept_until_it_is_withdrawn() {
     vehicle.scripts.keep_in(Box::new(store.clone()));
     vehicle.load(&stay()).unwrap();
     assert_eq!(store.kept(), [KeptScript { from: SENDER.to_owned(), assignment: stay() }]);
-    vehicle.hears(mine(Unload::NAME).with("name", "test"));
+    vehicle.hears(mine(Unload::NAME).with("name", "test").with("by", "the operator"));
     assert_eq!(store.kept(), []);
 }
 
@@ -415,7 +415,7 @@ fn a_script_that_cannot_be_kept_is_refused_and_one_that_cannot_be_forgotten_is_t
     disk.0.store(true, Ordering::Relaxed);
     vehicle.load(&stay()).unwrap();
     disk.0.store(false, Ordering::Relaxed);
-    vehicle.hears(mine(Unload::NAME).with("name", "test"));
+    vehicle.hears(mine(Unload::NAME).with("name", "test").with("by", "the operator"));
     assert!(vehicle.moves(), "it is withdrawn all the same");
     assert_eq!(vehicle.scripts.unsaved(), Some("no space left"));
     vehicle.scripts.catch_up(Duration::ZERO, &mut vehicle.program);
@@ -444,8 +444,34 @@ fn a_script_of_a_former_life_begins_when_the_vehicle_is_let_go_on() {
         blocks(&vehicle)
     };
     assert!(begins_with(Vehicle::on_the_ground(), mine(Ready::NAME)));
-    assert!(begins_with(Vehicle::in_the_air(), OrderTaken::plain(What::Resume).at(ME)));
-    assert!(!begins_with(Vehicle::in_the_air(), OrderTaken::plain(What::Hold).at(ME)));
+    assert!(begins_with(
+        Vehicle::in_the_air(),
+        OrderTaken::plain(What::Resume, "the operator").given_aboard().at(ME)
+    ));
+    assert!(!begins_with(
+        Vehicle::in_the_air(),
+        OrderTaken::plain(What::Hold, "the operator").given_aboard().at(ME)
+    ));
+}
+
+#[test]
+fn a_script_cannot_order_in_anothers_name() {
+    let land = json!({"name": "uav/1/order", "data": {"what": "land", "by": "Anna"}});
+    let ordered = |request: Value| {
+        let mut vehicle = Vehicle::in_the_air();
+        vehicle
+            .load(&script(
+                json!([{"sync": {"request": request}}, {"sync": {"request": "uav/1/script/done"}}]),
+            ))
+            .unwrap();
+        let events = vehicle.hears(mine("clear"));
+        assert!(events.iter().any(|event| event.name() == "uav/1/script/done"), "it goes on: {events:?}");
+        events.iter().find_map(OrderTaken::read).unwrap()
+    };
+    for request in [land, json!({"name": "uav/1/order", "data": {"what": "land"}})] {
+        let order = ordered(request);
+        assert_eq!((&*order.by, order.aboard), ("script/test", Some(true)));
+    }
 }
 
 #[test]
@@ -455,9 +481,7 @@ fn a_script_that_is_there_from_the_start_does_not_end_the_hold_of_a_vehicle_foun
         {"sync": {"wait": "uav/1/landed"}},
     ]));
     let by_script = |events: &[Event]| {
-        events.iter().any(|event| {
-            OrderTaken::read(event).is_some_and(|order| order.by.as_deref() == Some("script/test"))
-        })
+        events.iter().any(|event| OrderTaken::read(event).is_some_and(|order| &*order.by == "script/test"))
     };
     let found = |begins| {
         let mut vehicle = Vehicle::on_the_ground();
@@ -471,9 +495,12 @@ fn a_script_that_is_there_from_the_start_does_not_end_the_hold_of_a_vehicle_foun
     assert!(by_script(&vehicle.hears(mine(HandBack::NAME))), "whoever hands it back lets it go on");
 
     let (mut vehicle, _) = found(Begins::WhenReleased);
-    let events = vehicle.hears(mine(Unload::NAME).with("name", "test"));
+    let events = vehicle.hears(mine(Unload::NAME).with("name", "test").with("by", "the operator"));
     assert_eq!(states(&events), [ScriptState::Withdrawn]);
-    assert!(!by_script(&vehicle.hears(OrderTaken::plain(What::Resume).at(ME))), "withdrawn before it began");
+    assert!(
+        !by_script(&vehicle.hears(OrderTaken::plain(What::Resume, "the operator").given_aboard().at(ME))),
+        "withdrawn before it began"
+    );
 
     // So are those of the configuration.
     let mut core = AgentCore::new(AgentConfig { scripts: vec![onward], ..config() }).unwrap();
@@ -536,7 +563,7 @@ fn patrol_gives_way_to_an_operator_and_passes_over_points_out_of_bounds() {
     let happened = vehicle.happens();
     assert!(happened.iter().any(|event| event.kind() == Declined::NAME));
     assert_eq!(happened.iter().find_map(Goto::read).map(|goto| goto.x), Some(4.0));
-    let point = OrderTaken::go_to([7.0, 7.0, 3.0]).at(ME);
+    let point = OrderTaken::go_to([7.0, 7.0, 3.0], "the operator").given_aboard().at(ME);
     assert_eq!(vehicle.hears(point).iter().find_map(Goto::read).map(|goto| goto.x), Some(7.0));
     assert_eq!(vehicle.scripts.running().count(), 0);
 }

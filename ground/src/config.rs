@@ -6,6 +6,7 @@ use skein_bp::behaviour::{Chosen, Host};
 use skein_dbp::{Authority, Kept, NodeName};
 use skein_wire::{Fleet, standard_authority};
 
+use crate::giver::Giver;
 use crate::order::Order;
 
 /// The configuration of a ground station.
@@ -20,8 +21,8 @@ pub struct GroundConfig {
     pub operators: Vec<NodeName>,
     /// A number that grows with every start of this node.
     pub incarnation: u64,
-    /// Orders known in advance, each with its time.
-    pub orders: Vec<(Duration, Order)>,
+    /// Orders known in advance, each with its time and who gives it.
+    pub orders: Vec<(Duration, Giver, Order)>,
     /// Whether the b-threads are loaded; without them the station listens and asks for nothing.
     pub loaded: bool,
     /// Whether the swarm takes off when an operator orders it, and not as soon as it is there.

@@ -1,24 +1,29 @@
 //! The configuration file of a ground station. `ground/ground.toml` explains every field.
 
+use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context as _;
+use serde::de::{MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 use skein_bp::behaviour::{Behaviours, Settings};
 use skein_bp::configuration;
 use skein_dbp::{Authority, NodeName};
 use skein_wire::{Fleet, standard_authority};
-use skein_zenoh::NetworkSettings;
+use skein_zenoh::{NetworkSettings, Security};
 
 use crate::config::GroundConfig;
+use crate::console::{ConsoleSecurity, Role};
 
 /// Everything that the station must know, checked.
 pub struct Config {
     pub station: GroundConfig,
     pub network: NetworkSettings,
     pub console: SocketAddr,
+    /// TLS, and who may do what; none on the loopback interface unless it is configured.
+    pub console_security: Option<ConsoleSecurity>,
     pub record: PathBuf,
     /// The greatest size of a recording, bytes.
     pub record_most_bytes: u64,
@@ -40,8 +45,8 @@ pub struct GroundFile {
     pub launch: Launch,
     #[serde(default)]
     pub muster: bool,
-    #[serde(default = "console")]
-    pub console: SocketAddr,
+    #[serde(default, deserialize_with = "console_or_address")]
+    pub console: ConsoleFile,
     #[serde(default = "record")]
     pub record: PathBuf,
     #[serde(default = "record_most_mb", skip_serializing)]
@@ -55,6 +60,58 @@ pub struct GroundFile {
     pub network: NetworkSettings,
     #[serde(skip_serializing)]
     authority: Option<Authority>,
+}
+
+/// The table `[console]`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConsoleFile {
+    #[serde(default = "console")]
+    pub listen: SocketAddr,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    authority: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    certificate: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    key: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    roles: BTreeMap<String, Role>,
+}
+
+impl Default for ConsoleFile {
+    fn default() -> Self {
+        Self::at(console())
+    }
+}
+
+impl ConsoleFile {
+    /// A console at this address, without certificates.
+    pub fn at(listen: SocketAddr) -> Self {
+        Self { listen, authority: None, certificate: None, key: None, roles: BTreeMap::new() }
+    }
+
+    /// The certificates, those of the network unless others are named; none where the console is for this computer.
+    fn security(&self, network: Option<&Security>, folder: &Path) -> anyhow::Result<Option<ConsoleSecurity>> {
+        if self.listen.ip().is_loopback() && self.roles.is_empty() {
+            return Ok(None);
+        }
+        let path = |own: &Option<PathBuf>, shared: fn(&Security) -> &PathBuf, name: &str| {
+            let own = own.as_ref().map(|path| folder.join(path));
+            own.or_else(|| network.map(|security| shared(security).clone())).with_context(|| {
+                format!(
+                    "`console.listen` is {}: beyond the loopback interface the console is served over TLS only; name \
+                     `console.{name}`, or [network.security]",
+                    self.listen
+                )
+            })
+        };
+        Ok(Some(ConsoleSecurity {
+            authority: path(&self.authority, |security| &security.authority, "authority")?,
+            certificate: path(&self.certificate, |security| &security.certificate, "certificate")?,
+            key: path(&self.key, |security| &security.key, "key")?,
+            roles: self.roles.clone(),
+        }))
+    }
 }
 
 /// When the swarm takes off.
@@ -71,6 +128,27 @@ fn operators() -> Vec<String> {
 
 fn console() -> SocketAddr {
     ([127, 0, 0, 1], 8700).into()
+}
+
+/// The table, or in its place only the address.
+fn console_or_address<'de, D: serde::Deserializer<'de>>(from: D) -> Result<ConsoleFile, D::Error> {
+    struct Either;
+    impl<'de> Visitor<'de> for Either {
+        type Value = ConsoleFile;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            f.write_str("an address such as \"127.0.0.1:8700\", or a table with `listen`")
+        }
+
+        fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<ConsoleFile, E> {
+            text.parse().map(ConsoleFile::at).map_err(|_| E::invalid_value(Unexpected::Str(text), &self))
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ConsoleFile, A::Error> {
+            ConsoleFile::deserialize(serde::de::value::MapAccessDeserializer::new(map))
+        }
+    }
+    from.deserialize_any(Either)
 }
 
 fn record() -> PathBuf {
@@ -113,7 +191,7 @@ impl GroundFile {
             operators: names(&station.operators),
             launch: if station.launch_on_order { Launch::OnOrder } else { Launch::AtStart },
             muster: station.muster,
-            console,
+            console: ConsoleFile::at(console),
             record: record(),
             record_most_mb: record_most_mb(),
             state: state(),
@@ -148,10 +226,12 @@ impl GroundFile {
             authority: self.authority.unwrap_or_else(standard_authority),
             ..GroundConfig::new(fleet, node, vehicles)
         };
+        let network = self.network.relative_to(folder);
         Ok(Config {
             station,
-            network: self.network.relative_to(folder),
-            console: self.console,
+            console: self.console.listen,
+            console_security: self.console.security(network.security.as_ref(), folder)?,
+            network,
             record: folder.join(self.record),
             record_most_bytes: self.record_most_mb.saturating_mul(1 << 20),
             state: folder.join(self.state),
@@ -198,6 +278,25 @@ mod tests {
     }
 
     #[test]
+    fn the_console_is_an_address_or_a_table_and_uses_the_networks_certificates_beyond_this_computer() {
+        let short = EXAMPLE.replace("[console]\n", "console = \"127.0.0.1:9000\"\n");
+        let config = check(&short).unwrap();
+        assert_eq!((config.console.port(), config.console_security), (9000, None));
+        let secured = EXAMPLE.replace("#[network.security]", "[network.security]");
+        let secured = ["authority", "certificate", "key"]
+            .iter()
+            .fold(secured, |text, key| text.replace(&format!("\n#{key} ="), &format!("\n{key} =")));
+        let table = "[console]\nlisten = \"0.0.0.0:8700\"\nkey = \"k.pem\"\nroles = { anna = \"safety\" }\n";
+        let config = check(&secured.replacen("[console]\n", table, 1)).unwrap();
+        let security = config.console_security.unwrap();
+        assert_eq!(security.authority, Path::new("/etc/skein/certificates/authority.pem"));
+        assert_eq!(
+            (security.key.as_path(), security.roles["anna"]),
+            (Path::new("/etc/skein/k.pem"), Role::Safety)
+        );
+    }
+
+    #[test]
     fn faults_are_named() {
         for (from, to, fault) in [
             ("\"uav/1\", \"uav/2\"", "", "`vehicles` is empty"),
@@ -207,6 +306,10 @@ mod tests {
             ("fleet = \"demo\"", "fleet = \"a b\"", "`fleet`"),
             ("#lease_ms = 1000", "lease_ms = 1", "`lease_ms` is 1"),
             ("#muster = false", "mustard = true", "unknown field `mustard`"),
+            ("[console]", "[console]\nlisten = \"0.0.0.0:8700\"", "over TLS only"),
+            ("[console]", "[console]\nlisten = \"8700\"", "invalid socket address"),
+            ("[console]", "[console.roles]\nanna = \"king\"", "unknown variant `king`"),
+            ("[console]\n", "console = \"here\"\n", "an address such as"),
             ("[network]", "[behaviours]\nwell = {}\n[network]", "`behaviours.well`"),
         ] {
             let text = EXAMPLE.replace(from, to);

@@ -1,37 +1,46 @@
 //! The ground core: the station's program and roster, without I/O.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use skein_bp::catalogue::Whose;
 use skein_bp::{Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Board, Happened, Node, NodeConfig, NodeError, NodeName};
-use skein_wire::event::{Declared as _, Heard, Situation};
+use skein_wire::event::{Declared as _, Heard, Held, Situation, What};
 use skein_wire::{Link, MissionState, NodeLink, Readiness, State, Store, joint_roster};
 
 use crate::bthreads::{self, MissionOutcome, Watch};
 use crate::config::GroundConfig;
 use crate::explain::{Evidence, Explanation, explain};
+use crate::giver::Giver;
+use crate::launch_offer::{Candidate, LaunchOffer, LaunchOffers};
 use crate::order::{Order, Who};
-use crate::order_log::{OrderLog, OrderRecord};
+use crate::order_log::{Answer, OrderLog, OrderRecord};
+use crate::refusal::Refusal;
 
-/// An order names a vehicle that the station does not have.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{name}` is no vehicle of this station")]
-pub struct UnknownVehicle {
-    pub name: NodeName,
-}
+/// Who holds a vehicle is kept holding it this often while they are there: several times in a holder's absence that a
+/// vehicle bears with.
+const KEEP_PERIOD: Duration = Duration::from_secs(10);
 
 /// The ground station. Tick it every 20 ms with its link.
 pub struct GroundCore {
     name: NodeName,
     node: NodeLink,
-    orders: Vec<(Duration, Order)>,
+    orders: Vec<(Duration, Giver, Order)>,
     vehicles: Vec<NodeName>,
     now: Duration,
     roster: BTreeMap<NodeName, State>,
     readiness: BTreeMap<NodeName, Readiness>,
     order_log: OrderLog,
+    /// Who holds each vehicle, as it has told; without those that nobody holds.
+    holders: BTreeMap<NodeName, String>,
+    /// Who gives the orders that were known in advance. They hold no vehicle for longer than an order takes: whoever is
+    /// there must not ask a plan.
+    planners: BTreeSet<Giver>,
+    /// Who is there to give orders now.
+    present: BTreeSet<Giver>,
+    keep_due: Duration,
+    offers: LaunchOffers,
     evidence: Evidence,
     selections: Vec<Happened>,
 }
@@ -67,7 +76,7 @@ impl GroundCore {
             forgot: config.forgot,
             ..NodeConfig::new(config.name.clone(), config.incarnation, roster)
         };
-        config.orders.sort_by_key(|(at, _)| *at);
+        config.orders.sort_by_key(|(at, ..)| *at);
         let node = Node::new(node_config, program);
         let mut evidence = Evidence::default();
         config.vehicles.iter().for_each(|vehicle| evidence.note_vehicle(vehicle));
@@ -78,38 +87,182 @@ impl GroundCore {
         Self {
             node: node.reading_boards(),
             name: config.name,
+            planners: config.orders.iter().map(|(_, by, _)| by.clone()).collect(),
             orders: config.orders,
             vehicles: config.vehicles,
             now: Duration::ZERO,
             roster: BTreeMap::new(),
             readiness: BTreeMap::new(),
             order_log: OrderLog::default(),
+            holders: BTreeMap::new(),
+            present: BTreeSet::new(),
+            keep_due: Duration::ZERO,
+            offers: LaunchOffers::default(),
             evidence,
             selections: Vec::new(),
         }
     }
 
-    /// Says something to the vehicles, as the operator. Returns the order's number: see [`orders`](Self::orders).
+    /// Says something to the vehicles, as `by`. Returns the order's number: see [`orders`](Self::orders). Vehicles that
+    /// somebody else holds do not hear of it, if it is not for their safety, and count as refusing it.
     ///
     /// # Errors
-    /// [`UnknownVehicle`], and then nobody is ordered anything.
-    pub fn order(&mut self, order: &Order) -> Result<u64, UnknownVehicle> {
-        let who = order.who();
+    /// [`Refusal`], and then nobody is ordered anything. A launch is always refused: see
+    /// [`offer_launch`](Self::offer_launch).
+    pub fn order(&mut self, by: &Giver, order: &Order) -> Result<u64, Refusal> {
+        if order.what().is_launch() {
+            return Err(Refusal::LaunchUnasked);
+        }
+        self.give(by, order)
+    }
+
+    /// The first of a launch's two messages: what `what`, a launch, would launch. `token` is random, and nobody's guess.
+    ///
+    /// # Errors
+    /// [`Refusal`]: somebody else holds a vehicle, or nobody is there to be launched.
+    pub fn offer_launch(&mut self, by: &Giver, what: What, token: String) -> Result<LaunchOffer, Refusal> {
+        let held = self.vehicles.iter().find_map(|vehicle| self.held_by_another(by, vehicle));
+        if let Some((vehicle, holder)) = held {
+            return Err(Refusal::Held { vehicle, holder });
+        }
+        let candidates = self.candidates();
+        if candidates.is_empty() {
+            return Err(Refusal::NobodyToLaunch);
+        }
+        Ok(self.offers.offer(self.now, (by, what), token, candidates))
+    }
+
+    /// The second message: `by` returns the token within [`OFFER_LASTS`](crate::OFFER_LASTS). It serves once.
+    ///
+    /// # Errors
+    /// [`Refusal`]: there is no such offer to `by`, others would be launched now, or somebody else holds a vehicle.
+    pub fn launch(&mut self, by: &Giver, token: &str) -> Result<u64, Refusal> {
+        let offer = self.offers.take_up(self.now, by, token).ok_or(Refusal::NoSuchOffer)?;
+        if !offer.is_about(&self.candidates()) {
+            return Err(Refusal::OfferOutdated);
+        }
+        let launch = match offer.what {
+            What::LaunchTogether => Order::LaunchTogether,
+            _ => Order::Launch,
+        };
+        self.give(by, &launch)
+    }
+
+    /// Who is there to give orders, of whom vehicles are told: whoever holds one and is not there is not kept holding it.
+    pub fn attend(&mut self, present: BTreeSet<Giver>) {
+        self.present = present;
+    }
+
+    fn give(&mut self, by: &Giver, order: &Order) -> Result<u64, Refusal> {
+        let (who, what) = (order.who(), order.what());
         if let Who::These(named) = who
             && let Some(stranger) = named.iter().find(|name| !self.vehicles.contains(name))
         {
-            return Err(UnknownVehicle { name: stranger.clone() });
+            return Err(Refusal::UnknownVehicle { name: stranger.clone() });
         }
-        let concerned: Vec<_> = self
-            .vehicles
-            .iter()
-            .filter(|vehicle| who.includes(vehicle))
-            .map(|vehicle| (vehicle.clone(), self.roster.get(vehicle).map(|state| state.position)))
-            .collect();
-        for event in order.events(&self.name, &concerned) {
+        let (mut concerned, mut answers) = (Vec::new(), BTreeMap::new());
+        for vehicle in self.vehicles.iter().filter(|vehicle| who.includes(vehicle)) {
+            match self.objection(by, what, vehicle) {
+                None => concerned.push(vehicle.clone()),
+                Some(refusal) if what.is_for_all() => return Err(refusal),
+                Some(refusal) => drop(answers.insert(vehicle.clone(), refusal)),
+            }
+        }
+        if let (true, Some(refusal)) = (concerned.is_empty(), answers.values().next()) {
+            return Err(refusal.clone());
+        }
+        self.say(by, order, &concerned);
+        let refused = answers.into_iter().map(|(vehicle, why)| (vehicle, Answer::Refused(why.to_string())));
+        let pending = concerned.into_iter().map(|vehicle| (vehicle, Answer::Pending));
+        Ok(self.order_log.give(self.now, by.clone(), order.clone(), refused.chain(pending).collect()))
+    }
+
+    /// Tells the station's b-threads of an order for these vehicles.
+    fn say(&mut self, by: &Giver, order: &Order, vehicles: &[NodeName]) {
+        let place = |vehicle: &NodeName| self.roster.get(vehicle).map(|state| state.position);
+        let placed: Vec<_> = vehicles.iter().map(|vehicle| (vehicle.clone(), place(vehicle))).collect();
+        let everybody = vehicles.len() == self.vehicles.len() && *order.who() == Who::All;
+        for event in order.events(&self.name, by, everybody, &placed) {
             self.node.node_mut().enqueue(event);
         }
-        Ok(self.order_log.give(self.now, order.clone(), concerned.into_iter().map(|(vehicle, _)| vehicle)))
+        if order.what().is_launch() {
+            // Who launches a vehicle holds it, and no event of the launch says so to the vehicle.
+            self.say(by, &Order::Keep(Who::All), vehicles);
+        }
+    }
+
+    /// Why `by` cannot order this of a vehicle, if so.
+    fn objection(&self, by: &Giver, what: What, vehicle: &NodeName) -> Option<Refusal> {
+        if what.needs_holder() {
+            let (vehicle, holder) = self.held_by_another(by, vehicle)?;
+            return Some(Refusal::Held { vehicle, holder });
+        }
+        let holder = self.holder(vehicle).unwrap_or_default();
+        let is_his = holder == by.as_str();
+        let needs = matches!(what, What::Give | What::Release);
+        (needs && !is_his).then(|| Refusal::NotHolder {
+            vehicle: vehicle.clone(),
+            holder: holder.to_owned(),
+            what,
+        })
+    }
+
+    /// The vehicle and its holder, if that is not `by`. One that is out of reach may be anybody's by now.
+    fn held_by_another(&self, by: &Giver, vehicle: &NodeName) -> Option<(NodeName, String)> {
+        let holder =
+            self.holder(vehicle).filter(|holder| *holder != by.as_str() && self.is_alive(vehicle))?;
+        Some((vehicle.clone(), holder.to_owned()))
+    }
+
+    fn is_alive(&self, vehicle: &NodeName) -> bool {
+        self.node.node().peers().any(|(peer, state)| peer == vehicle && state.alive)
+    }
+
+    fn candidates(&self) -> Vec<Candidate> {
+        let candidate = |vehicle: &NodeName| {
+            let (state, readiness) = (self.roster.get(vehicle), self.readiness.get(vehicle));
+            Candidate::of(vehicle, state, readiness, self.is_alive(vehicle))
+        };
+        self.vehicles.iter().filter_map(candidate).collect()
+    }
+
+    fn set_holder(&mut self, vehicle: &NodeName, holder: &str) {
+        if holder.is_empty() {
+            self.holders.remove(vehicle);
+        } else if self.holder(vehicle) != Some(holder) {
+            self.holders.insert(vehicle.clone(), holder.to_owned());
+            if let Some(planner) = self.planners.iter().find(|by| by.as_str() == holder).cloned() {
+                self.say(
+                    &planner,
+                    &Order::Release(Who::only(vehicle.clone())),
+                    std::slice::from_ref(vehicle),
+                );
+            }
+        }
+    }
+
+    fn note_holder(&mut self, happened: &Happened) {
+        if let Some(held) = Held::read(&happened.event).filter(|_| self.vehicles.contains(&happened.home)) {
+            self.set_holder(&happened.home, held.by.as_deref().unwrap_or_default());
+        }
+    }
+
+    /// Keeps the vehicles for those of their holders who are there.
+    fn keep_holders(&mut self) {
+        if self.now < self.keep_due {
+            return;
+        }
+        self.keep_due = self.now + KEEP_PERIOD;
+        for by in self.present.clone() {
+            let held = self.vehicles.iter().filter(|vehicle| self.holder(vehicle) == Some(by.as_str()));
+            let held: Vec<_> = held.cloned().collect();
+            self.say(&by, &Order::Keep(Who::These(held.clone())), &held);
+        }
+    }
+
+    /// The person or program that holds a vehicle, as it has told.
+    pub fn holder(&self, vehicle: &NodeName) -> Option<&str> {
+        self.holders.get(vehicle).map(String::as_str)
     }
 
     /// Tells once when the disk does not take `what` must be kept, and once when it does again.
@@ -123,10 +276,10 @@ impl GroundCore {
     /// [`NodeError`] when a b-thread misbehaves; the station goes on all the same.
     pub fn tick(&mut self, now: Duration, link: &mut dyn Link) -> Result<(), NodeError> {
         self.now = now;
-        let due = self.orders.partition_point(|(at, _)| *at <= now);
-        for (_, order) in self.orders.drain(..due).collect::<Vec<_>>() {
-            // Nobody is there to hear of a vehicle that is not.
-            let _ = self.order(&order);
+        let due = self.orders.partition_point(|(at, ..)| *at <= now);
+        for (_, by, order) in self.orders.drain(..due).collect::<Vec<_>>() {
+            // Nobody is there to hear of a refusal; whoever wrote it down has launched by that.
+            let _ = self.give(&by, &order);
         }
         let outcome = self.node.pump(now, link);
         for state in self.node.take_states() {
@@ -140,7 +293,11 @@ impl GroundCore {
         self.note_boards(link);
         let happened = self.node.node_mut().take_selections();
         happened.iter().for_each(|happened| self.evidence.note_event(happened.clone()));
-        self.order_log.update(now, self.node.node(), &happened);
+        happened.iter().for_each(|happened| self.note_holder(happened));
+        for overruled in self.order_log.update(now, self.node.node(), &happened, &self.holders) {
+            self.node.node_mut().enqueue(overruled.at(&self.name));
+        }
+        self.keep_holders();
         self.selections.extend(happened);
         outcome
     }
@@ -153,6 +310,7 @@ impl GroundCore {
             self.node.node_mut().enqueue(first_word(&self.name, &state));
         }
         self.evidence.note_state(self.now, &state);
+        self.set_holder(&state.node, &state.holder);
         self.roster.insert(state.node.clone(), state);
     }
 

@@ -8,14 +8,14 @@
 //!
 //! ```
 //! use std::time::Duration;
-//! use skein_ground::{GroundConfig, GroundCore, Order, Who};
+//! use skein_ground::{Giver, GroundConfig, GroundCore, Order, Who};
 //! use skein_wire::{Fleet, Network, NetworkConfig, NodeName};
 //!
 //! let (ground, vehicle) = (NodeName::new("ground/main")?, NodeName::new("uav/1")?);
 //! let network = Network::new(NetworkConfig::default(), 0);
 //! let mut link = network.join(&ground);
 //! let mut station = GroundCore::new(GroundConfig::new(Fleet::new("demo")?, ground, vec![vehicle]));
-//! station.order(&Order::Hold(Who::All))?;
+//! station.order(&Giver::new("Anna")?, &Order::Hold(Who::All))?;
 //! station.tick(Duration::ZERO, &mut link)?;
 //! assert!(station.take_selections().iter().any(|happened| happened.event.kind() == "ordered"));
 //! assert!(station.finished().is_none());
@@ -32,14 +32,20 @@ pub mod config_file;
 pub mod console;
 mod core;
 pub mod explain;
+mod giver;
+mod launch_offer;
 mod order;
 mod order_log;
 pub mod recorder;
+mod refusal;
 
-pub use crate::core::{GroundCore, UnknownVehicle};
+pub use crate::core::GroundCore;
 pub use bthreads::MissionOutcome;
 #[cfg(feature = "zenoh")]
 pub use cli::main;
 pub use config::GroundConfig;
+pub use giver::{Giver, UnfitName};
+pub use launch_offer::{Candidate, LaunchOffer, OFFER_LASTS};
 pub use order::{Destination, Order, SentScript, UnfitScript, Who};
 pub use order_log::{Answer, OrderRecord};
+pub use refusal::Refusal;

@@ -10,6 +10,8 @@ use skein_bp::{Event, EventSet};
 use skein_dbp::NodeName;
 use skein_wire::event::{Declared as _, Events as _, OrderGiven, What};
 
+use crate::giver::Giver;
+
 /// Whom an order is for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Who {
@@ -42,6 +44,16 @@ pub enum Order {
     Load(Who, SentScript),
     /// Run the script of this name no more.
     Unload(Who, String),
+    /// Ask whoever holds a vehicle for it.
+    Ask(Who),
+    /// Give a vehicle that one holds to another person or program.
+    Give(Who, Giver),
+    /// Hold a vehicle from now on, whoever holds it.
+    Take(Who),
+    /// Hold a vehicle no more.
+    Release(Who),
+    /// Go on holding a vehicle, or hold it if nobody does.
+    Keep(Who),
 }
 
 /// How many states of a script are looked at before it is sent.
@@ -114,7 +126,11 @@ impl Order {
             What::Land => Self::Land(who),
             What::Return => Self::Return(who),
             What::HandBack => Self::HandBack(who),
-            What::GoTo | What::Load | What::Unload => return None,
+            What::Ask => Self::Ask(who),
+            What::Take => Self::Take(who),
+            What::Release => Self::Release(who),
+            What::Keep => Self::Keep(who),
+            What::GoTo | What::Load | What::Unload | What::Give => return None,
         })
     }
 
@@ -132,6 +148,11 @@ impl Order {
             Self::HandBack(_) => What::HandBack,
             Self::Load(..) => What::Load,
             Self::Unload(..) => What::Unload,
+            Self::Ask(_) => What::Ask,
+            Self::Give(..) => What::Give,
+            Self::Take(_) => What::Take,
+            Self::Release(_) => What::Release,
+            Self::Keep(_) => What::Keep,
         }
     }
 
@@ -147,6 +168,11 @@ impl Order {
             | Self::GoTo(who, _)
             | Self::Load(who, _)
             | Self::Unload(who, _)
+            | Self::Ask(who)
+            | Self::Give(who, _)
+            | Self::Take(who)
+            | Self::Release(who)
+            | Self::Keep(who)
             | Self::HandBack(who) => who,
         }
     }
@@ -161,28 +187,35 @@ impl Order {
         }
     }
 
-    /// The order as events of the ground station: `ground/main/ordered{what: "hold", who: "all"}`, or one for each
-    /// vehicle that it names. `positions` are those of the vehicles it is for, in metres ENU, as far as they are known.
+    /// The order of `by` as events of the ground station: `ground/main/ordered{what: "hold", who: "all"}` if it is for
+    /// `everybody`, or else one for each vehicle of `positions`, which says where they are in metres ENU, as far as that
+    /// is known.
     pub(crate) fn events(
         &self,
         ground: &NodeName,
+        by: &Giver,
+        everybody: bool,
         positions: &[(NodeName, Option<Vector3<f64>>)],
     ) -> Vec<Event> {
         let given = |who: &str| OrderGiven {
+            to: match self {
+                Self::Give(_, to) => Some(to.as_str().into()),
+                _ => None,
+            },
             name: self.script().map(Into::into),
             script: match self {
                 Self::Load(_, script) => Some(script.text.clone()),
                 _ => None,
             },
-            ..OrderGiven::plain(self.what(), who)
+            ..OrderGiven::plain(self.what(), who, by.as_str())
         };
-        let orders: Vec<_> = match (self, self.who()) {
-            (Self::GoTo(_, destination), _) => places(*destination, positions)
+        let orders: Vec<_> = match self {
+            Self::GoTo(_, destination) => places(*destination, positions)
                 .into_iter()
-                .map(|(vehicle, place)| given(vehicle.as_str()).to(place.into()))
+                .map(|(vehicle, place)| given(vehicle.as_str()).at_place(place.into()))
                 .collect(),
-            (_, Who::All) => vec![given(OrderGiven::ALL)],
-            (_, Who::These(vehicles)) => vehicles.iter().map(|vehicle| given(vehicle.as_str())).collect(),
+            _ if everybody => vec![given(OrderGiven::ALL)],
+            _ => positions.iter().map(|(vehicle, _)| given(vehicle.as_str())).collect(),
         };
         orders.into_iter().map(|order| order.at(ground)).collect()
     }

@@ -4,10 +4,14 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use skein_dbp::{Happened, Node, NodeName};
-use skein_wire::event::{Declared as _, Declined, Heeded, OrderTaken, ScriptNews, ScriptState, Takeoff};
+use skein_wire::event::{
+    Declared as _, Declined, Handover, Heeded, OrderTaken, Overruled, ScriptNews, ScriptState, Takeoff,
+};
 
 use crate::bthreads::{GOING_LASTS, Hold, LAUNCH_LASTS};
+use crate::giver::Giver;
 use crate::order::{Order, Who};
+use crate::refusal::held_by;
 
 /// The number of orders that are remembered.
 const KEPT: usize = 10;
@@ -17,6 +21,8 @@ const KEPT: usize = 10;
 pub struct OrderRecord {
     /// Its number at this station, from 1.
     pub id: u64,
+    /// Who has given it.
+    pub by: Giver,
     pub order: Order,
     /// When it was given, on the station's clock.
     pub at: Duration,
@@ -52,19 +58,20 @@ pub(crate) struct OrderLog {
 }
 
 impl OrderLog {
-    /// An order is given at `now` to `vehicles`. Whatever they have not taken in before will not be said to them again.
+    /// An order is given at `now` to those whose answer is open. Whatever they have not taken in before will not be said
+    /// to them again.
     pub(crate) fn give(
         &mut self,
         now: Duration,
+        by: Giver,
         order: Order,
-        vehicles: impl Iterator<Item = NodeName>,
+        answers: BTreeMap<NodeName, Answer>,
     ) -> u64 {
-        let answers: BTreeMap<_, _> = vehicles.map(|vehicle| (vehicle, Answer::Pending)).collect();
         let earlier = self.records.iter_mut().filter(|record| supersedes(&order, &record.order));
         let earlier = earlier.flat_map(|record| &mut record.answers);
-        for (_, answer) in
-            earlier.filter(|(vehicle, answer)| answers.contains_key(*vehicle) && answer.is_open())
-        {
+        for (_, answer) in earlier.filter(|(vehicle, answer)| {
+            answers.get(*vehicle).is_some_and(Answer::is_open) && answer.is_open()
+        }) {
             *answer = Answer::Refused("another order has taken its place".into());
         }
         self.given += 1;
@@ -72,19 +79,26 @@ impl OrderLog {
         if self.records.len() == KEPT {
             self.records.pop_front();
         }
-        self.records.push_back(OrderRecord { id: self.given, order, at: now, answers });
+        self.records.push_back(OrderRecord { id: self.given, by, order, at: now, answers });
         self.given
     }
 
-    /// Takes in what has happened since the last call.
-    pub(crate) fn update(&mut self, now: Duration, node: &Node, happened: &[Happened]) {
+    /// Takes in what has happened since the last call, and who holds each vehicle. Gives back which vehicles need not be
+    /// brought an order any more.
+    pub(crate) fn update(
+        &mut self,
+        now: Duration,
+        node: &Node,
+        happened: &[Happened],
+        holders: &BTreeMap<NodeName, String>,
+    ) -> Vec<Overruled> {
         for happened in happened {
             let vehicle = &happened.home;
             // Of several orders of a kind, it is the newest that is answered.
             for record in self.records.iter_mut().rev() {
                 let after = now.saturating_sub(record.at);
                 if let (Some(answer), Some(known)) =
-                    (answer_in(&record.order, happened, after), record.answers.get_mut(vehicle))
+                    (answer_in(record, happened, after), record.answers.get_mut(vehicle))
                 {
                     // A refusal may follow an acknowledgement; nothing else changes what has been said.
                     let declined = matches!((&known, &answer), (Answer::Acknowledged(_), Answer::Refused(_)));
@@ -117,6 +131,24 @@ impl OrderLog {
                 }
             }
         }
+        self.look_at_holders(holders)
+    }
+
+    /// Another station's order may have come first: the vehicle says who holds it.
+    fn look_at_holders(&mut self, holders: &BTreeMap<NodeName, String>) -> Vec<Overruled> {
+        let mut overruled = Vec::new();
+        for record in self.records.iter_mut().filter(|record| record.order.what().needs_holder()) {
+            let by = record.by.as_str();
+            for (vehicle, answer) in
+                record.answers.iter_mut().filter(|(_, answer)| **answer == Answer::Pending)
+            {
+                let Some(holder) = holders.get(vehicle).filter(|holder| *holder != by) else { continue };
+                *answer = Answer::Refused(held_by(holder, vehicle));
+                self.revision += 1;
+                overruled.push(Overruled { vehicle: vehicle.clone(), by: holder.as_str().into() });
+            }
+        }
+        overruled
     }
 
     /// A hold is acknowledged by those who surely keep it now: a vehicle that was out of reach for a lease does not.
@@ -161,7 +193,8 @@ fn supersedes(new: &Order, old: &Order) -> bool {
 }
 
 /// The answer to an order in an event at a vehicle.
-fn answer_in(order: &Order, happened: &Happened, after: Duration) -> Option<Answer> {
+fn answer_in(record: &OrderRecord, happened: &Happened, after: Duration) -> Option<Answer> {
+    let (order, by) = (&record.order, record.by.as_str());
     let event = &happened.event;
     let acknowledged = || Some(Answer::Acknowledged(after));
     let refused = |why: &str| Some(Answer::Refused(why.to_owned()));
@@ -169,8 +202,11 @@ fn answer_in(order: &Order, happened: &Happened, after: Duration) -> Option<Answ
         return acknowledged();
     }
     if let Some(taken) = OrderTaken::read(event) {
-        // What a script has ordered its own vehicle is nobody's answer.
-        return if taken.what == order.what() && taken.by.is_none() { acknowledged() } else { None };
+        // What another has ordered, or a script its own vehicle, is nobody's answer.
+        return if taken.what == order.what() && *taken.by == *by { acknowledged() } else { None };
+    }
+    if let Some(handover) = Handover::read(event) {
+        return if handover.what == order.what() && *handover.by == *by { acknowledged() } else { None };
     }
     if let Some(heeded) = Heeded::read(event) {
         return if heeded.what == order.what() { acknowledged() } else { None };

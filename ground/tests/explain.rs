@@ -130,6 +130,17 @@ fn a_vehicle_that_moves_needs_no_change() {
     assert_eq!(explanation.requests.len(), 1);
 }
 
+#[test]
+fn a_hold_is_told_with_who_ordered_it() {
+    let mut evidence = hovering(held_by_ground());
+    for by in ["Ben", "Anna"] {
+        let order = OrderGiven::plain(What::Hold, OrderGiven::ALL, by).at("ground/main");
+        evidence.note_event(Happened { home: node("ground/main"), ..happened(NOW, order, "") });
+    }
+    let because = &of(&evidence, "uav/3").changes[0].because;
+    assert_eq!(because.last().map(String::as_str), Some("Anna has ordered it"), "{because:?}");
+}
+
 /// Both at the passage: each with what it requests, blocks and waits for.
 fn at_a_passage(first: Bid, second: Bid) -> Vec<Board> {
     let leave = |vehicle: &str| EventSet::from(format!("{vehicle}/leave"));

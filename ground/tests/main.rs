@@ -2,6 +2,8 @@
 
 #![allow(clippy::panic, clippy::unwrap_used)] // A test fails by panicking.
 
+#[cfg(feature = "zenoh")]
+mod commands;
 mod explain;
 #[cfg(feature = "zenoh")]
 mod explain_command;

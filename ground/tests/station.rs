@@ -1,14 +1,15 @@
 //! The station with three simple vehicles over the in-memory network.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
-use skein_ground::{GroundConfig, GroundCore, Order, Who};
+use skein_ground::{Answer, Giver, GroundConfig, GroundCore, OFFER_LASTS, Order, Refusal, Who};
 use skein_wire::event::{
-    Advance, Airborne, Complete, Declared as _, Failed, Landed, OrderTaken, Takeoff, What, of,
+    Advance, Airborne, Complete, Declared as _, Failed, Handover, Landed, OrderGiven, OrderTaken, Takeoff,
+    What, of,
 };
 use skein_wire::{Fleet, MemoryLink, Network, NetworkConfig, NodeLink, State};
 
@@ -80,6 +81,31 @@ struct Fleet3 {
     station_link: MemoryLink,
     vehicles: BTreeMap<NodeName, (NodeLink, MemoryLink)>,
     happened: Vec<Happened>,
+    holders: BTreeMap<NodeName, String>,
+    /// Those that say that their motors are armed.
+    flying: BTreeSet<NodeName>,
+}
+
+/// Blocks the orders of all but one.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+struct Heeds {
+    vehicle: NodeName,
+    by: String,
+}
+
+impl BThread for Heeds {
+    fn bid(&self) -> Option<Bid> {
+        let others = OrderTaken::by(self.by.as_str()).not();
+        Some(
+            Bid::new().block(of::<OrderTaken>(&self.vehicle).and(OrderTaken::what(What::Resume)).and(others)),
+        )
+    }
+
+    fn resume(&mut self, _: &Event, _: &mut Context) {}
+}
+
+fn giver(name: &str) -> Giver {
+    Giver::new(name).unwrap()
 }
 
 fn name(text: &str) -> NodeName {
@@ -88,14 +114,27 @@ fn name(text: &str) -> NodeName {
 
 impl Fleet3 {
     fn new(orders: Vec<(Duration, Order)>, network: NetworkConfig, seed: u64) -> Self {
+        let orders = orders.into_iter().map(|(at, order)| (at, giver("Anna"), order)).collect();
+        Self::with(network, seed, |config| GroundConfig { orders, ..config })
+    }
+
+    /// On the ground until somebody launches them.
+    fn waiting() -> Self {
+        let mut fleet = Self::with(NetworkConfig::default(), 1, |config| GroundConfig {
+            launch_on_order: true,
+            ..config
+        });
+        fleet.run(Duration::from_millis(500));
+        fleet
+    }
+
+    fn with(network: NetworkConfig, seed: u64, change: impl FnOnce(GroundConfig) -> GroundConfig) -> Self {
         let fleet = Fleet::new("test").unwrap();
         let vehicles = ["uav/1", "uav/2", "uav/3"].map(name);
         let network = Network::new(network, seed);
-        let config = GroundConfig {
-            orders,
-            seed,
-            ..GroundConfig::new(fleet.clone(), name("ground/main"), vehicles.to_vec())
-        };
+        let config =
+            GroundConfig { seed, ..GroundConfig::new(fleet.clone(), name("ground/main"), vehicles.to_vec()) };
+        let config = change(config);
         let station = GroundCore::new(config);
         let station_link = network.join(&name("ground/main"));
         let roster: Vec<NodeName> = vehicles.iter().cloned().chain([name("ground/main")]).collect();
@@ -115,7 +154,22 @@ impl Fleet3 {
             station_link,
             vehicles: vehicles.into(),
             happened: Vec::new(),
+            holders: BTreeMap::new(),
+            flying: BTreeSet::new(),
         }
+    }
+
+    /// From now on this vehicle tells that it is held by them, and heeds no other.
+    fn is_held(&mut self, vehicle: &str, by: &str) {
+        self.holders.insert(name(vehicle), by.to_owned());
+        let (node, _) = self.vehicles.get_mut(&name(vehicle)).unwrap();
+        let heeds = Heeds { vehicle: name(vehicle), by: by.to_owned() };
+        node.node_mut().program_mut().add("heeds", heeds);
+    }
+
+    fn answer(&self, order: u64, vehicle: &str) -> &Answer {
+        let record = self.station.orders().find(|record| record.id == order).unwrap();
+        &record.answers[&name(vehicle)]
     }
 
     fn run(&mut self, duration: Duration) {
@@ -126,7 +180,16 @@ impl Fleet3 {
             self.happened.extend(self.station.take_selections());
             for (vehicle, (node, link)) in &mut self.vehicles {
                 node.pump(self.now, link).unwrap();
-                node.put_state(&State { time: self.now, ..State::new(vehicle.clone()) }, link);
+                let holder = self.holders.get(vehicle).cloned().unwrap_or_default();
+                node.put_state(
+                    &State {
+                        time: self.now,
+                        holder,
+                        armed: self.flying.contains(vehicle),
+                        ..State::new(vehicle.clone())
+                    },
+                    link,
+                );
             }
             self.now += TICK;
         }
@@ -255,4 +318,139 @@ fn a_vehicle_that_never_answers_keeps_no_other_on_the_ground() {
     fleet.run(Duration::from_secs(10));
     assert_eq!(fleet.saw("uav/3/takeoff").len(), 1);
     assert!(fleet.station.finished().is_none(), "a lost vehicle is not a finished one");
+}
+
+#[test]
+fn an_order_names_who_gave_it_from_the_console_to_the_vehicle() {
+    let mut fleet = Fleet3::new(vec![], NetworkConfig::default(), 1);
+    fleet.run(Duration::from_secs(1));
+    let id = fleet.station.order(&giver("Anna"), &Order::Land(Who::only(name("uav/1")))).unwrap();
+    fleet.run(Duration::from_secs(1));
+    let events = fleet.happened.iter().map(|happened| &happened.event);
+    let by: Vec<_> = events
+        .filter_map(|event| Some(OrderGiven::read(event)?.by).or_else(|| Some(OrderTaken::read(event)?.by)))
+        .collect();
+    assert_eq!(by.iter().map(|by| &**by).collect::<Vec<_>>(), ["Anna"], "at the station");
+    assert_eq!(fleet.station.orders().last().map(|record| record.by.as_str()), Some("Anna"));
+    assert!(matches!(fleet.answer(id, "uav/1"), Answer::Acknowledged(_)));
+}
+
+#[test]
+fn another_holder_is_named_with_the_remedy_and_keeps_nobody_from_stopping_the_vehicle() {
+    let mut fleet = Fleet3::waiting();
+    fleet.is_held("uav/1", "Anna");
+    fleet.run(Duration::from_millis(500));
+    let one = || Who::only(name("uav/1"));
+    let refusal = fleet.station.order(&giver("Ben"), &Order::Resume(one())).unwrap_err();
+    assert_eq!(refusal, Refusal::Held { vehicle: name("uav/1"), holder: "Anna".into() });
+    let words = refusal.to_string();
+    assert!(
+        words.contains("Anna holds `uav/1`") && words.contains("`ask`") && words.contains("`take`"),
+        "{words}"
+    );
+
+    let all = fleet.station.order(&giver("Ben"), &Order::Resume(Who::All)).unwrap();
+    assert_eq!(*fleet.answer(all, "uav/1"), Answer::Refused(words));
+    fleet.run(Duration::from_millis(200));
+    assert!(fleet.saw("uav/1/order").is_empty() && !fleet.saw("uav/2/order").is_empty());
+
+    for stop in [Order::Hold(one()), Order::Return(one()), Order::Land(one()), Order::Abort] {
+        fleet.station.order(&giver("Ben"), &stop).unwrap();
+    }
+    fleet.station.order(&giver("Anna"), &Order::Resume(one())).unwrap();
+    let not_his = fleet.station.order(&giver("Ben"), &Order::Give(one(), giver("Ben"))).unwrap_err();
+    assert!(matches!(not_his, Refusal::NotHolder { .. }), "{not_his}");
+}
+
+#[test]
+fn of_two_stations_the_one_that_comes_second_learns_it_from_the_vehicle() {
+    let mut fleet = Fleet3::waiting();
+    let order = fleet.station.order(&giver("Ben"), &Order::Resume(Who::only(name("uav/1")))).unwrap();
+    // Another station's order has come first, and this one does not know it yet.
+    fleet.is_held("uav/1", "Anna");
+    fleet.run(Duration::from_secs(1));
+    let Answer::Refused(why) = fleet.answer(order, "uav/1") else { panic!("it was not refused") };
+    assert!(why.contains("Anna holds `uav/1`"), "{why}");
+    // It is not brought any more, even if Anna lets the vehicle go.
+    fleet.vehicles.get_mut(&name("uav/1")).unwrap().0.node_mut().program_mut().remove("heeds");
+    fleet.holders.clear();
+    fleet.run(Duration::from_secs(5));
+    assert!(fleet.saw("uav/1/order").is_empty());
+}
+
+#[test]
+fn a_holder_who_is_there_is_kept_holding_and_one_who_is_gone_is_not() {
+    let mut fleet = Fleet3::waiting();
+    fleet.is_held("uav/1", "Anna");
+    let kept = |fleet: &Fleet3| {
+        let kept =
+            |happened: &&Happened| OrderGiven::read(&happened.event).is_some_and(|it| it.what == What::Keep);
+        fleet.happened.iter().filter(kept).count()
+    };
+    fleet.run(Duration::from_secs(25));
+    assert_eq!(kept(&fleet), 0, "she is not there");
+    fleet.station.attend([giver("Anna"), giver("Ben")].into());
+    fleet.run(Duration::from_secs(25));
+    assert!((2..=3).contains(&kept(&fleet)), "{} times", kept(&fleet));
+    let by = |event: &Event| Handover::read(event).map(|handover| handover.by.to_string());
+    assert!(fleet.happened.iter().filter_map(|happened| by(&happened.event)).all(|by| by == "Anna"));
+}
+
+#[test]
+fn a_launch_is_two_messages() {
+    let mut fleet = Fleet3::waiting();
+    let (anna, ben) = (giver("Anna"), giver("Ben"));
+    assert_eq!(fleet.station.order(&anna, &Order::Launch), Err(Refusal::LaunchUnasked));
+    let offer = fleet.station.offer_launch(&anna, What::Launch, "t1".into()).unwrap();
+    let vehicles: Vec<_> = offer.candidates.iter().map(|one| one.vehicle.as_str()).collect();
+    assert_eq!((offer.token.as_str(), &vehicles[..]), ("t1", &["uav/1", "uav/2", "uav/3"][..]));
+    fleet.run(Duration::from_secs(2));
+    assert!(fleet.saw("uav/1/takeoff").is_empty(), "one message launches nobody");
+
+    assert_eq!(fleet.station.launch(&ben, "t1"), Err(Refusal::NoSuchOffer), "another's");
+    assert_eq!(fleet.station.launch(&anna, "t2"), Err(Refusal::NoSuchOffer), "guessed");
+    fleet.station.launch(&anna, "t1").unwrap();
+    assert_eq!(fleet.station.launch(&anna, "t1"), Err(Refusal::NoSuchOffer), "used");
+    fleet.run(Duration::from_secs(2));
+    assert_eq!(fleet.saw("uav/1/takeoff").len(), 1);
+}
+
+#[test]
+fn an_offered_launch_lapses_gives_way_to_a_later_one_and_is_about_those_it_named() {
+    let mut fleet = Fleet3::waiting();
+    let anna = giver("Anna");
+    let offer = |fleet: &mut Fleet3, token: &str| {
+        fleet.station.offer_launch(&anna, What::Launch, token.into()).unwrap();
+    };
+    offer(&mut fleet, "old");
+    fleet.run(OFFER_LASTS + 2 * TICK);
+    assert_eq!(fleet.station.launch(&anna, "old"), Err(Refusal::NoSuchOffer), "too late");
+    offer(&mut fleet, "first");
+    offer(&mut fleet, "second");
+    assert_eq!(fleet.station.launch(&anna, "first"), Err(Refusal::NoSuchOffer));
+    fleet.station.launch(&anna, "second").unwrap();
+
+    let mut fleet = Fleet3::waiting();
+    offer(&mut fleet, "three");
+    fleet.flying.insert(name("uav/2"));
+    fleet.run(Duration::from_millis(200));
+    assert_eq!(fleet.station.launch(&anna, "three"), Err(Refusal::OfferOutdated));
+
+    let mut fleet = Fleet3::waiting();
+    fleet.is_held("uav/3", "Ben");
+    fleet.run(Duration::from_millis(200));
+    let held = fleet.station.offer_launch(&anna, What::Launch, "t".into()).unwrap_err();
+    assert_eq!(held, Refusal::Held { vehicle: name("uav/3"), holder: "Ben".into() });
+}
+
+#[test]
+fn orders_that_were_known_in_advance_hold_no_vehicle() {
+    let resume = Order::Resume(Who::only(name("uav/2")));
+    let mut fleet = Fleet3::new(vec![(Duration::from_secs(2), resume)], NetworkConfig::default(), 1);
+    fleet.run(Duration::from_secs(2));
+    fleet.holders.insert(name("uav/2"), "Anna".into());
+    fleet.run(Duration::from_secs(2));
+    let released =
+        |happened: &&Happened| OrderGiven::read(&happened.event).is_some_and(|it| it.what == What::Release);
+    assert_eq!(fleet.happened.iter().filter(released).count(), 1);
 }

@@ -6,12 +6,15 @@
   skein_operator.py hold                   nobody moves on, until Ctrl-C
   skein_operator.py hold --seconds 5 uav/1 uav/2
   skein_operator.py return uav/3           also: land, resume; `all` for every vehicle
+  skein_operator.py take uav/3             hold it from now on: it sets out for nobody else; also: ask, release, give
   skein_operator.py roster --term 2 --coordinator ground/main uav/1 uav/2    who decides together from now on
   skein_operator.py load curfew.toml --with for_s=60 --with 'min=[0,0,0]' --with 'max=[9,9,9]' all
   skein_operator.py unload curfew all
 
 It speaks as the node `script/operator`, which must be in the vehicles' rosters. Only one such script has a say at a
 time: `hold`, `land`, `return` and `resume` end what an earlier one still holds at the vehicles that they speak to.
+Every order names who gives it, `--by`. A vehicle takes orders that set it going from one holder; whoever gives the first
+holds it, and for 30 s after the last. It is held, sent home and landed by anybody.
 
 Needs eclipse-zenoh, protobuf, and skein_pb2.py beside it: README.md says how that is made.
 Exit codes: 0 done, 1 nobody is there or somebody did not acknowledge, 2 wrong usage.
@@ -24,6 +27,7 @@ if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 import argparse
+import getpass
 import ipaddress
 import json
 import math
@@ -62,6 +66,7 @@ TICK_S = 0.02
 
 # Words of the catalogue of events:
 ORDER = "order"
+HANDOVER = "handover"
 LOAD = "load"
 UNLOAD = "unload"
 SCRIPT = "script"
@@ -72,10 +77,17 @@ TO_HOLD = "hold"
 TO_LAND = "land"
 TO_RETURN = "return"
 TO_RESUME = "resume"
+TO_ASK = "ask"
+TO_GIVE = "give"
+TO_TAKE = "take"
+TO_RELEASE = "release"
 ACCEPTED = "accepted"
 REFUSED = "refused"
 WITHDRAWN = "withdrawn"
 # End of the words.
+
+# Who holds a vehicle.
+HANDOVERS = (TO_ASK, TO_GIVE, TO_TAKE, TO_RELEASE)
 
 # Leave to move, ten times a second for each vehicle in flight: too much for people to read.
 LEAVE = (ADVANCE, HOMEWARD)
@@ -279,6 +291,7 @@ def list_vehicles(options, output, interrupted):
             "battery": round(state.battery, 3),
             "task": state.task,
             "waiting_for": state.waiting_for,
+            "holder": state.holder,
             "mission": name_of(wire.Mission, state.mission),
             "position": [round(number, 2) for number in (state.position.x, state.position.y, state.position.z)],
         }
@@ -326,7 +339,8 @@ def watch(options, output, interrupted):
 
 def hold(options, output, interrupted):
     """`hold`: blocks `uav/*/advance` at every vehicle, which each requests before it moves on."""
-    block = wire.RemoteBid(bthread="hold", sync=1, block=wire.EventSet(named=f"uav/*/{ADVANCE}"))
+    bthread = f"hold by {options.by}" if options.by else "hold"
+    block = wire.RemoteBid(bthread=bthread, sync=1, block=wire.EventSet(named=f"uav/*/{ADVANCE}"))
     wanted = named(options)
     outboxes, said, faults = {}, {}, set()
 
@@ -405,8 +419,8 @@ def order(options, output, interrupted):
     what, wanted = options.command, named(options)
     if what == ROSTER and options.coordinator not in wanted:
         wanted.append(options.coordinator)
-    verb, data = (ORDER, {"what": what}) if what not in (LOAD, UNLOAD) else (what, script_data(options))
-    outboxes, taken, unwilling = {}, set(), {}
+    verb, data = verb_and_data(options)
+    outboxes, taken, unwilling, holders = {}, set(), {}, {}
 
     topics = ["state/*/*", "occ/*/*", f"occ/*/*/{NODE}", f"ack/*/*/{NODE}"]
     with Swarm(options.fleet, options.connect, topics, options.certificates) as swarm:
@@ -437,7 +451,7 @@ def order(options, output, interrupted):
             is_new = occurrence.incarnation == outbox.home_incarnation and occurrence.seq > outbox.applied
             if not is_new:
                 return
-            if verb == ORDER:
+            if verb in (ORDER, HANDOVER, ROSTER):
                 is_taken = occurrence.event == event(node)
             else:
                 told = {key: value.text for key, value in occurrence.event.data.items()}
@@ -475,6 +489,8 @@ def order(options, output, interrupted):
                 node, body = heard
                 if node not in outboxes and is_vehicle(node) and not wanted:
                     ask(node)
+                if isinstance(body, wire.State):
+                    holders[node] = body.holder
                 if node in outboxes and node not in taken:
                     if isinstance(body, wire.BidAck):
                         take_in_ack(node, body)
@@ -487,15 +503,33 @@ def order(options, output, interrupted):
             outbox.state()
     missing = ordered(outboxes.keys() - taken)
     for node in missing:
-        why = unwilling.get(node) or ", ".join(outboxes[node].refusals) or "no answer"
+        why = unwilling.get(node) or ", ".join(outboxes[node].refusals) or overruled(holders.get(node), options) or "no answer"
         output.tell(f"{node} has not taken the order: {why}", vehicle=node, order=what, taken=False)
     if not outboxes:
         return nobody(options)
     return f"not taken by {', '.join(missing)}" if missing else None
 
 
+def verb_and_data(options):
+    """The event that is requested, and what it carries: always the name of whoever requests it."""
+    what = options.command
+    if what in (LOAD, UNLOAD):
+        return what, {**script_data(options), "by": options.by}
+    if what in HANDOVERS:
+        to = {"to": options.to} if what == TO_GIVE else {}
+        return HANDOVER, {"what": what, "by": options.by, **to}
+    return (ROSTER, {}) if what == ROSTER else (ORDER, {"what": what, "by": options.by})
+
+
+def overruled(holder, options):
+    """Why a vehicle that somebody else holds does not take an order."""
+    if not holder or holder == options.by or options.command not in (TO_RESUME, LOAD, UNLOAD):
+        return None
+    return f"{holder} holds it: `ask` for it, or `take` it, which {holder} sees"
+
+
 def script_data(options):
-    """What a request of `load` or `unload` carries."""
+    """What a request of `load` or `unload` carries beside the name of whoever requests it."""
     if options.command == UNLOAD:
         return {"name": options.name}
     assignment = {"script": options.script, "with": dict(options.values)}
@@ -564,6 +598,22 @@ def endpoint(text):
                                      "or, with --certificates, tls/ADDRESS:PORT")
 
 
+def giver(text):
+    """The name of a person or program, as the console takes it."""
+    name = text.strip()
+    if not 0 < len(name.encode()) <= 64 or not name.isprintable() or set(name) & set("/#"):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected 1 to 64 bytes in one line, without / and #, such as Anna")
+    return name
+
+
+def account():
+    """The name of this account, if it has one that an order can tell."""
+    try:
+        return giver(getpass.getuser())
+    except (argparse.ArgumentTypeError, OSError, KeyError):
+        return None
+
+
 def duration(text):
     try:
         seconds = float(text)
@@ -605,6 +655,7 @@ def read_arguments(arguments):
             help="where nodes of the fleet listen: one that relays, or all (default: tcp/127.0.0.1:7447)",
         )
         options.add_argument("--certificates", metavar="DIR", help="folder of authority, certificate and key, for tls/")
+        options.add_argument("--by", type=giver, metavar="NAME", help="who gives orders (default: this account's name)")
         options.add_argument("--json", action="store_true", help="one JSON object a line on standard output")
         options.set_defaults(**defaults)
         return options
@@ -615,7 +666,7 @@ def read_arguments(arguments):
         description=about,
         epilog=rest,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        parents=[common(fleet="sim", connect="tcp/127.0.0.1:7447", certificates=None, json=False)],
+        parents=[common(fleet="sim", connect="tcp/127.0.0.1:7447", certificates=None, json=False, by=account())],
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
@@ -634,9 +685,15 @@ def read_arguments(arguments):
         (TO_LAND, "land where they are"),
         (TO_RETURN, "fly home and land there"),
         (TO_RESUME, "go on after an order to hold"),
+        (TO_ASK, "ask whoever holds them for them"),
+        (TO_GIVE, "give them to somebody else"),
+        (TO_TAKE, "hold them from now on, whoever holds them"),
+        (TO_RELEASE, "hold them no more"),
     ):
         added = command(what, order, about)
         added.add_argument("vehicles", type=vehicle, nargs="+", metavar="uav/N", help="these, or `all`")
+        if what == TO_GIVE:
+            added.add_argument("--to", type=giver, required=True, metavar="NAME", help="who shall hold them")
     electing = command(ROSTER, order, "who decides on joint events from now on, and who coordinates them")
     electing.add_argument("--term", type=term, required=True, help="the new term: above the present one, which is 1 at first")
     electing.add_argument("--coordinator", type=node, required=True, metavar="NODE", help="where joint events are decided")
@@ -651,7 +708,10 @@ def read_arguments(arguments):
     unloading.add_argument("name", metavar="NAME", help="the name it runs under")
     for added in (loading, unloading):
         added.add_argument("vehicles", type=vehicle, nargs="+", metavar="uav/N", help="these, or `all`")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if options.by is None and options.run is order:
+        parser.error("nobody is named who gives this order: add --by NAME")
+    return options
 
 
 def main(arguments):

@@ -4,6 +4,8 @@ import assert from 'node:assert/strict';
 import { chromium } from 'playwright-core';
 
 const EXECUTABLE = process.env.SKEIN_CHROMIUM ?? '/usr/bin/chromium';
+/** Who sits at the browser. */
+export const NAME = 'Anna';
 const ARGUMENTS = ['--no-sandbox', '--disable-background-networking', '--no-first-run'];
 /** The station speaks ten times a second; whoever waits for something asks it this often. */
 const GLANCE_MS = 20;
@@ -17,6 +19,7 @@ export async function open(url, { renderer = 'webgl', colorScheme = 'dark', befo
       : { args: [...ARGUMENTS, '--enable-unsafe-swiftshader'] }),
   });
   const page = await browser.newPage({ viewport: { width: 1280, height: 800 }, colorScheme });
+  await page.addInitScript((name) => window.localStorage.setItem('skein-name', name), NAME);
   await page.addInitScript(before);
   const console = new Console(browser, page);
   await page.goto(url);

@@ -3,7 +3,7 @@
 //     node go-to.mjs URL      beside `skein-sim fly open --headless`
 
 import assert from 'node:assert/strict';
-import { apart, drive, speed } from './browser.mjs';
+import { apart, drive, NAME, speed } from './browser.mjs';
 
 const ONE = 'uav/1';
 const OTHERS = ['uav/2', 'uav/3', 'uav/4'];
@@ -19,6 +19,9 @@ await drive({}, async (console) => {
   assert.equal(more, undefined, 'one order');
   assert.equal(ordered.data.what, 'goto');
   assert.equal(ordered.data.who, ONE);
+  assert.equal(ordered.data.by, NAME);
+  await console.until(`${ONE} is held by whoever ordered it`, () => console.vehicle(ONE).holder === NAME);
+  await console.until('the page says so', async () => /In command: you/.test(await console.page.locator('#holders').textContent()));
   const { x, y, z } = ordered.data;
   assert.ok(apart([x, y], PLACE) < 0.5, `ordered to ${[x, y]}, clicked at ${PLACE}`);
 

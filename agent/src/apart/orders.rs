@@ -26,6 +26,9 @@ pub struct Words {
     pub waiting_for: String,
     pub mission: MissionState,
     pub scripts: Vec<String>,
+    /// Who commands the vehicle, and who asks to; empty for nobody.
+    pub holder: String,
+    pub asked_by: String,
 }
 
 impl Orders {
@@ -42,7 +45,7 @@ impl Words {
     /// The state of a body, with these words.
     #[must_use]
     pub fn said_of(&self, body: State) -> State {
-        let Self { task, waiting_for, mission, scripts } = self.clone();
-        State { task, waiting_for, mission, scripts, ..body }
+        let Self { task, waiting_for, mission, scripts, holder, asked_by } = self.clone();
+        State { task, waiting_for, mission, scripts, holder, asked_by, ..body }
     }
 }

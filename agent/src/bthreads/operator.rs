@@ -2,7 +2,9 @@
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
-use skein_wire::event::{Advance, Declared as _, HandBack, Hold, Land, OrderTaken, Return, What};
+use skein_wire::event::{
+    Advance, Declared as _, Declined, HandBack, Hold, Land, OrderTaken, Return, Text, What,
+};
 
 use crate::{me::Me, precedence};
 
@@ -18,6 +20,25 @@ pub struct Operator {
 impl Operator {
     pub fn new(me: Me) -> Self {
         Self { me, pending: Vec::new(), holding: false }
+    }
+
+    /// What the vehicle does by itself then, if it does.
+    fn own(&self, what: What, by: &str) -> Option<Event> {
+        let why: Text = format!("ordered by {by}").into();
+        Some(match what {
+            What::Hold => self.me.event(Hold { why }),
+            What::Land => self.me.event(Land { why }),
+            What::Return => self.me.event(Return { why }),
+            What::HandBack => self.me.event(HandBack),
+            _ => return None,
+        })
+    }
+
+    /// The answer to an order that names nobody, which no b-thread heeds.
+    fn decline(&self, order: &Event) -> Option<Event> {
+        let what = What::of_word(order.text("what")?)?;
+        let why = "it names nobody: set `by` to the name of the person or program that gives it";
+        order.text("by").is_none().then(|| self.me.event(Declined { what, why: why.into() }))
     }
 }
 
@@ -35,23 +56,18 @@ impl BThread for Operator {
     fn resume(&mut self, event: &Event, _: &mut Context) {
         if !self.me.heard::<OrderTaken>(event) {
             self.pending.retain(|pending| pending != event);
-            self.holding &= self.me.heard::<Hold>(event);
+            self.holding &= self.me.heard::<Hold>(event) || self.me.heard::<Declined>(event);
             return;
         }
-        let what = OrderTaken::read(event).map(|order| order.what);
-        let why = || "ordered by the operator".into();
-        let event = match what {
-            Some(What::Hold) => Some(self.me.event(Hold { why: why() })),
-            Some(What::Land) => Some(self.me.event(Land { why: why() })),
-            Some(What::Return) => Some(self.me.event(Return { why: why() })),
-            Some(What::HandBack) => Some(self.me.event(HandBack)),
-            _ => None,
+        let Some(OrderTaken { what, by, .. }) = OrderTaken::read(event) else {
+            self.pending.extend(self.decline(event));
+            return;
         };
-        if what != Some(What::HandBack) {
+        let event = self.own(what, &by);
+        if what != What::HandBack {
             self.pending.clear();
         }
         self.pending.extend(event);
-        self.holding =
-            (self.holding && !matches!(what, Some(What::Resume | What::GoTo))) || what == Some(What::Hold);
+        self.holding = (self.holding && !matches!(what, What::Resume | What::GoTo)) || what == What::Hold;
     }
 }

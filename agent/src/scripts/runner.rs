@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::Serialize;
 use skein_bp::script::Script;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
-use skein_wire::event::{HandBack, OrderTaken, Ready, ScriptState, Unload, What};
+use skein_wire::event::{Declared as _, HandBack, OrderTaken, Ready, ScriptState, Unload, What};
 
 use super::report;
 use crate::{me::Me, precedence};
@@ -52,6 +52,22 @@ impl Runner {
         format!("script/{name}")
     }
 
+    /// A request of the script as the vehicle hears it: an order names the script, whatever it says itself.
+    fn named(&self, request: &Event) -> Event {
+        if !self.me.heard::<OrderTaken>(request) {
+            return request.clone();
+        }
+        request.clone().with("by", Self::bthread_name(&self.name)).with("aboard", true)
+    }
+
+    /// What the script itself calls an event that has happened, if it has requested it.
+    fn own_word(&self, event: &Event) -> Event {
+        let requested =
+            |bid: Bid| bid.requests().iter().find(|request| self.named(request) == *event).cloned();
+        let is_order = self.me.heard::<OrderTaken>(event);
+        is_order.then(|| self.script.bid().and_then(requested)).flatten().unwrap_or_else(|| event.clone())
+    }
+
     fn withdrawal(&self) -> EventSet {
         self.me.any::<Unload>().and(Unload::name(self.name.as_str()))
     }
@@ -96,7 +112,7 @@ impl BThread for Runner {
             return Some(Bid::new().wait_for(awaited).priority(precedence::MISSION));
         }
         let script = self.script.bid().filter(|_| !self.over)?;
-        let mut bid = script.requests().iter().fold(Bid::new(), |bid, event| bid.request(event.clone()));
+        let mut bid = script.requests().iter().fold(Bid::new(), |bid, event| bid.request(self.named(event)));
         bid = bid
             .wait_for(script.waits())
             .wait_for(self.withdrawal())
@@ -120,7 +136,11 @@ impl BThread for Runner {
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         if self.withdrawal().contains(event) {
-            return self.end(ScriptState::Withdrawn, "it was taken back", cx);
+            // One that names nobody is refused.
+            return match Unload::read(event).and_then(|unload| unload.by) {
+                Some(_) => self.end(ScriptState::Withdrawn, "it was taken back", cx),
+                None => {}
+            };
         }
         if self.asleep {
             return self.begin(cx);
@@ -129,7 +149,7 @@ impl BThread for Runner {
             let why = format!("it did not come to rest: it was resumed {MOST_AT_ONCE} times at once");
             return self.end(ScriptState::Ended, &why, cx);
         }
-        self.script.resume(event, &mut Context::at(cx.now()));
+        self.script.resume(&self.own_word(event), &mut Context::at(cx.now()));
         self.note_end(cx);
     }
 

@@ -34,7 +34,9 @@ skein_bp::words! {
         Position = "position",
         /// What is told to scripts only, around an undisturbed flight.
         Scripts = "scripts",
-        /// All of it at once.
+        /// Two people who order, ask for, take and give the vehicle.
+        Holder = "holder",
+        /// All of it at once, but for who holds the vehicle.
         Everything = "everything",
     }
 }
@@ -66,7 +68,8 @@ impl Scene {
             Self::Name => "another process under this name, orders to hold, resume and return",
             Self::Position => "a position that is doubted and trusted again, orders, low battery",
             Self::Scripts => "what is told to scripts, the ground's hold, low battery",
-            Self::Everything => "all of it at once",
+            Self::Holder => "two people who order, ask for, take, give and release the vehicle",
+            Self::Everything => "all of it at once, but for who holds the vehicle",
         }
     }
 
@@ -117,6 +120,9 @@ impl Scene {
         let orders = self.orders();
         if !orders.is_empty() {
             add("operator", world::operator(me, config, orders));
+        }
+        if self == Self::Holder {
+            add("people", world::people(me));
         }
         if is_in(&[Self::Scripts]) && !script_facts.is_empty() {
             add("script facts", world::script_facts(script_facts.iter().cloned()));

@@ -9,9 +9,10 @@ use skein_dbp::NodeName;
 use skein_dbp::facts::{BlockLapsed, Confirmed, DuplicateName, InStep, PeerJoined, PeerLost, Stalled};
 use skein_wire::event::{
     Abort, Advance, Ahead, Airborne, Arrived, At, BatteryCritical, BatteryLevel, BatteryLow, Clear,
-    CommandFailed, Declared as _, Enter, FenceBreached, FoundAirborne, Goto, HandBack, Land, Landed, Launch,
-    Leave, NeighbourAt, OrderTaken, Passage, PathBlocked, PilotTook, Plan, Planned, PositionDoubted,
-    PositionTrusted, Ready, SWARM, Slept, Stuck, Takeoff, TooClose, Unplannable, Unready, What,
+    CommandFailed, Declared as _, Enter, FenceBreached, FoundAirborne, Goto, HandBack, Handover, Land,
+    Landed, Launch, Leave, Load, NeighbourAt, OrderTaken, Passage, PathBlocked, PilotTook, Plan, Planned,
+    PositionDoubted, PositionTrusted, Ready, SWARM, Slept, Stuck, Takeoff, TooClose, Unload, Unplannable,
+    Unready, What,
 };
 
 use super::part::{Part, Place};
@@ -215,19 +216,33 @@ pub(super) fn peer(me: &Me, node: &NodeName) -> Part {
     ])
 }
 
-/// An operator who gives these orders.
+/// An operator who gives these orders. They count as given aboard: who holds the vehicle is not looked at.
 pub(super) fn operator(me: &Me, config: &AgentConfig, orders: &[What]) -> Part {
     let [x, y, z] = config.fence.max;
     let offers = orders.iter().fold(Place::new("there"), |place, what| {
         let place = match what {
             What::GoTo => place
-                .keeps_offering(me.event(OrderTaken::go_to(config.home)))
-                .keeps_offering(me.event(OrderTaken::go_to([x + 10.0, y, z]))),
+                .keeps_offering(me.event(OrderTaken::go_to(config.home, "operator").given_aboard()))
+                .keeps_offering(me.event(OrderTaken::go_to([x + 10.0, y, z], "operator").given_aboard())),
             _ => place,
         };
-        place.keeps_offering(me.event(OrderTaken::plain(*what)))
+        place.keeps_offering(me.event(OrderTaken::plain(*what, "operator").given_aboard()))
     });
     Part::of_one(offers)
+}
+
+/// Two people who want the vehicle.
+pub(super) fn people(me: &Me) -> Part {
+    let place = ["Anna", "Ben"].into_iter().fold(Place::new("there"), |place, by| {
+        let handover = |what| me.event(Handover { what, by: by.into(), to: Some("Ben".into()) });
+        let place = What::those(What::is_handover).map(handover).fold(place, Place::keeps_offering);
+        let script = Load { name: Some("x".into()), script: "{}".into(), by: Some(by.into()) };
+        place
+            .keeps_offering(me.event(OrderTaken::plain(What::Resume, by)))
+            .keeps_offering(me.event(script))
+            .keeps_offering(me.event(Unload { name: "x".into(), by: Some(by.into()) }))
+    });
+    Part::of_one(place)
 }
 
 /// What the ground station's bids for this vehicle are; they change with these events.

@@ -1,10 +1,10 @@
 /**
  * The commands: what each button sends, and to whom.
  *
- * A safety order acts at once. Only launching asks again, as arming takes two steps.
+ * A safety order acts at once. Only launching asks again: see `launch-dialog.ts`.
  */
 
-import { html, setText } from './dom';
+import { html, setAttribute, setText } from './dom';
 import type { Command } from './protocol';
 import { FOR_ALL, What } from './vocabulary';
 import { orderName } from './words';
@@ -20,7 +20,8 @@ const BUTTONS: { what: Command; key: string; title: string }[] = [
 ];
 
 export interface CommandEvents {
-  order(what: Exclude<Command, typeof What.goto>): void;
+  order(what: Exclude<Command, typeof What.goto | typeof What.launch>): void;
+  launch(): void;
   placing(): void;
   everyone(): void;
 }
@@ -29,7 +30,7 @@ export class Commands {
   private readonly to = html('span', { class: 'to-whom' });
   private readonly everyone = html('button', { type: 'button', class: 'link-button', hidden: true }, 'All vehicles');
   private readonly buttons = new Map<Command, HTMLButtonElement>();
-  private readonly confirm: HTMLDialogElement;
+  private mayNot: (what: Command) => string | null = () => null;
   private live = false;
   private all = true;
 
@@ -48,15 +49,13 @@ export class Commands {
     this.everyone.addEventListener('click', () => events.everyone());
     const line = html('p', { class: 'addressees', 'aria-live': 'polite' }, html('span', { class: 'to' }, 'To'), this.to, this.everyone);
     root.append(line, row);
-    this.confirm = this.makeConfirm();
-    document.body.append(this.confirm);
   }
 
   /** Does what pressing the button would do, if it can be pressed. */
   press(what: Command): void {
     if (this.buttons.get(what)?.disabled !== false) return;
     if (what === What.goto) this.events.placing();
-    else if (what === What.launch) this.confirm.showModal();
+    else if (what === What.launch) this.events.launch();
     else this.events.order(what);
   }
 
@@ -71,7 +70,12 @@ export class Commands {
   setEnabled(enabled: boolean): void {
     this.live = enabled;
     this.showEnabled();
-    if (!enabled) this.confirm.close();
+  }
+
+  /** `mayNot` says why whoever sits here may not give an order, if so. */
+  setRights(mayNot: (what: Command) => string | null): void {
+    this.mayNot = mayNot;
+    this.showEnabled();
   }
 
   setPlacing(placing: boolean): void {
@@ -79,30 +83,10 @@ export class Commands {
   }
 
   private showEnabled(): void {
-    for (const [what, button] of this.buttons) button.disabled = !this.live || (FOR_ALL.has(what) && !this.all);
-  }
-
-  private makeConfirm(): HTMLDialogElement {
-    const cancel = html('button', { type: 'button', class: 'command', autofocus: true }, 'Cancel');
-    const launch = (what: typeof What.launch | typeof What.launchTogether, words: string) => {
-      const button = html('button', { type: 'button', class: 'command command-arm' }, words);
-      button.addEventListener('click', () => {
-        dialog.close();
-        this.events.order(what);
-      });
-      return button;
-    };
-    const dialog = html(
-      'dialog',
-      { class: 'confirm', 'aria-labelledby': 'confirm-title' },
-      html('h2', { id: 'confirm-title' }, 'Arm motors and take off?'),
-      html('p', {}, html('strong', {}, 'All vehicles')),
-      html('p', { class: 'muted' }, 'In turn: each when its own checks pass and the one before it is in the air. Together: all at once, when everyone is there and ready.'),
-    );
-    dialog.append(
-      html('div', { class: 'dialog-buttons' }, cancel, launch(What.launchTogether, 'Take off together'), launch(What.launch, 'Take off in turn')),
-    );
-    cancel.addEventListener('click', () => dialog.close());
-    return dialog;
+    for (const { what, title } of BUTTONS) {
+      const [button, mayNot] = [this.buttons.get(what)!, this.mayNot(what)];
+      button.disabled = !this.live || mayNot !== null || (FOR_ALL.has(what) && !this.all);
+      setAttribute(button, 'title', mayNot ?? title);
+    }
   }
 }

@@ -8,10 +8,14 @@ import { Connection, liveUrl } from './connection';
 import { html, part, setText } from './dom';
 import { EventsPanel } from './events-panel';
 import { Help } from './help';
+import { HolderPanel } from './holder-panel';
+import { holdingNews } from './holding';
 import { identities } from './identity';
 import { listenToKeys } from './keys';
+import { LaunchDialog } from './launch-dialog';
 import { Banner, Notices } from './notices';
 import { OrdersPanel } from './orders-panel';
+import { Person } from './person';
 import { Placing } from './placing';
 import type { ClientMessage, Command, Fleet, Point, Question, Scene, Script, ServerMessage } from './protocol';
 import { addresseeWords, Selection } from './selection';
@@ -33,7 +37,7 @@ const ANSWER_MS = 3000;
 
 /** An order that the station has not answered yet. */
 interface Sent {
-  what: What;
+  what: string;
   timer: number;
   point?: Point;
 }
@@ -59,9 +63,19 @@ const placing = new Placing(part('view').parentElement!, (on) => {
 });
 const commands = new Commands(part('commands'), {
   order: (what) => order(what),
+  launch: () => person.named(What.launch, () => launch.open()),
   placing: () => placing.toggle(),
   everyone: () => selection.set([]),
 });
+
+const person: Person = new Person(part('person'), (name) => send({ type: 'hello', tag: newTag(), name }), (why) => notices.show(`${why}.`));
+const holders = new HolderPanel(part('holders'), (what, to, name) =>
+  person.named(what, () => send({ type: 'order', tag: newTag(), what, to, ...(name && { name }) })),
+);
+const launch = new LaunchDialog(
+  (what) => send({ type: 'order', tag: newTag(), what, to: 'all' }),
+  (what, token) => send({ type: 'order', tag: newTag(), what, to: 'all', token }),
+);
 
 let fleet: Fleet = { type: 'fleet', time_s: 0, outcome: null, vehicles: [] };
 /** By tag. */
@@ -108,8 +122,18 @@ function receive(message: ServerMessage): void {
       vehicles.setGround(view.groundZ);
       break;
     case 'fleet':
+      tellHoldings(fleet, message);
       fleet = message;
       showFleet();
+      break;
+    case 'you':
+      settle(message.tag);
+      person.hear(message);
+      commands.setRights((what) => person.mayNot(what));
+      showAddressees();
+      break;
+    case 'offer':
+      if (settle(message.tag)) launch.show(message);
       break;
     case 'orders':
       orders.show(message.orders);
@@ -134,6 +158,14 @@ function receive(message: ServerMessage): void {
       notices.show(sent ? `${orderName(sent.what)} was refused: ${message.message}` : message.message);
       break;
     }
+  }
+}
+
+/** What whoever sits here must notice of who holds what. */
+function tellHoldings(before: Fleet, now: Fleet): void {
+  for (const vehicle of now.vehicles) {
+    const news = holdingNews(before.vehicles.find(({ name }) => name === vehicle.name), vehicle, person.name);
+    if (news) notices.show(news);
   }
 }
 
@@ -183,14 +215,17 @@ function askWhy(): void {
 function showAddressees(): void {
   const to = selection.addressees(names());
   commands.setAddressees(addresseeWords(to, fleet.vehicles.length), to === 'all');
+  const addressed = fleet.vehicles.filter(({ name }) => to === 'all' || to.includes(name));
+  holders.show(addressed, person.name, person.mayNot(What.take));
 }
 
 function order(what: Command, point?: Point): void {
-  send({ type: 'order', tag: newTag(), what, to: selection.addressees(names()), ...(point && { point }) });
+  const to = selection.addressees(names());
+  person.named(what, () => send({ type: 'order', tag: newTag(), what, to, ...(point && { point }) }));
 }
 
 function withdraw(name: string, to: string[]): void {
-  send({ type: 'order', tag: newTag(), what: What.unload, name, to });
+  person.named(What.unload, () => send({ type: 'order', tag: newTag(), what: What.unload, name, to }));
 }
 
 /** Asks the station what a script's file says. */
@@ -201,7 +236,7 @@ async function readScript(file: File): Promise<void> {
 function offer(script: Script): void {
   const to = selection.addressees(names());
   showScript(script, addresseeWords(to, fleet.vehicles.length), (values) =>
-    send({ type: 'order', tag: newTag(), what: What.load, to, script: { script: script.file, with: values } }),
+    person.named(What.load, () => send({ type: 'order', tag: newTag(), what: What.load, to, script: { script: script.file, with: values } })),
   );
 }
 
@@ -212,7 +247,7 @@ function newTag(): string {
 
 function send(request: Exclude<ClientMessage, Question>): void {
   const { tag } = request;
-  const what = request.type === 'order' ? request.what : What.load;
+  const what = request.type === 'order' ? request.what : request.type === 'hello' ? 'Your name' : What.load;
   const point = 'point' in request ? request.point : undefined;
   if (!connection.send(request)) {
     notices.show(`${orderName(what)} was not sent: there is no connection to the station.`);
@@ -254,8 +289,12 @@ function connectionChanged(live: boolean, retryMs: number): void {
   everLive ||= live;
   retryAt = performance.now() + retryMs;
   commands.setEnabled(live);
-  if (live) askWhy();
+  if (live) {
+    person.introduce();
+    askWhy();
+  }
   if (!live) {
+    launch.close();
     placing.set(false);
     const lost = [...unanswered.keys()].map(settle);
     if (lost.length > 0) notices.show('The connection was lost before the station answered the last order.');

@@ -27,6 +27,12 @@ lease_s: number | null, };
 
 export type Bounds = { min: [number, number, number], max: [number, number, number], };
 
+export type CandidateView = { name: string, task: string,
+/**
+ * The checks before take-off that do not pass.
+ */
+doubts: Array<string>, };
+
 /**
  * One reason for which a vehicle stands still, and what would end it.
  */
@@ -53,7 +59,7 @@ state: string, value: string, advice: string, };
 /**
  * A message of a browser.
  */
-export type ClientMessage = { "type": "order" } & OrderMessage | { "type": "why", vehicle: string | null, } | { "type": "read_script", tag: string | null, file: string, text: string, };
+export type ClientMessage = { "type": "hello", tag: string | null, name: string, } | { "type": "order" } & OrderMessage | { "type": "why", vehicle: string | null, } | { "type": "read_script", tag: string | null, file: string, text: string, };
 
 /**
  * An event that has happened.
@@ -90,11 +96,15 @@ export type OrderMessage = { tag?: string, what: What, to: To, point?: [number, 
  */
 script?: { script: unknown, with: Record<string, unknown> },
 /**
- * For `unload`: the name that the script runs under.
+ * For `unload`: the name that the script runs under. For `give`: to whom.
  */
-name?: string, };
+name?: string,
+/**
+ * For a launch: the token that the first message was answered with.
+ */
+token?: string, };
 
-export type OrderView = { id: number, what: string, script: string | null, time_s: number, answers: { [key in string]: AnswerView }, };
+export type OrderView = { id: number, by: string, what: string, script: string | null, time_s: number, answers: { [key in string]: AnswerView }, };
 
 export type OutcomeView = { succeeded: boolean, failed: { [key in string]: string }, };
 
@@ -114,6 +124,11 @@ priority: number | null,
  * The b-threads that block it at its home.
  */
 blocked_by: Array<Blocker>, };
+
+/**
+ * What a person or program may do at the console.
+ */
+export type Role = "observer" | "safety" | "operator";
 
 /**
  * A message for browsers.
@@ -142,7 +157,11 @@ changes: Array<Change>,
 /**
  * The doubts about all this.
  */
-doubts: Array<string>, } | { "type": "ordered", tag: string | null, id: number, } | { "type": "script", tag: string | null, script: unknown, } | { "type": "error", tag: string | null, message: string, };
+doubts: Array<string>, } | { "type": "you", tag: string | null, name: string | null, role: Role,
+/**
+ * Whether a certificate says so; otherwise whoever sits there does.
+ */
+certified: boolean, } | { "type": "offer", tag: string | null, token: string, what: string, lasts_s: number, vehicles: Array<CandidateView>, } | { "type": "ordered", tag: string | null, id: number, } | { "type": "script", tag: string | null, script: unknown, } | { "type": "error", tag: string | null, message: string, };
 
 /**
  * Where a vehicle is and what it does.
@@ -181,7 +200,15 @@ speed_m_s: number,
  */
 still_since_s: number | null, };
 
-export type StateView = { position: [number, number, number], velocity: [number, number, number], yaw_rad: number, radius_m: number, mode: string, armed: boolean, battery: number, task: string, waiting_for: string, mission: MissionView, path: Array<[number, number, number]>, scripts: Array<string>, };
+export type StateView = { position: [number, number, number], velocity: [number, number, number], yaw_rad: number, radius_m: number, mode: string, armed: boolean, battery: number, task: string, waiting_for: string, mission: MissionView, path: Array<[number, number, number]>, scripts: Array<string>,
+/**
+ * Whose orders it takes; empty while nobody holds it.
+ */
+holder: string,
+/**
+ * Who asks the holder for it; empty if nobody does.
+ */
+asked_by: string, };
 
 export type To = string | Array<string>;
 

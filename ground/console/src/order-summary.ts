@@ -1,5 +1,5 @@
 /**
- * What has become of an order, in one line: `Hold: 7 of 8 acknowledged, uav/3 missing`.
+ * What has become of an order, in one line: `Hold by Anna: 7 of 8 acknowledged, uav/3 missing`.
  */
 
 import type { Answer, Order } from './protocol';
@@ -18,7 +18,7 @@ export function orderSummary(order: Order): string {
   }
   if (pending > 0) parts.push(`${pending} pending`);
   const what = [orderName(order.what), order.script].filter(Boolean).join(' ');
-  return `${what}: ${parts.join(', ')}`;
+  return `${what}${order.by && ` by ${order.by}`}: ${parts.join(', ')}`;
 }
 
 /** How an order stands as a whole: the worst of its answers. */

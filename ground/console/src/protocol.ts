@@ -82,12 +82,30 @@ export type ServerMessage =
   | With<Told<'orders'>, { orders: Order[] }>
   | Told<'events'>
   | Why
+  | You
+  | Offer
   | With<Told<'ordered'>, { tag: string; id: number | null }>
   | With<Told<'script'>, { tag: string; script: Script }>
   | Told<'error'>;
 
+/** Who the station takes this browser for. */
+export type You = With<Told<'you'>, { tag: string }>;
+
+/** What a launch would launch. */
+export type Offer = With<Told<'offer'>, { tag: string; what: typeof What.launch | typeof What.launchTogether }>;
+
 /** The orders that have a button. */
-export type Command = Exclude<What, typeof What.handBack | typeof What.load | typeof What.unload>;
+export type Command = Exclude<
+  What,
+  | typeof What.handBack
+  | typeof What.load
+  | typeof What.unload
+  | typeof What.ask
+  | typeof What.give
+  | typeof What.take
+  | typeof What.release
+  | typeof What.keep
+>;
 
 /** A go-to's place; without a height every vehicle keeps its own. */
 export type Point = [x: number, y: number, z: number | null];
@@ -96,7 +114,7 @@ export type Point = [x: number, y: number, z: number | null];
 export type Question = Asked<'why'>;
 
 /** What this console says. But for questions, all of it is answered under its tag. */
-export type ClientMessage = ((Asked<'order'> | Asked<'read_script'>) & { tag: string }) | Question;
+export type ClientMessage = ((Asked<'order'> | Asked<'read_script'> | Asked<'hello'>) & { tag: string }) | Question;
 
 /** Reads a message of the station; `null` if it is none that this console knows. */
 export function readMessage(text: string): ServerMessage | null {
@@ -123,6 +141,10 @@ export function readMessage(text: string): ServerMessage | null {
       return { type: 'events', events: list(json.events, readEvent) };
     case 'why':
       return readWhy(json);
+    case 'you':
+      return readYou(json);
+    case 'offer':
+      return readOffer(json);
     case 'ordered':
       return { type: 'ordered', tag: string(json.tag), id: number(json.id) };
     case 'script':
@@ -136,6 +158,23 @@ export function readMessage(text: string): ServerMessage | null {
     default:
       return null;
   }
+}
+
+/** Whoever has no role that this console knows sees, and orders nothing. */
+function readYou(json: Raw<Told<'you'>>): You {
+  const role = json.role === 'operator' || json.role === 'safety' ? json.role : 'observer';
+  return { type: 'you', tag: string(json.tag), name: string(json.name) || null, role, certified: json.certified === true };
+}
+
+function readOffer(json: Raw<Told<'offer'>>): Offer | null {
+  const [token, what] = [string(json.token), json.what];
+  if (!token || (what !== What.launch && what !== What.launchTogether)) return null;
+  const vehicles = list(json.vehicles, ({ name, task, doubts }: Raw<station.CandidateView>) => ({
+    name: string(name),
+    task: string(task),
+    doubts: strings(doubts),
+  }));
+  return { type: 'offer', tag: string(json.tag), token, what, lasts_s: number(json.lasts_s) ?? 0, vehicles };
 }
 
 function readScene(json: Raw<Told<'scene'>>): Scene {
@@ -190,6 +229,8 @@ function readVehicle(json: Raw<station.VehicleView | station.StateView>): Vehicl
     mission: json.mission === 'complete' || json.mission === 'failed' || json.mission === 'under_way' ? json.mission : null,
     path: Array.isArray(json.path) ? json.path.map(vector).filter((point) => point !== null) : [],
     scripts: strings(json.scripts),
+    holder: string(json.holder),
+    asked_by: string(json.asked_by),
     link: { alive: link.alive === true, age_ms: number(link.age_ms) },
     notes: strings(json.notes),
     checks: list(json.checks, readCheck),
@@ -237,6 +278,7 @@ function readOrder(json: Raw<station.OrderView>): Order | null {
   const answers = isRecord(json.answers) ? json.answers : {};
   return {
     id,
+    by: string(json.by),
     what: string(json.what),
     script: string(json.script),
     time_s: number(json.time_s) ?? 0,

@@ -99,6 +99,7 @@ export class VehiclesPanel {
 class Row {
   readonly element: HTMLLIElement;
   private readonly mode = html('span', { class: 'mode' });
+  private readonly holder = html('span', { class: 'holder' });
   private readonly height = html('span', { class: 'number' });
   private readonly speed = html('span', { class: 'number' });
   private readonly charge = html('span', { class: 'charge' });
@@ -120,7 +121,7 @@ class Row {
       this.speed,
       this.battery,
       this.link,
-      html('span', { class: 'doing' }, this.task, this.waiting),
+      html('span', { class: 'doing' }, this.task, this.waiting, this.holder),
       this.notes,
     );
   }
@@ -132,6 +133,11 @@ class Row {
     setAttribute(element, 'data-mode', vehicle.heard ? vehicle.mode : '');
     setAttribute(element, 'data-mission', vehicle.mission);
     setText(this.mode, vehicle.heard ? spaced(vehicle.mode) : '');
+
+    setText(this.holder, vehicle.holder);
+    setAttribute(this.holder, 'title', vehicle.holder ? `${vehicle.holder} commands it${vehicle.asked_by && `; ${vehicle.asked_by} asks for it`}` : null);
+    setAttribute(this.holder, 'data-asked', vehicle.asked_by || null);
+    this.holder.hidden = !vehicle.holder;
 
     const speed = vehicle.velocity && Math.hypot(...vehicle.velocity);
     setText(this.height, vehicle.position ? `${(vehicle.position[2] - groundZ).toFixed(1)} m` : '–');

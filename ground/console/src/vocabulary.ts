@@ -14,8 +14,16 @@ export const What = {
   handBack: 'hand_back',
   load: 'load',
   unload: 'unload',
+  ask: 'ask',
+  give: 'give',
+  take: 'take',
+  release: 'release',
+  keep: 'keep',
 } as const;
 export type What = (typeof What)[keyof typeof What];
 
 /** These are decided for everyone, whoever is selected. */
 export const FOR_ALL: ReadonlySet<What> = new Set([What.launch, What.launchTogether, What.abort]);
+
+/** These bring vehicles to a stop, home, or down. */
+export const FOR_SAFETY: ReadonlySet<What> = new Set([What.hold, What.land, What.return, What.abort]);

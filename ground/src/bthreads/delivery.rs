@@ -6,7 +6,7 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::NodeName;
 use skein_dbp::facts::Unknown;
-use skein_wire::event::{Declared as _, Events as _, OrderGiven, OrderTaken};
+use skein_wire::event::{Declared as _, Events as _, OrderGiven, OrderTaken, Overruled};
 
 use crate::order::ordered_for;
 
@@ -39,8 +39,14 @@ impl Delivery {
 
     /// What is to be brought, if the order is not carried out by the station itself.
     fn to_bring(&self, given: &OrderGiven) -> Option<Event> {
-        let OrderGiven { what, x, y, z, .. } = *given;
-        what.reaches_vehicle().then(|| OrderTaken { what, x, y, z, by: None }.at(&self.vehicle))
+        let &OrderGiven { what, x, y, z, ref by, .. } = given;
+        let order = OrderTaken { x, y, z, ..OrderTaken::plain(what, by) };
+        what.reaches_vehicle().then(|| order.at(&self.vehicle))
+    }
+
+    /// Somebody else holds the vehicle, which heeds no other.
+    fn overruled(&self) -> EventSet {
+        Overruled::any_at(&self.ground).and(Overruled::vehicle(&self.vehicle))
     }
 
     /// The vehicle has restarted and may have taken the order or not. To repeat it does no harm if it brings it down.
@@ -53,7 +59,7 @@ impl BThread for Delivery {
     fn bid(&self) -> Option<Bid> {
         let bid = Bid::new().wait_for(ordered_for(&self.ground, &self.vehicle));
         let Some(order) = &self.order else { return Some(bid) };
-        let bid = bid.request(order.clone()).wait_for(self.unknown(order));
+        let bid = bid.request(order.clone()).wait_for(self.unknown(order)).wait_for(self.overruled());
         Some(match self.until {
             Some(until) => bid.deadline(until),
             None => bid,
@@ -69,7 +75,7 @@ impl BThread for Delivery {
                 self.until = given.what.sets_going().then(|| cx.now() + GOING_LASTS);
             }
         } else if self.order.as_ref() == Some(event) || self.until.is_some() {
-            // It is taken, or has waited too long, or its vehicle begins a life of which its operator knows nothing.
+            // It is taken, or has waited too long, or another holds the vehicle, or its vehicle begins a life of which its operator knows nothing.
             self.order = None;
         }
     }

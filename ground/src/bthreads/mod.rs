@@ -3,23 +3,23 @@
 //! Adding a b-thread: write its file, name it in [`load`]. One in a crate of one's own is a
 //! [`Behaviour`](skein_bp::behaviour::Behaviour).
 
+mod beside_delivery;
 mod delivery;
 mod hold;
 mod launch;
 mod muster;
 pub mod roll_call;
-mod script_delivery;
 mod together;
 mod watch;
 
 use skein_bp::Program;
 
+pub use beside_delivery::BesideDelivery;
 pub use delivery::{Delivery, GOING_LASTS};
 pub use hold::Hold;
 pub use launch::Launch;
 pub use muster::Muster;
 pub use roll_call::RollCall;
-pub use script_delivery::ScriptDelivery;
 pub use together::{LAUNCH_LASTS, Together};
 pub use watch::{MissionOutcome, Watch};
 
@@ -38,8 +38,10 @@ pub fn load(program: &mut Program, config: &GroundConfig) {
     program.add(Watch::NAME, Watch::new(ground.clone(), vehicles.iter().cloned()));
     for vehicle in vehicles {
         program.add(Delivery::name(vehicle), Delivery::new(ground.clone(), vehicle.clone()));
-        let scripts = ScriptDelivery::new(ground.clone(), vehicle.clone());
-        program.add(ScriptDelivery::name(vehicle), scripts);
+        let scripts = BesideDelivery::of_scripts(ground.clone(), vehicle.clone());
+        program.add(BesideDelivery::name_for_scripts(vehicle), scripts);
+        let handovers = BesideDelivery::of_handovers(ground.clone(), vehicle.clone());
+        program.add(BesideDelivery::name_for_handovers(vehicle), handovers);
     }
     config.behaviours.load(&config.host(), program);
 }

@@ -1,7 +1,9 @@
 //! The program of a ground station: see `skein-ground --help`.
 
+mod caller;
 mod certificates;
 mod explain;
+mod order;
 mod recording;
 mod serve;
 
@@ -20,7 +22,7 @@ use crate::config_file::Config;
     name = "skein-ground",
     version,
     max_term_width = 80,
-    after_help = "Exit codes: 0 done, 1 the mission failed or nothing can be explained, 2 wrong usage or input."
+    after_help = "Exit codes: 0 done, 1 the mission failed, an order was not taken in by all or nothing can be explained, 2 wrong usage or input."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -46,6 +48,8 @@ enum Command {
     },
     /// Make a fleet's authority and the certificates of its nodes, or renew them.
     Certificates(certificates::Certificates),
+    #[command(flatten)]
+    Order(order::OrderCommand),
     /// Explain why vehicles of a recorded mission moved or stood still: who requested what, who blocked it, and what
     /// would have to change.
     Explain {
@@ -72,6 +76,7 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
             serve(config, &known, *until_over, *incarnation, cli.json)
         }
         Command::Certificates(args) => certificates::run(args, cli.json),
+        Command::Order(order) => order::run(order, cli.json),
         Command::Explain { file, at, vehicle } => explain::run(file, *at, vehicle.as_deref(), cli.json),
     };
     match outcome {

@@ -86,7 +86,7 @@ impl Station {
             config.station.forgot = true;
             config.station.launch_on_order = true;
         }
-        let mut console = Console::serve(config.console, {
+        let mut console = Console::serve(config.console, config.console_security.as_ref(), {
             let bell = bell.clone();
             move || bell.ring()
         })?;
@@ -134,13 +134,13 @@ impl Station {
         self.link.bell().wait(TICK);
         let now = self.began.elapsed();
         for wish in self.console.take_orders() {
-            tracing::info!("ordered: {} for {}", wish.order.what(), wish.order.who());
-            let given = self.core.order(&wish.order);
-            wish.answer(given);
+            tracing::info!("{wish}");
+            wish.carry_out(&mut self.core);
         }
         self.incarnation.go_on(now);
         self.core.note_disk("incarnation", self.incarnation.trouble());
         self.core.note_disk("recording", self.recording.trouble().as_deref());
+        self.core.attend(self.console.present());
         if let Err(error) = self.core.tick(now, &mut self.link) {
             tracing::error!("{error}");
             self.recording.note(now, Level::Error, self.core.name().as_str(), &error.to_string());

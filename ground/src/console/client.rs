@@ -9,9 +9,10 @@ use tokio::task::JoinSet;
 use tokio::time::timeout;
 
 use super::feed::Message;
-use super::request::{self, Mailbox, Request};
+use super::request::{self, Granted, Mailbox, OrderMessage, Request};
+use super::session::Session;
 use super::subscription::{Pictures, Question, Reasons, Subscription, Text};
-use crate::order::Order;
+use super::token;
 
 /// A browser that takes nothing for this long is let go.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -26,9 +27,17 @@ type Read = (Option<String>, Result<Request, String>);
 struct Gone;
 
 /// Attends a browser until it goes.
-pub(super) async fn attend(mut socket: WebSocket, mut subscription: Subscription, mailbox: &Mailbox) {
+pub(super) async fn attend(
+    mut socket: WebSocket,
+    mut session: Session,
+    mut subscription: Subscription,
+    mailbox: &Mailbox,
+) {
     let history = subscription.history();
-    let mut outcome = say(&mut socket, &Message::events(history.iter())).await;
+    let mut outcome = say(&mut socket, &Message::you(&session, None)).await;
+    if outcome.is_ok() {
+        outcome = say(&mut socket, &Message::events(history.iter())).await;
+    }
     let mut shown = Pictures::new();
     let mut question: Option<Question> = None;
     let mut readings = JoinSet::new();
@@ -41,7 +50,7 @@ pub(super) async fn attend(mut socket: WebSocket, mut subscription: Subscription
                     Some(text) if request::takes_long(&text) => look_at(text, &mut readings, &mut socket).await,
                     Some(text) => {
                         let request = request::read(&text);
-                        answer(request, &mut socket, &mut question, &subscription, mailbox).await
+                        answer(request, &mut socket, &mut session, &mut question, &subscription, mailbox).await
                     }
                     None if matches!(message, ws::Message::Close(_)) => Err(Gone),
                     None => Ok(()),
@@ -49,7 +58,7 @@ pub(super) async fn attend(mut socket: WebSocket, mut subscription: Subscription
                 Some(Err(_)) | None => Err(Gone),
             },
             Some(Ok(request)) = readings.join_next() => {
-                answer(request, &mut socket, &mut question, &subscription, mailbox).await
+                answer(request, &mut socket, &mut session, &mut question, &subscription, mailbox).await
             },
             pictures = newest(&mut subscription.pictures) => match pictures {
                 Ok(pictures) => show(&mut socket, pictures, &mut shown).await,
@@ -128,6 +137,7 @@ async fn look_at(text: String, readings: &mut JoinSet<Read>, socket: &mut WebSoc
 async fn answer(
     (tag, request): Read,
     socket: &mut WebSocket,
+    session: &mut Session,
     question: &mut Option<Question>,
     subscription: &Subscription,
     mailbox: &Mailbox,
@@ -138,23 +148,35 @@ async fn answer(
             Ok(())
         }
         Ok(Request::Script(script)) => say(socket, &Message::Script { tag, script }).await,
-        Ok(Request::Order(order)) => give(socket, tag, order, mailbox).await,
+        Ok(Request::Order(order)) => give(socket, session, tag, *order, mailbox).await,
+        Ok(Request::Hello(name)) => {
+            let answer = match session.introduce(&name) {
+                Ok(()) => Message::you(session, tag),
+                Err(message) => Message::Error { tag, message },
+            };
+            say(socket, &answer).await
+        }
         Err(message) => say(socket, &Message::Error { tag, message }).await,
     }
 }
 
 async fn give(
     socket: &mut WebSocket,
+    session: &Session,
     tag: Option<String>,
-    order: Order,
+    order: OrderMessage,
     mailbox: &Mailbox,
 ) -> Result<(), Gone> {
-    let given = match mailbox.put(order) {
-        Ok(given) => given.await.map_err(|_| "the station is ending".to_owned()),
-        Err(why) => Err(why.to_owned()),
-    };
-    match given.and_then(|given| given.map_err(|stranger| stranger.to_string())) {
-        Ok(id) => say(socket, &Message::Ordered { tag, id }).await,
+    match wish(session, order, mailbox).await {
+        Ok(Granted::Ordered(id)) => say(socket, &Message::Ordered { tag, id }).await,
+        Ok(Granted::Offered(offer)) => say(socket, &Message::offer(tag, &offer)).await,
         Err(message) => say(socket, &Message::Error { tag, message }).await,
     }
+}
+
+/// What the station makes of a request. Rights are looked at before anything else is.
+async fn wish(session: &Session, order: OrderMessage, mailbox: &Mailbox) -> Result<Granted, String> {
+    let by = session.giver(order.what)?;
+    let given = mailbox.put(by, order.wanted(token::random)?)?.await;
+    given.map_err(|_| "the station is ending".to_owned())?.map_err(|refusal| refusal.to_string())
 }

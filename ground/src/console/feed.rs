@@ -9,15 +9,19 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use serde::Serialize;
-use skein_bp::Value;
 use skein_bp::script::ScriptFile;
+use skein_bp::{Event, Value};
+use skein_dbp::facts::Stalled;
 use skein_dbp::{Happened, NodeName, Peer};
-use skein_wire::event::{Advance, Declared as _, Homeward};
+use skein_wire::event::{Advance, Declared as _, Homeward, What};
 use skein_wire::{Check, Form, MissionState, Scene, SenderStats, State};
 
+use super::session::{Role, Session};
 use super::subscription::{Broadcast, Subscription, Text};
 use crate::core::GroundCore;
 use crate::explain::Explanation;
+use crate::giver::Giver;
+use crate::launch_offer::{Candidate, LaunchOffer, OFFER_LASTS};
 use crate::order_log::{Answer, OrderRecord};
 
 /// The swarm is shown this often.
@@ -61,6 +65,22 @@ pub(super) enum Message<'a> {
         headline: String,
         #[serde(flatten)]
         explanation: Explanation,
+    },
+    /// Who the station takes this browser for, and what it may do.
+    You {
+        tag: Option<String>,
+        name: Option<&'a str>,
+        role: Role,
+        /// Whether a certificate says so; otherwise whoever sits there does.
+        certified: bool,
+    },
+    /// What a launch would launch: return the token in time, and it is ordered.
+    Offer {
+        tag: Option<String>,
+        token: &'a str,
+        what: &'static str,
+        lasts_s: f64,
+        vehicles: Vec<CandidateView<'a>>,
     },
     /// An order is given, under this number.
     Ordered {
@@ -159,6 +179,19 @@ pub(super) struct StateView<'a> {
     mission: MissionView,
     path: Vec<[f64; 3]>,
     scripts: &'a [String],
+    /// Whose orders it takes; empty while nobody holds it.
+    holder: &'a str,
+    /// Who asks the holder for it; empty if nobody does.
+    asked_by: &'a str,
+}
+
+#[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct CandidateView<'a> {
+    name: &'a str,
+    task: &'a str,
+    /// The checks before take-off that do not pass.
+    doubts: &'a [String],
 }
 
 #[derive(Serialize)]
@@ -174,6 +207,7 @@ pub(super) enum MissionView {
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(super) struct OrderView<'a> {
     id: u64,
+    by: &'a str,
     what: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     script: Option<&'a str>,
@@ -266,7 +300,9 @@ impl Feed {
         let tells = |happened: &&Happened| {
             // Leaves to move are ten a second for each vehicle; what keeps one back shows as `stalled`.
             let repeated = matches!(happened.event.kind(), Advance::NAME | Homeward::NAME);
-            !(repeated || happened.home == *station && is_about_leave(happened))
+            // Whoever holds a vehicle goes on holding it.
+            let kept = happened.event.text("what") == Some(What::Keep.word());
+            !(repeated || kept || happened.home == *station && is_about_leave(happened))
         };
         let told: Vec<&Happened> = happened.iter().filter(tells).collect();
         if !told.is_empty() {
@@ -278,6 +314,26 @@ impl Feed {
 impl<'a> Message<'a> {
     pub(super) fn events(happened: impl Iterator<Item = &'a Happened>) -> Self {
         Self::Events { events: happened.map(event_view).collect() }
+    }
+
+    pub(super) fn you(session: &'a Session, tag: Option<String>) -> Self {
+        let name = session.name().map(Giver::as_str);
+        Self::You { tag, name, role: session.role(), certified: session.is_certified() }
+    }
+
+    pub(super) fn offer(tag: Option<String>, offer: &'a LaunchOffer) -> Self {
+        let view = |Candidate { vehicle, task, doubts }: &'a Candidate| CandidateView {
+            name: vehicle.as_str(),
+            task,
+            doubts,
+        };
+        Self::Offer {
+            tag,
+            token: &offer.token,
+            what: offer.what.word(),
+            lasts_s: OFFER_LASTS.as_secs_f64(),
+            vehicles: offer.candidates.iter().map(view).collect(),
+        }
     }
 
     /// No message holds a map with keys that are no texts, so that writing it cannot fail.
@@ -383,6 +439,8 @@ fn state_view(state: &State) -> StateView<'_> {
         },
         path: state.path.iter().map(array).collect(),
         scripts: &state.scripts,
+        holder: &state.holder,
+        asked_by: &state.asked_by,
     }
 }
 
@@ -395,11 +453,17 @@ fn order_view(record: &OrderRecord) -> OrderView<'_> {
     };
     OrderView {
         id: record.id,
+        by: record.by.as_str(),
         what: record.order.what().word(),
         script: record.order.script(),
         time_s: record.at.as_secs_f64(),
         answers: record.answers.iter().map(|(vehicle, said)| (vehicle.as_str(), answer(said))).collect(),
     }
+}
+
+/// Who blocks what is stalled; in other events `by` is somebody else.
+fn stalled_by(event: &Event) -> Option<&str> {
+    event.text("by").filter(|_| event.kind() == Stalled::NAME)
 }
 
 fn event_view(happened: &Happened) -> EventView<'_> {
@@ -410,6 +474,6 @@ fn event_view(happened: &Happened) -> EventView<'_> {
         name: happened.event.name(),
         data: happened.event.data().collect(),
         requested_by: &happened.requested_by,
-        blocked_by: happened.event.text("by").into_iter().collect(),
+        blocked_by: stalled_by(&happened.event).into_iter().collect(),
     }
 }

@@ -4,16 +4,23 @@
 //! [`publish`](Console::publish) and asks it for orders with [`take_orders`](Console::take_orders); neither ever waits. A
 //! browser that does not read gets the newest when it does; it holds up nobody.
 //!
-//! Only this computer can open it, and only pages that it serves itself may speak to it.
+//! On the loopback interface only this computer can open it, and anybody on it may be anybody. Beyond it, TLS only: a
+//! browser shows a certificate of the fleet's authority, which has a [`Role`]. Only pages that it serves itself may speak
+//! to it.
 
 mod client;
 mod feed;
+mod listener;
 mod request;
 mod server;
+mod session;
 mod subscription;
 #[cfg(test)]
 mod tests;
+mod tls;
+mod token;
 
+use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
@@ -23,8 +30,11 @@ use skein_wire::Scene;
 use tokio::sync::oneshot;
 
 pub use self::request::Wish;
-use self::{feed::Feed, request::Mailbox};
+pub use self::session::Role;
+pub use self::tls::{ConsoleSecurity, ConsoleSecurityError};
+use self::{feed::Feed, request::Mailbox, subscription::Present};
 use crate::core::GroundCore;
+use crate::giver::Giver;
 
 /// So many orders may wait for the station's loop.
 const ORDERS_WAITING: usize = 64;
@@ -33,9 +43,12 @@ const ORDERS_WAITING: usize = 64;
 #[derive(Debug, thiserror::Error)]
 pub enum ConsoleError {
     #[error(
-        "console address `{address}` is not on the loopback interface: use 127.0.0.1, and a tunnel from elsewhere"
+        "console address `{address}` is not on the loopback interface, and beyond it the console is served over TLS only: \
+         use 127.0.0.1 and a tunnel, or give [console] certificates and [console.roles]"
     )]
     NotLoopback { address: SocketAddr },
+    #[error(transparent)]
+    Security(#[from] ConsoleSecurityError),
     #[error("console address `{address}`: {source}; use another port, or 0 for any that is free")]
     Listen { address: SocketAddr, source: std::io::Error },
     #[error("the console's thread cannot be started: {0}")]
@@ -45,17 +58,29 @@ pub enum ConsoleError {
 /// The console's server. It ends when this is dropped.
 pub struct Console {
     address: SocketAddr,
+    scheme: &'static str,
     feed: Feed,
+    present: Present,
     orders: Receiver<Wish>,
     _stop: oneshot::Sender<()>,
 }
 
 impl Console {
     /// Serves the console at `address`; port 0 is any free one. `wake` is called when an order waits to be taken.
-    pub fn serve(address: SocketAddr, wake: impl Fn() + Send + Sync + 'static) -> Result<Self, ConsoleError> {
-        if !address.ip().is_loopback() {
+    ///
+    /// # Errors
+    /// [`ConsoleError`]: the address is not free, or beyond the loopback interface without `security`; a certificate
+    /// cannot be used.
+    pub fn serve(
+        address: SocketAddr,
+        security: Option<&ConsoleSecurity>,
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> Result<Self, ConsoleError> {
+        if security.is_none() && !address.ip().is_loopback() {
             return Err(ConsoleError::NotLoopback { address });
         }
+        let tls = security.map(ConsoleSecurity::open).transpose()?;
+        let scheme = if tls.is_some() { "https" } else { "http" };
         let listen = |source| ConsoleError::Listen { address, source };
         let listener = std::net::TcpListener::bind(address).map_err(listen)?;
         listener.set_nonblocking(true).map_err(listen)?;
@@ -64,13 +89,15 @@ impl Console {
         let (feed, subscription) = Feed::new();
         let (stop, stopped) = oneshot::channel();
         let mailbox = Mailbox::new(put, wake);
-        server::start(listener, subscription, mailbox, stopped).map_err(ConsoleError::Thread)?;
-        Ok(Self { address: bound, feed, orders, _stop: stop })
+        let present = Present::default();
+        server::start((listener, tls), (subscription, present.clone()), mailbox, stopped)
+            .map_err(ConsoleError::Thread)?;
+        Ok(Self { address: bound, scheme, feed, present, orders, _stop: stop })
     }
 
     /// The address for a browser.
     pub fn url(&self) -> String {
-        format!("http://{}", self.address)
+        format!("{}://{}", self.scheme, self.address)
     }
 
     /// Shows what stands in the world, if that is known.
@@ -83,8 +110,13 @@ impl Console {
         self.feed.publish(now, station, happened);
     }
 
-    /// The orders that operators have given since the last call.
+    /// What operators have wished for since the last call: see [`Wish::carry_out`].
     pub fn take_orders(&self) -> impl Iterator<Item = Wish> + '_ {
         self.orders.try_iter()
+    }
+
+    /// Those who are there now to give orders: see [`GroundCore::attend`].
+    pub fn present(&self) -> BTreeSet<Giver> {
+        self.present.names()
     }
 }

@@ -9,27 +9,65 @@ use skein_dbp::NodeName;
 use skein_wire::event::{OrderGiven, What};
 use tokio::sync::oneshot;
 
-use crate::core::UnknownVehicle;
+use crate::core::GroundCore;
+use crate::giver::Giver;
+use crate::launch_offer::LaunchOffer;
 use crate::order::{Destination, Order, SentScript, Who};
+use crate::refusal::Refusal;
 
-/// An operator's order that waits for the station.
+/// What somebody wants of the station.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Wanted {
+    Order(Order),
+    /// To be told what this launch would launch, under this token.
+    Offer(What, String),
+    /// The launch that was offered under this token.
+    Launch(String),
+}
+
+/// What somebody wants, on its way to the station.
 pub struct Wish {
-    pub order: Order,
+    by: Giver,
+    wanted: Wanted,
     answer: oneshot::Sender<Given>,
 }
 
-/// The number under which the station has given an order, or why it has not.
-pub(super) type Given = Result<u64, UnknownVehicle>;
+/// What the station has made of a wish, or why nothing.
+pub(super) type Given = Result<Granted, Refusal>;
+
+/// What the station has made of a wish.
+#[derive(Debug)]
+pub(super) enum Granted {
+    /// The number under which it has given an order.
+    Ordered(u64),
+    Offered(LaunchOffer),
+}
 
 impl Wish {
-    /// Tells the browser what the station has made of it.
-    pub fn answer(self, given: Result<u64, UnknownVehicle>) {
+    /// Has the station do it, and tells the browser what came of it.
+    pub fn carry_out(self, station: &mut GroundCore) {
+        let Self { by, wanted, answer } = self;
+        let granted = match wanted {
+            Wanted::Order(order) => station.order(&by, &order).map(Granted::Ordered),
+            Wanted::Offer(what, token) => station.offer_launch(&by, what, token).map(Granted::Offered),
+            Wanted::Launch(token) => station.launch(&by, &token).map(Granted::Ordered),
+        };
         // Who asked may have closed the page.
-        let _ = self.answer.send(given);
+        let _ = answer.send(granted);
     }
 }
 
-/// The box into which browsers put their orders.
+impl std::fmt::Display for Wish {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.wanted {
+            Wanted::Order(order) => write!(f, "{} orders {} for {}", self.by, order.what(), order.who()),
+            Wanted::Offer(what, _) => write!(f, "{} asks what {what} would launch", self.by),
+            Wanted::Launch(_) => write!(f, "{} confirms a launch", self.by),
+        }
+    }
+}
+
+/// The box into which browsers put their wishes.
 #[derive(Clone)]
 pub(super) struct Mailbox {
     put: SyncSender<Wish>,
@@ -41,20 +79,22 @@ impl Mailbox {
         Self { put, wake: Arc::new(wake) }
     }
 
-    /// Hands an order to the station; its number follows once it is given.
-    pub(super) fn put(&self, order: Order) -> Result<oneshot::Receiver<Given>, &'static str> {
-        let (answer, number) = oneshot::channel();
-        self.put.try_send(Wish { order, answer }).map_err(|_| "too many orders wait for the station")?;
+    /// Hands a wish to the station; what came of it follows.
+    pub(super) fn put(&self, by: Giver, wanted: Wanted) -> Result<oneshot::Receiver<Given>, &'static str> {
+        let (answer, given) = oneshot::channel();
+        self.put.try_send(Wish { by, wanted, answer }).map_err(|_| "too many orders wait for the station")?;
         (self.wake)();
-        Ok(number)
+        Ok(given)
     }
 }
 
 /// The request of a browser.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 pub(super) enum Request {
-    /// That something is done.
-    Order(Order),
+    /// To be known by this name from now on.
+    Hello(String),
+    /// That something is done. It is read when it is known that whoever asks may.
+    Order(Box<OrderMessage>),
     /// To be told why this vehicle does what it does, from now on; none: nothing more.
     Why(Option<NodeName>),
     /// To be told what a script's file says: its purpose and its parameters.
@@ -67,6 +107,11 @@ pub(super) enum Request {
 #[cfg_attr(test, ts(rename = "ClientMessage"))]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub(super) enum Message {
+    /// Says who speaks: whatever sets vehicles going needs a name.
+    Hello {
+        tag: Option<String>,
+        name: String,
+    },
     Order(Box<OrderMessage>),
     Why {
         #[cfg_attr(test, ts(type = "string | null"))]
@@ -79,14 +124,14 @@ pub(super) enum Message {
     },
 }
 
-#[derive(Deserialize)]
+#[derive(Debug, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(super) struct OrderMessage {
     #[serde(default)]
     #[cfg_attr(test, ts(optional))]
     tag: Option<String>,
     #[cfg_attr(test, ts(type = "What"))]
-    what: What,
+    pub(super) what: What,
     to: To,
     #[serde(default)]
     #[cfg_attr(test, ts(optional))]
@@ -95,13 +140,17 @@ pub(super) struct OrderMessage {
     #[serde(default)]
     #[cfg_attr(test, ts(optional, type = "{ script: unknown, with: Record<string, unknown> }"))]
     script: Option<Assignment>,
-    /// For `unload`: the name that the script runs under.
+    /// For `unload`: the name that the script runs under. For `give`: to whom.
     #[serde(default)]
     #[cfg_attr(test, ts(optional))]
     name: Option<String>,
+    /// For a launch: the token that the first message was answered with.
+    #[serde(default)]
+    #[cfg_attr(test, ts(optional))]
+    token: Option<String>,
 }
 
-#[derive(Deserialize)]
+#[derive(Debug, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(untagged)]
 enum To {
@@ -139,13 +188,28 @@ pub(super) fn tag(text: &str) -> Option<String> {
 /// Reads a message: its tag, and what is asked for or what is wrong with it.
 pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
     match serde_json::from_str::<Message>(text) {
-        Ok(Message::Order(message)) => (message.tag.clone(), order(*message).map(Request::Order)),
+        Ok(Message::Hello { tag, name }) => (tag, Ok(Request::Hello(name))),
+        Ok(Message::Order(message)) => (message.tag.clone(), Ok(Request::Order(message))),
         Ok(Message::Why { vehicle }) => (None, Ok(Request::Why(vehicle))),
         Ok(Message::ReadScript { tag, file, text }) => {
             let script = ScriptFile::parse(&file, &text).map_err(|error| error.to_string());
             (tag, script.map(|script| Request::Script(Box::new(script))))
         }
         Err(error) => (None, Err(format!("not an order or a question: {error}"))),
+    }
+}
+
+impl OrderMessage {
+    /// What is wanted; a launch without its token is to be offered under `token`.
+    pub(super) fn wanted(mut self, token: impl FnOnce() -> Result<String, String>) -> Result<Wanted, String> {
+        let returned = self.token.take();
+        let order = order(self)?;
+        match (order.what(), returned) {
+            (what, None) if what.is_launch() => Ok(Wanted::Offer(what, token()?)),
+            (what, Some(token)) if what.is_launch() => Ok(Wanted::Launch(token)),
+            (what, Some(_)) => Err(format!("{what} takes no `token`")),
+            (_, None) => Ok(Wanted::Order(order)),
+        }
     }
 }
 
@@ -171,6 +235,10 @@ fn order(OrderMessage { what, to, point, script, name, .. }: OrderMessage) -> Re
             Order::Load(who, SentScript::new(&script).map_err(|error| error.to_string())?)
         }
         What::Unload => Order::Unload(who, name.ok_or("`unload` needs the `name` of a script")?),
+        What::Give => {
+            let to = name.ok_or("`give` needs the `name` of a person or program")?;
+            Order::Give(who, Giver::new(&to).map_err(|error| error.to_string())?)
+        }
         What::GoTo => {
             let (x, y, z) = point.ok_or("`goto` needs a `point`: [x, y, z or null], metres")?;
             let finite = x.is_finite() && y.is_finite() && z.is_none_or(f64::is_finite);
@@ -187,13 +255,31 @@ fn order(OrderMessage { what, to, point, script, name, .. }: OrderMessage) -> Re
 mod tests {
     use super::*;
 
+    fn wanted(text: &str) -> Result<Wanted, String> {
+        match read(text).1? {
+            Request::Order(message) => message.wanted(|| Ok("7".into())),
+            _ => Err("it is no order".into()),
+        }
+    }
+
     #[test]
     fn orders_are_read_for_one_for_some_and_for_all() {
-        let (tag, hold) = read(r#"{"type":"order","tag":"7","what":"hold","to":"all"}"#);
-        assert_eq!((tag.as_deref(), hold), (Some("7"), Ok(Request::Order(Order::Hold(Who::All)))));
-        let (_, goto) = read(r#"{"type":"order","what":"goto","to":["uav/3"],"point":[1,-2.5,null]}"#);
-        let who = Who::only(NodeName::new("uav/3").unwrap());
-        assert_eq!(goto, Ok(Request::Order(Order::GoTo(who, Destination { x: 1.0, y: -2.5, z: None }))));
+        let hold = r#"{"type":"order","tag":"7","what":"hold","to":"all"}"#;
+        assert_eq!(read(hold).0.as_deref(), Some("7"));
+        assert_eq!(wanted(hold), Ok(Wanted::Order(Order::Hold(Who::All))));
+        let goto = wanted(r#"{"type":"order","what":"goto","to":["uav/3"],"point":[1,-2.5,null]}"#);
+        let who = || Who::only(NodeName::new("uav/3").unwrap());
+        assert_eq!(goto, Ok(Wanted::Order(Order::GoTo(who(), Destination { x: 1.0, y: -2.5, z: None }))));
+        let give = wanted(r#"{"type":"order","what":"give","to":["uav/3"],"name":"Ben"}"#);
+        assert_eq!(give, Ok(Wanted::Order(Order::Give(who(), Giver::new("Ben").unwrap()))));
+    }
+
+    #[test]
+    fn a_launch_is_offered_first_and_given_for_its_token() {
+        let first = wanted(r#"{"type":"order","what":"launch","to":"all"}"#);
+        assert_eq!(first, Ok(Wanted::Offer(What::Launch, "7".into())));
+        let second = wanted(r#"{"type":"order","what":"launch","to":"all","token":"ab"}"#);
+        assert_eq!(second, Ok(Wanted::Launch("ab".into())));
     }
 
     #[test]
@@ -211,9 +297,12 @@ mod tests {
 
     #[test]
     fn a_question_is_about_one_vehicle_or_none() {
-        let vehicle = NodeName::new("uav/3").unwrap();
-        assert_eq!(read(r#"{"type":"why","vehicle":"uav/3"}"#).1, Ok(Request::Why(Some(vehicle))));
-        assert_eq!(read(r#"{"type":"why","vehicle":null}"#).1, Ok(Request::Why(None)));
+        let asked = |text: &str| match read(text).1 {
+            Ok(Request::Why(vehicle)) => vehicle.map(|vehicle| vehicle.to_string()),
+            _ => panic!("it is no question"),
+        };
+        assert_eq!(asked(r#"{"type":"why","vehicle":"uav/3"}"#).as_deref(), Some("uav/3"));
+        assert_eq!(asked(r#"{"type":"why","vehicle":null}"#), None);
     }
 
     #[test]
@@ -227,7 +316,7 @@ mod tests {
         let sound =
             "name = \"a\"\nabout = \"Waits.\"\n[[body]]\nsync = { wait = { any_data = \"{me}/at\" } }\n";
         let (tag, script) = read_script(sound);
-        let Ok(Request::Script(script)) = script else { panic!("{script:?}") };
+        let Ok(Request::Script(script)) = script else { panic!("it is no script") };
         assert_eq!((tag.as_deref(), script.name.as_str()), (Some("3"), "a"));
         let fault = read_script(&sound.replace("sync", "dance")).1.unwrap_err();
         assert!(fault.starts_with("a.toml") && fault.contains("unknown field `dance`"), "{fault}");
@@ -251,12 +340,19 @@ mod tests {
             (r#"{"type":"why","vehicle":"uav"}"#, "`uav` is not a node name"),
             (r#"{"type":"order","what":"load","to":"all"}"#, "needs a `script`"),
             (r#"{"type":"order","what":"unload","to":"all"}"#, "needs the `name`"),
+            (r#"{"type":"order","what":"give","to":"all"}"#, "needs the `name`"),
+            (r#"{"type":"order","what":"give","to":"all","name":"a/b"}"#, "names no person"),
+            (r#"{"type":"order","what":"hold","to":"all","token":"7"}"#, "takes no `token`"),
+            (r#"{"type":"hello"}"#, "`name`"),
             (
                 r#"{"type":"order","what":"load","to":"all","script":{"script":{"name":"a","about":"","body":[{"dance":1}]}}}"#,
                 "a: `body[0]` unknown field `dance`",
             ),
         ] {
-            let error = read(text).1.expect_err(text);
+            let error = match read(text).1 {
+                Ok(_) => wanted(text).expect_err(text),
+                Err(error) => error,
+            };
             assert!(error.contains(fault), "{text}: {error}");
         }
     }

@@ -6,17 +6,19 @@ use std::thread;
 
 use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
-use axum::extract::{Request, State};
+use axum::extract::{ConnectInfo, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use axum::serve::ListenerExt as _;
 use tokio::sync::{Semaphore, oneshot};
 
 use super::client;
+use super::listener::Listener;
 use super::request::Mailbox;
-use super::subscription::Subscription;
+use super::session::{Caller, Identity, Session};
+use super::subscription::{Present, Subscription};
+use super::tls::Tls;
 
 /// So many browsers may watch at once.
 const MOST_BROWSERS: usize = 64;
@@ -55,25 +57,27 @@ const ASSETS: [Asset; 3] = [
 struct Shared {
     subscription: Subscription,
     mailbox: Mailbox,
+    present: Present,
     seats: Arc<Semaphore>,
 }
 
 /// Serves on a thread of its own until `stopped`.
 pub(super) fn start(
-    listener: TcpListener,
-    subscription: Subscription,
+    (listener, tls): (TcpListener, Option<Tls>),
+    (subscription, present): (Subscription, Present),
     mailbox: Mailbox,
     stopped: oneshot::Receiver<()>,
 ) -> std::io::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let listener = {
         let _inside = runtime.enter();
-        tokio::net::TcpListener::from_std(listener)?
+        Listener::new(tokio::net::TcpListener::from_std(listener)?, tls)
     };
-    let shared = Shared { subscription, mailbox, seats: Arc::new(Semaphore::new(MOST_BROWSERS)) };
+    let shared = Shared { subscription, mailbox, present, seats: Arc::new(Semaphore::new(MOST_BROWSERS)) };
+    let service = router(shared).into_make_service_with_connect_info::<Caller>();
     let serve = async move {
         tokio::select! {
-            outcome = async { axum::serve(listener.tap_io(send_at_once), router(shared)).await } => {
+            outcome = async { axum::serve(listener, service).await } => {
                 if let Err(error) = outcome {
                     tracing::error!("the console has ended: {error}");
                 }
@@ -83,12 +87,6 @@ pub(super) fn start(
     };
     thread::Builder::new().name("console".into()).spawn(move || runtime.block_on(serve))?;
     Ok(())
-}
-
-/// An answer to an order waits for no further one.
-fn send_at_once(stream: &mut tokio::net::TcpStream) {
-    // Without it, everything works, but later.
-    let _ = stream.set_nodelay(true);
 }
 
 fn router(shared: Shared) -> Router {
@@ -101,14 +99,10 @@ fn router(shared: Shared) -> Router {
 }
 
 /// Turns away pages of other origins, which could otherwise land the swarm from any browser on this computer, and
-/// names that others have made to point here.
-async fn guard(request: Request, next: Next) -> Response {
-    let headers = request.headers();
-    if !is_local(headers) {
-        return (StatusCode::FORBIDDEN, "the console answers to localhost only").into_response();
-    }
-    if !is_own_origin(headers) {
-        return (StatusCode::FORBIDDEN, "the console answers to its own page only").into_response();
+/// names that others have made to point here; and over TLS those who have no role.
+async fn guard(ConnectInfo(caller): ConnectInfo<Caller>, request: Request, next: Next) -> Response {
+    if let Err(why) = check(&caller.identity, request.headers()) {
+        return (StatusCode::FORBIDDEN, why).into_response();
     }
     let mut response = next.run(request).await;
     let headers = response.headers_mut();
@@ -116,6 +110,26 @@ async fn guard(request: Request, next: Next) -> Response {
     headers.insert(header::CACHE_CONTROL, header::HeaderValue::from_static("no-cache"));
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, header::HeaderValue::from_static("nosniff"));
     response
+}
+
+/// Why a request is not answered, if so.
+fn check(identity: &Identity, headers: &HeaderMap) -> Result<(), String> {
+    match identity {
+        // Over TLS the certificate is for the station's own names.
+        Identity::Anybody if !is_local(headers) => return Err("the console answers to localhost only".into()),
+        Identity::Stranger(name) => {
+            return Err(format!(
+                "the certificate of {name:?} has no role here: the station's [console.roles] must name it"
+            ));
+        }
+        Identity::Anybody | Identity::Known(..) => {}
+    }
+    let scheme = if *identity == Identity::Anybody { "http://" } else { "https://" };
+    if is_own_origin(scheme, headers) {
+        Ok(())
+    } else {
+        Err("the console answers to its own page only".into())
+    }
 }
 
 fn text(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
@@ -129,19 +143,24 @@ fn is_local(headers: &HeaderMap) -> bool {
     bare == "localhost" || bare.parse::<std::net::IpAddr>().is_ok_and(|address| address.is_loopback())
 }
 
-fn is_own_origin(headers: &HeaderMap) -> bool {
+fn is_own_origin(scheme: &str, headers: &HeaderMap) -> bool {
     let host = text(headers, header::HOST).unwrap_or_default();
     // Programs that are no browsers send none.
-    text(headers, header::ORIGIN).is_none_or(|origin| origin.strip_prefix("http://") == Some(host))
+    text(headers, header::ORIGIN).is_none_or(|origin| origin.strip_prefix(scheme) == Some(host))
 }
 
-async fn live(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Response {
+async fn live(
+    State(shared): State<Shared>,
+    ConnectInfo(caller): ConnectInfo<Caller>,
+    upgrade: WebSocketUpgrade,
+) -> Response {
     let Ok(seat) = shared.seats.clone().try_acquire_owned() else {
         return (StatusCode::SERVICE_UNAVAILABLE, "too many browsers watch already").into_response();
     };
     upgrade.max_message_size(LONGEST_REQUEST).max_frame_size(LONGEST_REQUEST).on_upgrade(
         async move |socket| {
-            client::attend(socket, shared.subscription, &shared.mailbox).await;
+            let session = Session::new(caller, shared.present);
+            client::attend(socket, session, shared.subscription, &shared.mailbox).await;
             drop(seat);
         },
     )
@@ -172,10 +191,21 @@ mod tests {
 
     #[test]
     fn pages_of_others_are_turned_away() {
-        assert!(is_own_origin(&headers("127.0.0.1:8700", Some("http://127.0.0.1:8700"))));
-        assert!(is_own_origin(&headers("127.0.0.1:8700", None)));
-        for origin in ["http://127.0.0.1:8701", "https://example.org", "null"] {
-            assert!(!is_own_origin(&headers("127.0.0.1:8700", Some(origin))), "{origin} was answered");
+        let is_own = |scheme, origin| is_own_origin(scheme, &headers("127.0.0.1:8700", origin));
+        assert!(is_own("http://", Some("http://127.0.0.1:8700")) && is_own("http://", None));
+        assert!(is_own("https://", Some("https://127.0.0.1:8700")));
+        for origin in ["http://127.0.0.1:8701", "https://127.0.0.1:8700", "https://example.org", "null"] {
+            assert!(!is_own("http://", Some(origin)), "{origin} was answered");
         }
+    }
+
+    #[test]
+    fn over_tls_those_without_a_role_are_turned_away_and_told_the_remedy() {
+        let headers = headers("station.example:8700", None);
+        let known = Identity::Known(crate::giver::Giver::new("Anna").unwrap(), super::super::Role::Observer);
+        assert_eq!(check(&known, &headers), Ok(()));
+        let why = check(&Identity::Stranger("uav/1;1".into()), &headers).unwrap_err();
+        assert!(why.contains("uav/1;1") && why.contains("[console.roles]"), "{why}");
+        assert!(check(&Identity::Anybody, &headers).is_err(), "by another name without TLS");
     }
 }

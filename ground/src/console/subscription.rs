@@ -1,10 +1,12 @@
 //! The way of messages from the station's loop to the browsers: nobody waits for anybody.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use skein_dbp::{Happened, NodeName};
 use tokio::sync::{broadcast, watch};
+
+use crate::giver::Giver;
 
 /// Events that a browser gets when it connects.
 const EVENTS_KEPT: usize = 300;
@@ -45,6 +47,39 @@ pub(super) struct Subscription {
 pub(super) struct Question {
     pub(super) vehicle: NodeName,
     questions: Questions,
+}
+
+/// Those who are there to give orders, each with the number of their browsers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Present(Arc<Mutex<BTreeMap<Giver, usize>>>);
+
+/// Somebody's presence, until it is dropped.
+pub(super) struct Attendance {
+    name: Giver,
+    present: Present,
+}
+
+impl Present {
+    pub(super) fn enter(&self, name: Giver) -> Attendance {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner).entry(name.clone()).or_default() += 1;
+        Attendance { name, present: self.clone() }
+    }
+
+    pub(super) fn names(&self) -> BTreeSet<Giver> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).keys().cloned().collect()
+    }
+}
+
+impl Drop for Attendance {
+    fn drop(&mut self) {
+        let mut present = self.present.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(browsers) = present.get_mut(&self.name) {
+            *browsers -= 1;
+            if *browsers == 0 {
+                present.remove(&self.name);
+            }
+        }
+    }
 }
 
 impl Broadcast {

@@ -6,7 +6,9 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_dbp::{Board, Happened, NodeName};
 use skein_wire::State;
-use skein_wire::event::{Advance, Declared as _, Enter, Events as _, Goto, Homeward, Plan, Takeoff};
+use skein_wire::event::{
+    Advance, Declared as _, Enter, Events as _, Goto, Homeward, OrderGiven, Plan, Takeoff, Text, What,
+};
 
 use super::party::Party;
 
@@ -47,6 +49,8 @@ pub(super) struct Vehicle {
     events: VecDeque<Happened>,
     /// The latest leave to move.
     leave: Option<Happened>,
+    /// The person or program that has ordered each station to hold it, last.
+    held_by: BTreeMap<NodeName, Text>,
     /// Its b-threads that have asked for a move.
     pub(super) movers: BTreeSet<String>,
 }
@@ -74,6 +78,11 @@ impl Evidence {
         let requested_by = || happened.requested_by.iter().map(|name| Party::read(&happened.home, name));
         if happened.event.kind() == Takeoff::NAME && self.launchers.len() < MOST_MOVERS {
             self.launchers.extend(requested_by());
+        }
+        if let Some(order) = OrderGiven::read(&happened.event).filter(|order| order.what == What::Hold) {
+            for (_, vehicle) in self.vehicles.iter_mut().filter(|(name, _)| order.is_for(name)) {
+                vehicle.held_by.insert(happened.home.clone(), order.by.clone());
+            }
         }
         let Some(vehicle) = self.vehicles.get_mut(&happened.home) else { return };
         if Moves::NAMES.contains(&happened.event.kind()) && vehicle.movers.len() < MOST_MOVERS {
@@ -113,6 +122,11 @@ impl Evidence {
 }
 
 impl Vehicle {
+    /// The person or program that has ordered this station to hold it.
+    pub(super) fn held_by(&self, station: &NodeName) -> Option<&str> {
+        self.held_by.get(station).map(|by| &**by)
+    }
+
     /// Newest first; of the leaves to move the latest only.
     pub(super) fn latest_events(&self) -> impl Iterator<Item = &Happened> {
         let mut events: Vec<&Happened> = self.events.iter().chain(&self.leave).collect();

@@ -13,7 +13,7 @@ use super::evidence::Evidence;
 use super::explanation::Change;
 use super::party::Party;
 use super::waits;
-use crate::bthreads::Launch;
+use crate::bthreads::{Hold, Launch};
 
 /// Reasons that are given.
 const MOST_CHANGES: usize = 8;
@@ -173,6 +173,7 @@ impl<'a> Inquiry<'a> {
             ));
             let said = self.because.len();
             self.because.extend(self.why_unready(&blocker.node, request));
+            self.because.extend(self.who_ordered_hold(&blocker));
             self.go_on(&blocker, lease);
             self.because.truncate(said - 1);
         }
@@ -185,6 +186,12 @@ impl<'a> Inquiry<'a> {
         let checks = |event: &&Happened| matches!(event.event.kind(), Ready::NAME | Unready::NAME);
         let unready = Unready::read(&known.latest_events().find(checks)?.event)?;
         Some(format!("{blocker} is not ready: {}", unready.why))
+    }
+
+    /// The person or program that has ordered a station to hold the vehicle.
+    fn who_ordered_hold(&self, blocker: &Party) -> Option<String> {
+        let known = self.evidence.vehicle(self.vehicle).filter(|_| blocker.bthread == Hold::NAME)?;
+        known.held_by(&blocker.node).map(|by| format!("{by} has ordered it"))
     }
 
     /// What would let `party` go on, or its lease here lapse?

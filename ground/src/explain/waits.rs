@@ -77,8 +77,8 @@ fn orders_in(set: &EventSet, vehicle: &NodeName) -> Vec<What> {
     let contains = |what: What| match kind {
         Some(OrderGiven::NAME) => [OrderGiven::ALL, vehicle.as_str()]
             .iter()
-            .any(|who| set.contains(&OrderGiven::plain(what, who).at(node))),
-        Some(OrderTaken::NAME) => set.contains(&OrderTaken::plain(what).at(node)),
+            .any(|who| set.contains(&OrderGiven::plain(what, who, "").at(node))),
+        Some(OrderTaken::NAME) => set.contains(&OrderTaken::plain(what, "").at(node)),
         // Only an operator hands back.
         Some(HandBack::NAME) => what == What::HandBack && set.contains(&HandBack.at(node)),
         _ => false,

@@ -206,12 +206,12 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("uav-1.incarnation");
             fs::write(&path, text).unwrap();
-            let error = next_incarnation(folder.path(), &node(), clock(3)).unwrap_err().to_string();
+            let error = next_incarnation(folder.path(), &node(), 0, clock(3)).unwrap_err().to_string();
             assert!(error.contains("uav-1.incarnation") && error.contains("clock"), "{error}");
-            let life = next_incarnation(folder.path(), &node(), clock(CLOCK)).unwrap();
+            let life = next_incarnation(folder.path(), &node(), 0, clock(CLOCK)).unwrap();
             assert_eq!((life.number, life.unsaved), (CLOCK, None));
             assert!(life.trouble.unwrap().contains("uav-1.incarnation.damaged"));
-            let next = next_incarnation(folder.path(), &node(), clock(0)).unwrap();
+            let next = next_incarnation(folder.path(), &node(), 0, clock(0)).unwrap();
             assert_eq!((next.number, next.trouble), (CLOCK + 1, None), "it counts on from there");
         }
     }

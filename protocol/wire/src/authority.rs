@@ -4,7 +4,7 @@ use skein_bp::EventSet;
 use skein_dbp::{Authority, Grant, Lift, NewRoster, NodeName, Role, Roster};
 
 use crate::event::{
-    Abort, Advance, Enter, Events as _, Goto, Launch, Load, OrderTaken, SWARM, Takeoff, Unload,
+    Abort, Advance, Enter, Events as _, Goto, Handover, Launch, Load, OrderTaken, SWARM, Takeoff, Unload,
     of_every_vehicle,
 };
 
@@ -17,16 +17,19 @@ pub fn joint_roster<'a>(ground: NodeName, fleet: impl IntoIterator<Item = &'a No
     Roster::first(ground, vehicles)
 }
 
-/// Ground stations and operators' scripts launch, order and hold vehicles, change the roster and lift blocks; vehicles
+/// Ground stations and operators' scripts order and hold vehicles, change the roster and lift blocks. Ground stations
+/// alone launch, for a launch takes two messages there. Vehicles
 /// claim passages from one another, keep a joint launch back until they are ready, and may call one off.
 pub fn standard_authority() -> Authority {
     let joint = || EventSet::from(format!("{SWARM}/**"));
-    let command = Grant {
-        request: of_every_vehicle::<(Takeoff, OrderTaken, Load, Unload)>()
-            .or(NewRoster::any_of("*/*"))
-            .or(Lift::any_of("*/*"))
-            .or(joint()),
+    let orders = |of_vehicle: EventSet| of_vehicle.or(NewRoster::any_of("*/*")).or(Lift::any_of("*/*"));
+    let station = Grant {
+        request: orders(of_every_vehicle::<(Takeoff, OrderTaken, Handover, Load, Unload)>()).or(joint()),
         block: of_every_vehicle::<(Takeoff, Goto, Advance)>().or(Enter::any_of("*/*")).or(joint()),
+    };
+    let operator = Grant {
+        request: orders(of_every_vehicle::<(OrderTaken, Handover, Load, Unload)>()).or(Abort::any_of(SWARM)),
+        ..station.clone()
     };
     let vehicle = Grant {
         request: Abort::any_of(SWARM),
@@ -39,8 +42,8 @@ pub fn standard_authority() -> Authority {
         grant: grant.clone(),
     };
     let roles = vec![
-        role("ground", &["ground/*"], &command),
-        role("operator", &["operator/*", "script/*"], &command),
+        role("ground", &["ground/*"], &station),
+        role("operator", &["operator/*", "script/*"], &operator),
         role("vehicle", &["uav/*"], &vehicle),
     ];
     Authority::new(roles, None)
@@ -59,8 +62,12 @@ mod tests {
             .and(EventSet::region([0.0; 3], [6.0; 3]));
         assert!(authority.may_block(&vehicle, "right_of_way", &claim));
         assert!(!authority.may_block(&vehicle, "right_of_way", &of_every_vehicle::<Advance>()));
-        assert!(!authority.may_request(&vehicle, "x", &OrderTaken::plain(What::Land).at("uav/1")));
+        assert!(!authority.may_request(&vehicle, "x", &OrderTaken::plain(What::Land, "x").at("uav/1")));
         assert!(authority.may_request(&vehicle, "x", &"swarm/abort".into()));
+        let script = NodeName::new("script/operator").unwrap();
+        assert!(authority.may_request(&script, "x", &OrderTaken::plain(What::Land, "x").at("uav/1")));
+        assert!(!authority.may_request(&script, "x", &Takeoff.at("uav/1")), "a launch takes two messages");
+        assert!(!authority.may_request(&script, "x", &Launch.at(SWARM)));
         let stranger = NodeName::new("camera/1").unwrap();
         assert!(!authority.may_block(&stranger, "x", &claim));
     }

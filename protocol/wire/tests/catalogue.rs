@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 use skein_wire::event::{
-    Abort, Advance, Catalogue, Declared as _, Homeward, Launch, OrderTaken, ScriptNews, What, Whose,
+    Abort, Advance, Catalogue, Declared as _, Handover, Homeward, Launch, OrderTaken, ScriptNews, What, Whose,
 };
 use skein_wire::event::{Declaration, Load, MOTION, PlanReason, ScriptState, Situation, Unload};
 
@@ -59,12 +59,16 @@ fn the_console_knows_the_orders() {
         )
     };
     text += &list("What", What::WORDS);
-    let for_all: Vec<String> =
-        What::those(What::is_for_all).map(|what| format!("What.{}", camel(what.word()))).collect();
-    text += &format!(
-        "\n/** These are decided for everyone, whoever is selected. */\nexport const FOR_ALL: ReadonlySet<What> = new Set([{}]);\n",
-        for_all.join(", ")
-    );
+    let mut set = |name: &str, about: &str, is_so: fn(What) -> bool| {
+        let words: Vec<String> =
+            What::those(is_so).map(|what| format!("What.{}", camel(what.word()))).collect();
+        text += &format!(
+            "\n/** {about} */\nexport const {name}: ReadonlySet<What> = new Set([{}]);\n",
+            words.join(", ")
+        );
+    };
+    set("FOR_ALL", "These are decided for everyone, whoever is selected.", What::is_for_all);
+    set("FOR_SAFETY", "These bring vehicles to a stop, home, or down.", What::is_for_safety);
     stands_in("ground/console/src/vocabulary.ts", None, &text);
 }
 
@@ -78,6 +82,7 @@ fn camel(word: &str) -> String {
 fn the_python_operator_knows_the_events_that_it_speaks_of() {
     let events = [
         ("ORDER", OrderTaken::NAME),
+        ("HANDOVER", Handover::NAME),
         ("LOAD", Load::NAME),
         ("UNLOAD", Unload::NAME),
         ("SCRIPT", ScriptNews::NAME),
@@ -86,7 +91,9 @@ fn the_python_operator_knows_the_events_that_it_speaks_of() {
         ("ROSTER", skein_dbp::NewRoster::NAME),
     ];
     let mut text: String = events.map(|(constant, name)| format!("{constant} = \"{name}\"\n")).concat();
-    for what in [What::Hold, What::Land, What::Return, What::Resume] {
+    for what in
+        [What::Hold, What::Land, What::Return, What::Resume, What::Ask, What::Give, What::Take, What::Release]
+    {
         text += &format!("TO_{} = \"{what}\"\n", what.word().to_uppercase());
     }
     for state in [ScriptState::Accepted, ScriptState::Refused, ScriptState::Withdrawn] {
@@ -138,8 +145,8 @@ fn what_a_vehicle_takes_and_its_own_are_as_they_were() {
         events.map(|event| event.name).collect::<Vec<_>>()
     };
     let catalogue = Catalogue::standard();
-    assert_eq!(named(&mut catalogue.gateway()), ["order", "load", "unload"]);
-    assert_eq!(catalogue.own().count(), 39);
+    assert_eq!(named(&mut catalogue.gateway()), ["order", "handover", "load", "unload"]);
+    assert_eq!(catalogue.own().count(), 40);
     let others = catalogue.of_vehicle().filter(|event| event.whose == Whose::Anyone);
     assert_eq!(named(&mut { others }), ["takeoff", "goto", "advance", "enter", "complete", "failed"]);
     assert_eq!([Launch::NAME, Abort::NAME], [What::Launch.word(), What::Abort.word()]);

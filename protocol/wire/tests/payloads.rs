@@ -114,6 +114,8 @@ fn state() -> State {
         battery: 0.5,
         mode: "offboard".into(),
         path: vec![Default::default(); 40],
+        holder: "Anna".into(),
+        asked_by: "Ben".into(),
         echo: Some(Echo {
             node: NodeName::new("uav/2").unwrap(),
             incarnation: 3,

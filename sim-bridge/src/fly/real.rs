@@ -90,9 +90,11 @@ pub fn fly(
 
 /// At the address asked for, or at any that is free.
 fn serve_console(address: SocketAddr) -> anyhow::Result<Console> {
-    let console = Console::serve(address, || {});
+    let console = Console::serve(address, None, || {});
     Ok(console.or_else(|error| match error {
-        skein_ground::console::ConsoleError::Listen { .. } => Console::serve((address.ip(), 0).into(), || {}),
+        skein_ground::console::ConsoleError::Listen { .. } => {
+            Console::serve((address.ip(), 0).into(), None, || {})
+        }
         error => Err(error),
     })?)
 }
@@ -116,9 +118,9 @@ impl Host for RealTime {
             ports.receive(|index, bytes| swarm.send_mavlink(index, bytes));
         }
         for wish in self.console.take_orders() {
-            let given = swarm.order(&wish.order);
-            wish.answer(given);
+            wish.carry_out(swarm.ground_mut());
         }
+        swarm.ground_mut().attend(self.console.present());
     }
 
     fn after_step(&mut self, swarm: &Swarm, happenings: &Happenings) {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use skein_agent::{AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, Mind, Parts, PositionSource};
 use skein_bp::{Program, script::Assignment};
 use skein_dbp::{Kept, NodeName};
-use skein_ground::{GroundConfig, Order, Who};
+use skein_ground::{Giver, GroundConfig, Order, Who};
 use skein_wire::{Fleet, standard_authority};
 use skein_world::{SimulationConfig, VehicleSetup};
 
@@ -163,7 +163,8 @@ pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Control
             scenario::Who::All => Who::All,
             scenario::Who::Vehicle(number) => Who::only(vehicle_name(number.saturating_sub(1))),
         };
-        Some((Duration::from_secs_f64(said.at_s), Order::plain(said.order, who)?))
+        let by = Giver::new("scenario").ok()?;
+        Some((Duration::from_secs_f64(said.at_s), by, Order::plain(said.order, who)?))
     });
     let vehicles = (0..scenario.vehicles.len()).map(vehicle_name).collect();
     GroundConfig {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use skein_agent::{AgentConfig, AgentCore, AgentError, Outcome, Parts};
 use skein_dbp::{Happened, NodeName};
-use skein_ground::{GroundConfig, GroundCore, Order, UnknownVehicle};
+use skein_ground::{Giver, GroundConfig, GroundCore, Order, Refusal};
 use skein_wire::{Link, MemoryStore, Scan};
 use skein_world::{Simulation, Truth};
 
@@ -191,12 +191,13 @@ impl Swarm {
         }
     }
 
-    /// Says something to the vehicles, as an operator at the ground station.
+    /// Says something to the vehicles, as the ground station itself.
     ///
     /// # Errors
-    /// There is no such vehicle.
-    pub fn order(&mut self, order: &Order) -> Result<u64, UnknownVehicle> {
-        self.ground.order(order)
+    /// There is no such vehicle, somebody else holds it, or it is a launch, which takes two messages.
+    pub fn order(&mut self, order: &Order) -> Result<u64, Refusal> {
+        let by = Giver::from(self.ground.name());
+        self.ground.order(&by, order)
     }
 
     /// Says something to the autopilot of vehicle `index`, as another program would.
@@ -214,6 +215,11 @@ impl Swarm {
     #[must_use]
     pub fn ground(&self) -> &GroundCore {
         &self.ground
+    }
+
+    /// The ground station, for its operators.
+    pub fn ground_mut(&mut self) -> &mut GroundCore {
+        &mut self.ground
     }
 
     /// Every mission has ended, or its vehicle has crashed.

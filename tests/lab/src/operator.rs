@@ -28,7 +28,7 @@ impl Operator {
                     if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
                         stream.set_nodelay(true)?;
                     }
-                    return Ok(Self { socket });
+                    return Self { socket }.introduced();
                 }
                 Err(error) if Instant::now() > deadline => {
                     return Err(error).context("the console does not answer");
@@ -36,6 +36,13 @@ impl Operator {
                 Err(_) => std::thread::sleep(Duration::from_millis(50)),
             }
         }
+    }
+
+    /// Says who speaks: the station sets nothing going for somebody without a name.
+    fn introduced(mut self) -> anyhow::Result<Self> {
+        let hello = json!({ "type": "hello", "name": env!("CARGO_PKG_NAME") });
+        self.socket.send(Message::text(hello.to_string()))?;
+        Ok(self)
     }
 
     /// Waits until all of so many vehicles have their motors armed.

@@ -59,7 +59,7 @@ fn without_webgl_some_are_sent_home_or_down_and_the_rest_fly_on() {
     let (status, summary) = flight.end();
     assert_eq!(status.code(), Some(1), "not everybody arrived");
     assert_eq!(summary.collisions, Collisions::default());
-    let ordered = Some("ordered by the operator".to_owned());
+    let ordered = Some("ordered by Anna".to_owned());
     let outcomes: Vec<_> = summary.per_vehicle.into_iter().map(|each| (each.outcome, each.reason)).collect();
     let down = (Outcome::LandedEarly, ordered);
     assert_eq!(outcomes, [down.clone(), down.clone(), down, (Outcome::Arrived, None)]);

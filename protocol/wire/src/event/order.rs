@@ -27,6 +27,16 @@ skein_bp::words! {
         Load = "load",
         /// Run a script no more.
         Unload = "unload",
+        /// Ask whoever holds the vehicle to give it away.
+        Ask = "ask",
+        /// Give the vehicle to another person or program.
+        Give = "give",
+        /// Hold the vehicle from now on, whoever holds it.
+        Take = "take",
+        /// Hold the vehicle no more.
+        Release = "release",
+        /// Go on holding the vehicle, or hold it if nobody does: whoever holds it is still there.
+        Keep = "keep",
     }
 }
 
@@ -43,7 +53,7 @@ impl What {
 
     /// Whether it needs more than whom it is for: a place, or a script.
     pub fn needs_more(self) -> bool {
-        matches!(self, Self::GoTo | Self::Load | Self::Unload)
+        matches!(self, Self::GoTo | Self::Load | Self::Unload | Self::Give)
     }
 
     pub fn is_launch(self) -> bool {
@@ -53,6 +63,22 @@ impl What {
     /// Whether it is about a script.
     pub fn is_about_script(self) -> bool {
         matches!(self, Self::Load | Self::Unload)
+    }
+
+    /// Whether it is about who holds a vehicle. It reaches the vehicle as [`Handover`].
+    pub fn is_handover(self) -> bool {
+        matches!(self, Self::Ask | Self::Give | Self::Take | Self::Release | Self::Keep)
+    }
+
+    /// Whether only who holds a vehicle may order it; whoever orders it takes a vehicle that nobody holds. Anybody with
+    /// the right may always hold a vehicle in its place, send it home, or land it.
+    pub fn needs_holder(self) -> bool {
+        self.is_launch() || self.sets_going() || self.is_about_script()
+    }
+
+    /// Whether it is for safety: it brings a vehicle to a stop, home, or down.
+    pub fn is_for_safety(self) -> bool {
+        self == Self::Hold || self.calls_launch_off()
     }
 
     /// Whether a vehicle takes it in at its gateway, as [`OrderTaken`]. The ground station carries out the others.
@@ -92,7 +118,7 @@ impl What {
 
     /// Whether it says nothing against what other orders have set going.
     pub fn is_beside_flight(self) -> bool {
-        self.is_launch() || self.is_about_script()
+        self.is_launch() || self.is_about_script() || self.is_handover()
     }
 }
 
@@ -107,8 +133,27 @@ skein_bp::events! {
         x: Option<f64> ["m"],
         y: Option<f64> ["m"],
         z: Option<f64> ["m"],
-        /// The b-thread of the script that has given it, if one has.
+        /// The person or program that has given it; of a script, its b-thread: `script/NAME`. One that names nobody is
+        /// declined.
+        by: Text,
+        /// Whether it was given aboard: by a script, or at the vehicle's own computer.
+        aboard: Option<bool>,
+    }
+    /// Somebody asks for this vehicle, gives it away, takes it, lets it go, or keeps it.
+    Handover = "handover", Operator {
+        what: What,
+        /// The person or program that says so.
+        by: Text,
+        /// To whom the vehicle is given.
+        to: Option<Text>,
+    }
+    /// Who holds this vehicle has changed, or who asks for it: only the holder's orders set it going.
+    Held = "held", Own {
+        /// The person or program; none if nobody holds it.
         by: Option<Text>,
+        /// Who asks for it.
+        asked_by: Option<Text>,
+        why: Text,
     }
     /// An operator gives the vehicle back to its agent after a pilot had it.
     HandBack = "hand_back", Own;
@@ -124,14 +169,20 @@ skein_bp::events! {
 }
 
 impl OrderTaken {
-    /// An order that needs no more than its word.
-    pub fn plain(what: What) -> Self {
-        Self { what, x: None, y: None, z: None, by: None }
+    /// An order of this person or program that needs no more than its word.
+    pub fn plain(what: What, by: &str) -> Self {
+        Self { what, x: None, y: None, z: None, by: by.into(), aboard: None }
     }
 
     /// The order to go there, metres ENU.
-    pub fn go_to([x, y, z]: [f64; 3]) -> Self {
-        Self { x: Some(x), y: Some(y), z: Some(z), ..Self::plain(What::GoTo) }
+    pub fn go_to([x, y, z]: [f64; 3], by: &str) -> Self {
+        Self { x: Some(x), y: Some(y), z: Some(z), ..Self::plain(What::GoTo, by) }
+    }
+
+    /// The same order, given aboard.
+    #[must_use]
+    pub fn given_aboard(self) -> Self {
+        Self { aboard: Some(true), ..self }
     }
 
     /// Where to go, metres ENU.

@@ -26,11 +26,15 @@ skein_bp::events! {
         name: Option<Text>,
         /// The script and the values of its parameters, as JSON.
         script: Text,
+        /// The person or program that sends it. One that names nobody is refused.
+        by: Option<Text>,
     }
     /// Withdraw a script.
     Unload = "unload", Operator {
         /// The name it runs under.
         name: Text,
+        /// The person or program that withdraws it. One that names nobody is refused.
+        by: Option<Text>,
     }
     /// News of a script.
     ScriptNews = "script", Own {

@@ -27,6 +27,10 @@ skein_bp::events! {
         what: What,
         /// A vehicle, or `all`.
         who: Text,
+        /// The person or program that has ordered it.
+        by: Text,
+        /// To whom a vehicle is given, for `give`.
+        to: Option<Text>,
         /// The name of the script that it is about.
         name: Option<Text>,
         /// For `load`: the script and the values of its parameters, as JSON.
@@ -35,6 +39,12 @@ skein_bp::events! {
         x: Option<f64> ["m"],
         y: Option<f64> ["m"],
         z: Option<f64> ["m"],
+    }
+    /// An order is not brought to this vehicle any more: another person or program holds it.
+    Overruled = "overruled", Anyone {
+        vehicle: NodeName,
+        /// Who holds it.
+        by: Text,
     }
     /// A vehicle's first word to this station, in each of its lives.
     Heard = "heard", Anyone {
@@ -63,13 +73,14 @@ impl OrderGiven {
     pub const ALL: &str = "all";
 
     /// An order that needs no more than whom it is for.
-    pub fn plain(what: What, who: &str) -> Self {
-        Self { what, who: who.into(), name: None, script: None, x: None, y: None, z: None }
+    pub fn plain(what: What, who: &str, by: &str) -> Self {
+        let (who, by) = (who.into(), by.into());
+        Self { what, who, by, to: None, name: None, script: None, x: None, y: None, z: None }
     }
 
     /// The same order, to this place, metres ENU.
     #[must_use]
-    pub fn to(self, [x, y, z]: [f64; 3]) -> Self {
+    pub fn at_place(self, [x, y, z]: [f64; 3]) -> Self {
         Self { x: Some(x), y: Some(y), z: Some(z), ..self }
     }
 

@@ -44,6 +44,10 @@ pub struct State {
     pub mission: MissionState,
     /// The names of the scripts that run on it; only the first [`State::MAX_SCRIPTS`] travel.
     pub scripts: Vec<String>,
+    /// The person or program whose orders it takes; empty while nobody holds it.
+    pub holder: String,
+    /// Who asks the holder for it; empty if nobody does.
+    pub asked_by: String,
     /// The last word of one other vehicle, each in turn: from it that one learns how long messages take.
     pub echo: Option<Echo>,
 }
@@ -95,6 +99,8 @@ impl State {
             path: Vec::new(),
             mission: MissionState::default(),
             scripts: Vec::new(),
+            holder: String::new(),
+            asked_by: String::new(),
             echo: None,
         }
     }
@@ -144,6 +150,8 @@ impl From<&State> for proto::State {
             path: state.path.iter().take(State::MAX_PATH).map(Into::into).collect(),
             mission: proto::Mission::from(state.mission).into(),
             scripts: state.scripts.iter().take(State::MAX_SCRIPTS).cloned().collect(),
+            holder: state.holder.clone(),
+            asked_by: state.asked_by.clone(),
             echo: state.echo.as_ref().map(|echo| proto::Echo {
                 node: text(&echo.node),
                 incarnation: echo.incarnation,
@@ -181,6 +189,8 @@ impl TryFrom<proto::State> for State {
             // In a word of a later version, it is not over as far as this one can tell.
             mission: proto::Mission::try_from(state.mission).unwrap_or_default().into(),
             scripts: state.scripts.into_iter().map(words).collect(),
+            holder: state.holder,
+            asked_by: state.asked_by,
             echo: state.echo.map(Echo::try_from).transpose()?,
         })
     }
