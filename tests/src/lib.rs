@@ -27,6 +27,7 @@ pub fn flight(scenario: &str, seed: u64) -> Fly {
         headless: true,
         processes: false,
         network: cli::Network::Peer,
+        secure: false,
         agent: None,
         ground: None,
         console: ([127, 0, 0, 1], 0).into(),

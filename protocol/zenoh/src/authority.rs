@@ -13,9 +13,9 @@ use rcgen::{
 use skein_wire::NodeName;
 use x509_parser::pem::Pem;
 
-use crate::config::{AUTHORITY, ROSTER, Security, stem};
-use crate::error::ZenohError;
-use crate::roster::{FIRST_SERIAL, Roster};
+use crate::certificate;
+use crate::roster::{FIRST_SERIAL, Roster, RosterError};
+use crate::security::{AUTHORITY, ROSTER, Security, stem};
 
 const AUTHORITY_KEY: &str = "authority.key";
 
@@ -38,7 +38,7 @@ pub enum AuthorityError {
     #[error("{node} at `{host}`: expected an address or a host's name")]
     Host { node: NodeName, host: String },
     #[error(transparent)]
-    Roster(#[from] ZenohError),
+    Roster(#[from] RosterError),
 }
 
 /// A node that is to have a certificate.
@@ -232,7 +232,7 @@ fn name_of(node: &NodeName, host: &str) -> Result<SanType, AuthorityError> {
 fn hosts_of(certificate: &Path) -> Vec<String> {
     let bytes = fs::read(certificate).unwrap_or_default();
     let pem = Pem::iter_from_buffer(&bytes).next().and_then(Result::ok);
-    let hosts = pem.as_ref().and_then(|pem| pem.parse_x509().ok()).map(|it| crate::certificate::hosts(&it));
+    let hosts = pem.as_ref().and_then(|pem| pem.parse_x509().ok()).map(|it| certificate::hosts(&it));
     hosts.filter(|hosts| !hosts.is_empty()).unwrap_or_else(|| HERE.map(String::from).to_vec())
 }
 
@@ -253,4 +253,75 @@ fn write(path: &Path, text: &str, mode: u32) -> Result<(), AuthorityError> {
     let mut file = options.open(&beside).map_err(failed)?;
     file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(failed)?;
     fs::rename(&beside, path).map_err(failed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::certificate::check;
+
+    fn node(name: &str) -> NodeName {
+        NodeName::new(name).unwrap()
+    }
+
+    /// An authority in `folder` with a ground station and a vehicle.
+    fn authority(folder: &Path) -> Authority {
+        let mut authority = Authority::open(folder, "demo", SystemTime::now()).unwrap();
+        let holders = ["ground/main", "uav/1"].map(|name| Holder::here(node(name)));
+        authority.issue(&holders, 30, false, SystemTime::now()).unwrap();
+        authority
+    }
+
+    fn fault(
+        security: &Security,
+        authority: &Authority,
+        host: &str,
+        now: SystemTime,
+    ) -> Result<Vec<String>, String> {
+        check(security, &node("uav/1"), authority.roster(), &[host.to_owned()], now)
+            .map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn each_fault_is_named_with_its_file_and_a_remedy() {
+        let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+        let [ours, theirs] = [0, 1].map(|it| authority(folders[it].path()));
+        let [own, ground, foreign] = [
+            ours.security(&node("uav/1")),
+            ours.security(&node("ground/main")),
+            theirs.security(&node("uav/1")),
+        ];
+        let (here, now) = ("127.0.0.1", SystemTime::now());
+        let nonsense = folders[0].path().join("nonsense.pem");
+        std::fs::write(&nonsense, "-----BEGIN NOTHING-----").unwrap();
+        assert_eq!(fault(&own, &ours, here, now), Ok(vec![]));
+        assert_eq!(fault(&own, &ours, "0.0.0.0", now), Ok(vec![]));
+        let year = Duration::from_secs(365 * 24 * 3600);
+        let soon = fault(&own, &ours, here, now + Duration::from_secs(25 * 24 * 3600)).unwrap();
+        assert!(soon.len() == 1 && soon[0].contains("expires on"), "{soon:?}");
+        for (security, host, now, words) in [
+            (own.clone(), here, SystemTime::UNIX_EPOCH, ["authority.pem", "time-sync.target"]),
+            (own.clone(), here, now + year, ["uav-1.pem", "has expired on"]),
+            (own.clone(), "10.0.0.7", now, ["uav-1.pem", "uav/1=10.0.0.7".trim_start_matches("uav/1")]),
+            (ground.clone(), here, now, ["ground-main.pem", "certificate of ground/main"]),
+            (
+                Security { key: ground.key.clone(), ..own.clone() },
+                here,
+                now,
+                ["ground-main.key", "uav-1.pem"],
+            ),
+            (
+                Security { authority: foreign.authority.clone(), ..own.clone() },
+                here,
+                now,
+                ["uav-1.pem", "not signed by the authority"],
+            ),
+            (Security { certificate: nonsense.clone(), ..own.clone() }, here, now, ["nonsense.pem", "PEM"]),
+            (Security { key: "/none.key".into(), ..own.clone() }, here, now, ["/none.key", "cannot be read"]),
+            (Security { authority: "/none.pem".into(), ..own }, here, now, ["/none.pem", "cannot be read"]),
+        ] {
+            let fault = fault(&security, &ours, host, now).unwrap_err();
+            assert!(words.iter().all(|word| fault.contains(word)), "{fault}");
+        }
+    }
 }

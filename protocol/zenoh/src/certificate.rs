@@ -14,8 +14,8 @@ use x509_parser::extensions::GeneralName;
 use x509_parser::pem::Pem;
 use x509_parser::time::ASN1Time;
 
-use crate::config::Security;
 use crate::roster::{Roster, Unlisted};
+use crate::security::Security;
 
 /// A certificate that ends sooner is warned of.
 const SOON: Duration = Duration::from_secs(7 * 24 * 3600);
@@ -236,76 +236,5 @@ impl Now {
             return Err(Fault::Expired { until: until.to_string(), now: now() });
         }
         Ok(())
-    }
-}
-
-#[cfg(all(test, feature = "authority"))]
-mod tests {
-    use super::*;
-    use crate::authority::{Authority, Holder};
-
-    fn node(name: &str) -> NodeName {
-        NodeName::new(name).unwrap()
-    }
-
-    /// An authority in `folder` with a ground station and a vehicle.
-    fn authority(folder: &Path) -> Authority {
-        let mut authority = Authority::open(folder, "demo", SystemTime::now()).unwrap();
-        let holders = ["ground/main", "uav/1"].map(|name| Holder::here(node(name)));
-        authority.issue(&holders, 30, false, SystemTime::now()).unwrap();
-        authority
-    }
-
-    fn fault(
-        security: &Security,
-        authority: &Authority,
-        host: &str,
-        now: SystemTime,
-    ) -> Result<Vec<String>, String> {
-        check(security, &node("uav/1"), authority.roster(), &[host.to_owned()], now)
-            .map_err(|error| error.to_string())
-    }
-
-    #[test]
-    fn each_fault_is_named_with_its_file_and_a_remedy() {
-        let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
-        let [ours, theirs] = [0, 1].map(|it| authority(folders[it].path()));
-        let [own, ground, foreign] = [
-            ours.security(&node("uav/1")),
-            ours.security(&node("ground/main")),
-            theirs.security(&node("uav/1")),
-        ];
-        let (here, now) = ("127.0.0.1", SystemTime::now());
-        let nonsense = folders[0].path().join("nonsense.pem");
-        std::fs::write(&nonsense, "-----BEGIN NOTHING-----").unwrap();
-        assert_eq!(fault(&own, &ours, here, now), Ok(vec![]));
-        assert_eq!(fault(&own, &ours, "0.0.0.0", now), Ok(vec![]));
-        let year = Duration::from_secs(365 * 24 * 3600);
-        let soon = fault(&own, &ours, here, now + Duration::from_secs(25 * 24 * 3600)).unwrap();
-        assert!(soon.len() == 1 && soon[0].contains("expires on"), "{soon:?}");
-        for (security, host, now, words) in [
-            (own.clone(), here, SystemTime::UNIX_EPOCH, ["authority.pem", "time-sync.target"]),
-            (own.clone(), here, now + year, ["uav-1.pem", "has expired on"]),
-            (own.clone(), "10.0.0.7", now, ["uav-1.pem", "uav/1=10.0.0.7".trim_start_matches("uav/1")]),
-            (ground.clone(), here, now, ["ground-main.pem", "certificate of ground/main"]),
-            (
-                Security { key: ground.key.clone(), ..own.clone() },
-                here,
-                now,
-                ["ground-main.key", "uav-1.pem"],
-            ),
-            (
-                Security { authority: foreign.authority.clone(), ..own.clone() },
-                here,
-                now,
-                ["uav-1.pem", "not signed by the authority"],
-            ),
-            (Security { certificate: nonsense.clone(), ..own.clone() }, here, now, ["nonsense.pem", "PEM"]),
-            (Security { key: "/none.key".into(), ..own.clone() }, here, now, ["/none.key", "cannot be read"]),
-            (Security { authority: "/none.pem".into(), ..own }, here, now, ["/none.pem", "cannot be read"]),
-        ] {
-            let fault = fault(&security, &ours, host, now).unwrap_err();
-            assert!(words.iter().all(|word| fault.contains(word)), "{fault}");
-        }
     }
 }

@@ -1,7 +1,7 @@
 //! The settings by which a session is joined to others.
 
 use std::net::{IpAddr, TcpListener};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
@@ -10,11 +10,8 @@ use skein_wire::{Fleet, NodeName};
 
 use crate::error::ZenohError;
 use crate::roster::Roster;
+use crate::security::Security;
 use crate::{access, certificate, links};
-
-/// The files of an authority and of a fleet's roster in a folder of certificates.
-pub(crate) const AUTHORITY: &str = "authority.pem";
-pub(crate) const ROSTER: &str = "roster.toml";
 
 /// Longest message that Zenoh puts together from its fragments, in bytes: more than any that Skein reads.
 const MOST_REASSEMBLED: usize = 16 << 20;
@@ -65,23 +62,6 @@ pub enum Mode {
     Router,
 }
 
-/// Certificates, as PEM files: whoever has one of this authority in a name of the roster is a member, says what is its
-/// own to say, and all that travels is encrypted.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Security {
-    /// The authority's certificate.
-    pub authority: PathBuf,
-    /// This node's certificate, for the host names by which others connect to it.
-    pub certificate: PathBuf,
-    /// Its private key.
-    pub key: PathBuf,
-    /// Who takes part, and with which certificates: a [`Roster`]'s file. Without it, whoever this node's own
-    /// configuration names, with their first certificates, and nobody relays.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub roster: Option<PathBuf>,
-}
-
 impl Default for NetworkSettings {
     /// A peer on a free port of the loopback interface.
     fn default() -> Self {
@@ -97,40 +77,22 @@ impl Default for NetworkSettings {
 /// Settings of Zenoh's, each with its value in JSON.
 type Settings = Vec<(&'static str, String)>;
 
-/// The files of a node's certificate and key, but for their endings.
-pub(crate) fn stem(node: &NodeName) -> String {
-    node.as_str().replace('/', "-")
-}
-
-impl Security {
-    /// The files of `node` in a folder that `skein-ground certificates` has filled.
-    pub fn in_folder(folder: &Path, node: &NodeName) -> Self {
-        let stem = stem(node);
-        Self {
-            authority: folder.join(AUTHORITY),
-            certificate: folder.join(format!("{stem}.pem")),
-            key: folder.join(format!("{stem}.key")),
-            roster: Some(folder.join(ROSTER)),
-        }
-    }
-
-    /// The settings by which only members come in, encrypted, and say only what is theirs to say.
-    fn settings(&self, fleet: &Fleet, roster: &Roster) -> Settings {
-        let Self { authority, certificate, key, .. } = self;
-        vec![
-            // Access control knows the other end by its certificate alone.
-            ("transport/link/protocols", "[\"tls\"]".into()),
-            ("transport/link/tls/root_ca_certificate", json(authority)),
-            ("transport/link/tls/listen_certificate", json(certificate)),
-            ("transport/link/tls/listen_private_key", json(key)),
-            ("transport/link/tls/connect_certificate", json(certificate)),
-            ("transport/link/tls/connect_private_key", json(key)),
-            ("transport/link/tls/enable_mtls", "true".into()),
-            ("transport/link/tls/verify_name_on_connect", "true".into()),
-            ("transport/unicast/max_links", "1".into()),
-            ("access_control", access::control(fleet, roster).to_string()),
-        ]
-    }
+/// The settings by which only members come in, encrypted, and say only what is theirs to say.
+fn secured(security: &Security, fleet: &Fleet, roster: &Roster) -> Settings {
+    let Security { authority, certificate, key, .. } = security;
+    vec![
+        // Access control knows the other end by its certificate alone.
+        ("transport/link/protocols", "[\"tls\"]".into()),
+        ("transport/link/tls/root_ca_certificate", json(authority)),
+        ("transport/link/tls/listen_certificate", json(certificate)),
+        ("transport/link/tls/listen_private_key", json(key)),
+        ("transport/link/tls/connect_certificate", json(certificate)),
+        ("transport/link/tls/connect_private_key", json(key)),
+        ("transport/link/tls/enable_mtls", "true".into()),
+        ("transport/link/tls/verify_name_on_connect", "true".into()),
+        ("transport/unicast/max_links", "1".into()),
+        ("access_control", access::control(fleet, roster).to_string()),
+    ]
 }
 
 impl ZenohConfig {
@@ -179,7 +141,7 @@ impl ZenohConfig {
             for warning in certificate::check(security, node, &roster, &hosts, SystemTime::now())? {
                 tracing::warn!("{warning}");
             }
-            settings.extend(security.settings(&self.fleet, &roster));
+            settings.extend(secured(security, &self.fleet, &roster));
             links::open(node, &roster);
         }
         Ok((settings, listen))
@@ -210,10 +172,7 @@ impl NetworkSettings {
     #[must_use]
     pub fn relative_to(mut self, folder: &Path) -> Self {
         if let Some(security) = &mut self.security {
-            let Security { authority, certificate, key, roster } = security;
-            for path in [authority, certificate, key].into_iter().chain(roster) {
-                *path = folder.join(&*path);
-            }
+            *security = security.relative_to(folder);
         }
         self
     }

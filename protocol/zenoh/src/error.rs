@@ -1,10 +1,9 @@
 //! Faults of a session.
 
-use std::path::PathBuf;
-
 use skein_wire::NodeName;
 
 use crate::certificate::CertificateError;
+use crate::roster::RosterError;
 
 /// Why a session cannot be opened, or a link not be had.
 #[derive(Debug, thiserror::Error)]
@@ -27,8 +26,8 @@ pub enum ZenohError {
     NotEncrypted { endpoint: String },
     #[error(transparent)]
     Certificate(#[from] CertificateError),
-    #[error("`{}`: {fault}", path.display())]
-    Roster { path: PathBuf, fault: String },
+    #[error(transparent)]
+    Roster(#[from] RosterError),
     #[error("`[network.security]` is for one node of a roster, and this session is nobody's")]
     Nobody,
     #[error(

@@ -35,6 +35,7 @@ mod links;
 mod log;
 mod queue;
 mod roster;
+mod security;
 mod session;
 
 #[cfg(feature = "authority")]
@@ -42,11 +43,12 @@ pub use authority::{Authority, AuthorityError, Holder, Issued};
 pub use bell::Bell;
 pub use certificate::{CertificateError, Fault};
 pub use complaints::Complaints;
-pub use config::{Mode, NetworkSettings, Security, ZenohConfig};
+pub use config::{Mode, NetworkSettings, ZenohConfig};
 pub use error::ZenohError;
 pub use link::{ZenohLink, ZenohLinkStats};
 pub use links::{overhearing, take as take_refusals};
 pub use log::log;
 pub use queue::ZenohStats;
-pub use roster::{FIRST_SERIAL, Roster, Unlisted};
+pub use roster::{FIRST_SERIAL, Roster, RosterError, Unlisted};
+pub use security::Security;
 pub use session::{ZenohSession, share_threads};

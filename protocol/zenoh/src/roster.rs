@@ -1,12 +1,10 @@
 //! Who takes part in a secured network, by the names of their certificates.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use skein_wire::NodeName;
-
-use crate::error::ZenohError;
 
 /// The serial number of a node's first certificate.
 pub const FIRST_SERIAL: u32 = 1;
@@ -28,6 +26,14 @@ struct RosterFile {
     #[serde(default)]
     relays: Vec<String>,
     members: BTreeMap<String, u32>,
+}
+
+/// A roster's file that cannot be read, or is not sound.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{}`: {fault}", path.display())]
+pub struct RosterError {
+    pub path: PathBuf,
+    pub fault: String,
 }
 
 /// The reason why a certificate's holder counts for nothing.
@@ -66,8 +72,8 @@ impl Roster {
     ///
     /// # Errors
     /// The file, and its field at fault.
-    pub fn read(path: &Path) -> Result<Self, ZenohError> {
-        let fault = |fault: String| ZenohError::Roster { path: path.into(), fault };
+    pub fn read(path: &Path) -> Result<Self, RosterError> {
+        let fault = |fault: String| RosterError { path: path.into(), fault };
         let text = std::fs::read_to_string(path).map_err(|error| fault(error.to_string()))?;
         Self::parse(&text).map_err(fault)
     }

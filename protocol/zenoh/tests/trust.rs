@@ -188,8 +188,8 @@ fn a_member_speaks_for_itself_and_for_nobody_else() {
     let mut link = vehicle.link(&name("uav/2")).unwrap();
     for mode in ["peer", "client", "router"] {
         let raw = Raw::open(&members.security("uav/1"), mode, vehicle.locators());
-        let own = format!("skein/trust/bid/uav/1/uav/2");
-        let heard = heard_until(&mut link, &own, || {
+        let own = "skein/trust/bid/uav/1/uav/2";
+        let heard = heard_until(&mut link, own, || {
             for forged in [
                 "skein/trust/bid/ground/main/uav/2",
                 "skein/trust/state/ground/main",
@@ -199,9 +199,9 @@ fn a_member_speaks_for_itself_and_for_nobody_else() {
             ] {
                 raw.put(forged, "forged");
             }
-            raw.put(&own, "mine");
+            raw.put(own, "mine");
         });
-        assert!(heard.iter().all(|key| *key == own), "as a {mode} it was heard under {heard:?}");
+        assert!(heard.iter().all(|key| key == own), "as a {mode} it was heard under {heard:?}");
     }
 }
 
@@ -335,8 +335,8 @@ fn an_expired_certificate_and_a_foreign_one_are_refused_with_words_at_both_ends(
     let late = members.forge("late", Some("uav/1;1"), -1);
     let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let endpoint = format!("tls/127.0.0.1:{port}");
-    let _raw = Raw::listening(&late, "peer", &[endpoint.clone()], &[]);
-    let _ground = members.open("ground/main", &[endpoint.clone()]);
+    let _raw = Raw::listening(&late, "peer", std::slice::from_ref(&endpoint), &[]);
+    let _ground = members.open("ground/main", std::slice::from_ref(&endpoint));
     told(&["refused the link to", &endpoint, "has expired"]);
     assert_eq!(vehicle.connected_peers(), 0);
 }
