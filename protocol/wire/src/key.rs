@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use skein_dbp::{Board, NodeName, is_chunk};
+use skein_dbp::{BidAck, Board, NodeName, Occurrence, Repair, is_chunk};
 
 use crate::message::{KINDS, Kind, Payload, Readiness, Record, State};
 use crate::proto::MAX_PAYLOAD;
@@ -122,6 +122,11 @@ impl Key {
     /// The longest message that may be put under it, in bytes.
     pub fn most_bytes(&self) -> usize {
         self.kind.bytes.most().min(MAX_PAYLOAD)
+    }
+
+    /// Whether the newest message under it says all that earlier ones have said.
+    pub(crate) fn says_all(&self) -> bool {
+        !(self.is_of::<Occurrence>() || self.is_of::<Repair>() || self.is_of::<BidAck>())
     }
 
     /// Whom it is for; none if for all.

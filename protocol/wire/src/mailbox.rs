@@ -90,9 +90,10 @@ impl Mailbox {
         Some((key, payload))
     }
 
-    /// Takes out the messages that `may` come now, oldest first; it is asked with the sender and the bytes.
-    pub fn take(&mut self, mut may: impl FnMut(&NodeName, usize) -> bool) -> Vec<(Key, Vec<u8>)> {
-        let due = |(_, (_, key, payload)): &(&u64, &(Owner, Key, Vec<u8>))| may(key.sender(), payload.len());
+    /// Takes out the messages that `may` come now, oldest first; it is asked with the key and the bytes. Of those that
+    /// have to wait, the newest under a key stands for all before it, if it says all.
+    pub fn take(&mut self, mut may: impl FnMut(&Key, usize) -> bool) -> Vec<(Key, Vec<u8>)> {
+        let due = |(_, (_, key, payload)): &(&u64, &(Owner, Key, Vec<u8>))| may(key, payload.len());
         let due: Vec<u64> = self.waiting.iter().filter(due).map(|(number, _)| *number).collect();
         let mut taken = Vec::with_capacity(due.len());
         for number in due {
@@ -101,7 +102,24 @@ impl Mailbox {
                 taken.push((key, payload));
             }
         }
+        self.drop_superseded();
         taken
+    }
+
+    fn drop_superseded(&mut self) {
+        if self.waiting.is_empty() {
+            return;
+        }
+        let mut newest: BTreeMap<&Key, u64> = BTreeMap::new();
+        let mut superseded = Vec::new();
+        for (number, (owner, key, _)) in self.waiting.iter().filter(|(_, (_, key, _))| key.says_all()) {
+            if let Some(before) = newest.insert(key, *number) {
+                superseded.push((before, owner.clone()));
+            }
+        }
+        for (number, owner) in superseded {
+            self.drop_one(&owner, number);
+        }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -141,6 +159,10 @@ impl Mailbox {
         let Some(number) = self.queues.get(owner).and_then(|queue| queue.numbers.front().copied()) else {
             return;
         };
+        self.drop_one(owner, number);
+    }
+
+    fn drop_one(&mut self, owner: &Owner, number: u64) {
         if let Some((_, _, payload)) = self.waiting.remove(&number) {
             self.note_gone(owner, number, payload.len());
         }
@@ -236,12 +258,13 @@ mod tests {
             mailbox.push(key("uav/2"), vec![byte]);
         }
         let mut left = 2;
-        let taken = mailbox.take(|sender, _| {
-            let may = sender.as_str() == "uav/2" || left > 0;
-            left -= i32::from(sender.as_str() == "uav/1");
+        let taken = mailbox.take(|key, _| {
+            let sender = key.sender().as_str();
+            let may = sender == "uav/2" || left > 0;
+            left -= i32::from(sender == "uav/1");
             may
         });
         assert_eq!(taken.len(), 6);
-        assert_eq!(left_of(&mut mailbox, "uav/1"), [2, 3]);
+        assert_eq!(left_of(&mut mailbox, "uav/1"), [3], "the newest state says all");
     }
 }

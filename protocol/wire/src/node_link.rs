@@ -269,7 +269,7 @@ impl NodeLink {
             self.mailbox.push(key, payload);
         }
         let (shares, node) = (&mut self.shares, &self.node);
-        let due = self.mailbox.take(|sender, bytes| shares.take(now, node.member(sender), bytes));
+        let due = self.mailbox.take(|key, bytes| shares.take(now, node.member(key.sender()), key, bytes));
         for (key, payload) in due {
             self.take_in(now, &key, &payload);
         }

@@ -4,10 +4,14 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use skein_bp::Bound;
-use skein_dbp::NodeName;
+use skein_dbp::{BidRecord, NodeName};
+
+use crate::key::Key;
 
 /// Reading and following a message costs about as much as so many bytes, however short it is.
 const PER_MESSAGE: usize = 512;
+/// A record of bids is read, judged and put on the program's board: each of its bytes costs as much as so many.
+const PER_BYTE_OF_BIDS: usize = 4;
 /// A share is for so long.
 const TICK_MS: u128 = 20;
 
@@ -26,7 +30,7 @@ struct Share {
 impl Shares {
     /// Uses the share of a member, or that of all others together, for a message of so many bytes, if any of it is left
     /// at `now`. A long message uses what is to come.
-    pub(crate) fn take(&mut self, now: Duration, member: Option<&NodeName>, bytes: usize) -> bool {
+    pub(crate) fn take(&mut self, now: Duration, member: Option<&NodeName>, key: &Key, bytes: usize) -> bool {
         let full = i64::try_from(Bound::TickBytes.most()).unwrap_or(i64::MAX);
         let member = member.cloned();
         let share = self.0.entry(member).or_insert(Share { left: full, at: now });
@@ -37,7 +41,8 @@ impl Shares {
         }
         let may = share.left > 0;
         if may {
-            share.left -= i64::try_from(bytes + PER_MESSAGE).unwrap_or(i64::MAX);
+            let per_byte = if key.is_of::<BidRecord>() { PER_BYTE_OF_BIDS } else { 1 };
+            share.left -= i64::try_from(per_byte * bytes + PER_MESSAGE).unwrap_or(i64::MAX);
         }
         may
     }
@@ -49,20 +54,27 @@ mod tests {
 
     const MS: Duration = Duration::from_millis(1);
 
+    fn key() -> Key {
+        "skein/demo/state/uav/1".parse().unwrap()
+    }
+
     #[test]
     fn short_messages_use_a_share_up_and_get_it_back_in_a_tick() {
         let (mut shares, one) = (Shares::default(), NodeName::new("uav/1").unwrap());
-        let mut taken = |at: Duration| (0..1000).filter(|_| shares.take(at, Some(&one), 0)).count();
+        let mut taken = |at: Duration| (0..1000).filter(|_| shares.take(at, Some(&one), &key(), 0)).count();
         assert_eq!(taken(MS), 128);
         assert_eq!((taken(MS), taken(11 * MS), taken(31 * MS)), (0, 64, 128));
-        assert!(shares.take(31 * MS, None, 0), "another's share is its own");
+        assert!(shares.take(31 * MS, None, &key(), 0), "another's share is its own");
     }
 
     #[test]
     fn a_long_message_is_taken_and_paid_for() {
         let mut shares = Shares::default();
-        assert!(shares.take(MS, None, 256 << 10));
-        assert!(!shares.take(50 * MS, None, 0));
-        assert!(shares.take(100 * MS, None, 0));
+        assert!(shares.take(MS, None, &key(), 256 << 10));
+        assert!(!shares.take(50 * MS, None, &key(), 0));
+        assert!(shares.take(100 * MS, None, &key(), 0));
+        let bids: Key = "skein/demo/bid/uav/1/uav/2".parse().unwrap();
+        assert!(shares.take(200 * MS, None, &bids, 16 << 10));
+        assert!(!shares.take(200 * MS, None, &key(), 0), "a record of 16 KiB is a tick's share");
     }
 }
