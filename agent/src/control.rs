@@ -380,8 +380,8 @@ impl Control {
         (self.decisions.standing(now) != Standing::Fresh).then(|| self.decisions.age(now))
     }
 
-    /// Without fresh decisions there is no leave to move, so that the vehicle hovers and avoids; what does not fly yet
-    /// is called off, and after a while it lands.
+    /// Without fresh decisions there is no leave to move, so that the vehicle hovers and avoids; what does
+    /// not fly yet is called off, and after a while it lands.
     fn heed_silence(&mut self, now: Duration) -> Option<Report> {
         let standing = self.decisions.standing(now);
         let why = format!("nothing was decided on board for {:.1} s", self.decisions.age(now).as_secs_f64());
@@ -395,7 +395,8 @@ impl Control {
         }
     }
 
-    /// Lands of its own accord a vehicle that it flies, unless it does already; gives what the mission should hear.
+    /// Lands of its own accord a vehicle that it flies, unless it does already; gives what the mission should
+    /// hear.
     pub fn land(&mut self, now: Duration, why: &str) -> Option<Report> {
         if !self.flight.is_committed() || self.flight.is_landing() || self.flight.is_on_the_ground() {
             return None;

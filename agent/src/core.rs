@@ -91,8 +91,8 @@ impl AgentCore {
         self
     }
 
-    /// The same agent, whose promises of a former life are lost, and `why`: it stands, or holds, until an operator says
-    /// that it may go on.
+    /// The same agent, whose promises of a former life are lost, and `why`: it stands, or holds, until an
+    /// operator says that it may go on.
     #[must_use]
     pub fn having_lost_promises(mut self, why: &str) -> Self {
         self.mission.forget_promises(why);

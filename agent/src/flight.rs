@@ -319,8 +319,8 @@ impl Flight {
         Report::CommandFailed(why)
     }
 
-    /// Does not carry out an instruction that has come too late; gives what the mission should hear, which takes it for
-    /// carried out.
+    /// Does not carry out an instruction that has come too late; gives what the mission should hear, which
+    /// takes it for carried out.
     pub fn decline(&mut self, instruction: Instruction, mode: FlightMode) -> Option<Report> {
         match (instruction, self.phase) {
             (Instruction::TakeOff, FlightPhase::Grounded) => {

@@ -31,7 +31,8 @@ use crate::{
     verify::check_script,
 };
 
-/// How many states of a script and the vehicle's program are looked at before it runs: no more than there is time for. `skein-agent verify --script` looks at all.
+/// How many states of a script and the vehicle's program are looked at before it runs: no more than there is
+/// time for. `skein-agent verify --script` looks at all.
 const STATES_TRIED: usize = 500;
 
 /// Why a script is not taken in that nobody sends.
@@ -90,7 +91,8 @@ pub struct Tried {
 }
 
 impl Trial {
-    /// Looks for a fault of the script together with the vehicle's program. It takes some tens of milliseconds.
+    /// Looks for a fault of the script together with the vehicle's program. It takes some tens of
+    /// milliseconds.
     #[must_use]
     pub fn run(self) -> Tried {
         let Self { assignment, from, config, is_known } = self;
@@ -258,7 +260,8 @@ impl Mission {
         self.mind.decide(now, self.node.node_mut())
     }
 
-    /// The limits on the vehicle's motion that its b-threads state now, if they may have changed since the last call.
+    /// The limits on the vehicle's motion that its b-threads state now, if they may have changed since the
+    /// last call.
     pub fn changed_limits(&mut self) -> Option<&Limits> {
         let program = self.node.node().program();
         if self.limits_of.replace(program.revision()) == Some(program.revision()) {
@@ -273,7 +276,8 @@ impl Mission {
         self.node.node_mut().note_disk(what, trouble);
     }
 
-    /// What this vehicle has promised in a former life is lost, and `why`: it does not go on before an operator says so.
+    /// The promises of this vehicle's former life are lost, and `why`: it does not go on before an
+    /// operator says so.
     pub fn forget_promises(&mut self, why: &str) {
         let bthread = bthreads::LostPromises::new(self.me.clone(), why);
         self.node.node_mut().program_mut().add("lost_promises", bthread);

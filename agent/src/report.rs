@@ -34,7 +34,8 @@ pub enum Report {
     },
     /// The agent has not run for so long that it let go of the vehicle.
     Slept(Duration),
-    /// Control lands the vehicle of its own accord, and this is why; the mission is to see to it that it stays so.
+    /// Control lands the vehicle of its own accord, and this is why; the mission is to see to it that it
+    /// stays so.
     Lands(String),
     /// The autopilot does not do what it was told on the ground.
     CommandFailed(String),

@@ -1092,7 +1092,7 @@ fn a_vehicle_that_has_lost_its_promises_says_so_and_stays_until_an_operator_lets
     let lost = bthreads::LostPromises::new(Me::new(ME), "the file is cut short");
     vehicle.program.add("lost_promises", lost);
     let told = vehicle.reports(Ready::NAME);
-    assert_eq!(told, ["ready", "hold: its promises are lost: the file is cut short"]);
+    assert_eq!(told, ["hold: its promises are lost: the file is cut short", "ready"]);
     assert_eq!(vehicle.is_ordered(What::Hold), ["order hold", "hold: ordered by the operator"]);
     assert!(vehicle.is_ordered(What::Resume).contains(&"takeoff".to_owned()));
 }

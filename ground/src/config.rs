@@ -37,7 +37,8 @@ pub struct GroundConfig {
     pub authority: Authority,
     /// The promises of a former life of this station: joint decisions, and a roster that an operator has given.
     pub kept: Kept,
-    /// Whether what a former life has kept is lost: see [`NodeConfig::forgot`](skein_dbp::NodeConfig::forgot).
+    /// Whether what a former life has kept is lost: see
+    /// [`NodeConfig::forgot`](skein_dbp::NodeConfig::forgot).
     pub forgot: bool,
     /// Seed of the program's tie-breaks.
     pub seed: u64,

@@ -18,13 +18,14 @@ use crate::{
     report::Report,
 };
 
-/// An agent that has not run for this long has let its set-points fall silent, and does not take them up by itself.
+/// An agent that has not run for this long has let its set-points fall silent, and does not take them up by
+/// itself.
 const LONGEST_PAUSE: Duration = SILENT_AFTER;
 /// A navigation cycle and a state message to the others begin this often.
 pub const CYCLE_PERIOD: Duration = Duration::from_millis(100);
 
-/// Control of one vehicle, which hears and tells the others itself. Feed it bytes, scans and orders, tick it every 20
-/// ms, carry its bytes and its news away.
+/// Control of one vehicle, which hears and tells the others itself. Feed it bytes, scans and orders, tick it
+/// every 20 ms, carry its bytes and its news away.
 #[derive(Debug)]
 pub struct ControlSide {
     pub(crate) control: Control,
@@ -60,7 +61,8 @@ impl ControlSide {
         self.control.take_mavlink()
     }
 
-    /// Takes in what another station says to the autopilot through this agent: an order of it takes the vehicle over.
+    /// Takes in what another station says to the autopilot through this agent: an order of it takes the
+    /// vehicle over.
     pub fn overhear(&mut self, now: Duration, bytes: &[u8]) {
         if let Some(report) = self.control.overhear(bytes) {
             self.news.reports.put(now, report);
@@ -171,7 +173,7 @@ impl ControlSide {
         }
     }
 
-    /// What it has to tell the mission since the last call.
+    /// Takes the news for the mission since the last call.
     pub fn take_news(&mut self) -> News {
         std::mem::take(&mut self.news)
     }
@@ -192,7 +194,8 @@ impl ControlSide {
         self.control.flight().is_committed()
     }
 
-    /// The newest set-point, when it was made, and the motion of the vehicle as it is now; none before the first.
+    /// The newest set-point, when it was made, and the motion of the vehicle as it is now; none before the
+    /// first.
     #[must_use]
     pub fn last_set_point(&self) -> Option<(Duration, SetPoint, Motion)> {
         self.control.last_set_point()

@@ -36,7 +36,7 @@ impl Decisions {
         now.saturating_sub(*self.newest.get_or_insert(now))
     }
 
-    /// What follows from it.
+    /// The consequence of it.
     pub fn standing(&mut self, now: Duration) -> Standing {
         match self.age(now) {
             age if age > LAND_AFTER => Standing::TooOld,
@@ -46,8 +46,8 @@ impl Decisions {
     }
 }
 
-/// Whether an instruction that was decided at `at` comes too late to be carried out. What brings the vehicle to a stop
-/// or down never does.
+/// Whether an instruction that was decided at `at` comes too late to be carried out. What brings the vehicle
+/// to a stop or down never does.
 pub fn is_too_late(now: Duration, at: Duration, instruction: &Instruction) -> bool {
     let sets_going = matches!(
         instruction,

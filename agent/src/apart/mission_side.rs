@@ -12,11 +12,11 @@ use super::{
 };
 use crate::mission::{Mission, Outcome, Trial, Tried};
 
-/// What is decided may be answered by what is selected next, which deserves its turn in the same step; so often.
+/// A decision may be answered by what is selected next, which deserves its turn in the same step; so often.
 const ROUNDS: usize = 4;
 
-/// The mission of one vehicle. Feed it news, let it go on every 20 ms and when news or messages have come, and carry
-/// its orders to control.
+/// The mission of one vehicle. Feed it news, let it go on every 20 ms and when news or messages have come,
+/// and carry its orders to control.
 #[derive(Debug)]
 pub struct MissionSide {
     mission: Mission,
@@ -29,8 +29,8 @@ impl MissionSide {
         Self { mission, body: Body::default(), next_cycle: Duration::ZERO }
     }
 
-    /// Goes on: hears control and other nodes, decides, and says to other nodes what is to be said. Gives the orders
-    /// for control.
+    /// Goes on: hears control and other nodes, decides, and says to other nodes what is to be said. Gives the
+    /// orders for control.
     pub fn go_on(&mut self, now: Duration, news: News, link: &mut dyn Link) -> Orders {
         // States and checks are control's to hear, who has a link for them.
         self.mission.receive(now, link);

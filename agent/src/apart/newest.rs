@@ -1,4 +1,4 @@
-//! What waits to be taken: the newest of each kind, in the order in which they came.
+//! A tray in which the newest thing of each kind waits to be taken, in the order in which they came.
 
 use std::mem::discriminant;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! What control tells the mission.
+//! Control's words to the mission.
 
 use nalgebra::Vector3;
 use skein_wire::event::What;
@@ -6,7 +6,7 @@ use skein_wire::event::What;
 use super::newest::Newest;
 use crate::{neighbours::Neighbour, report::Report, scripts::Circumstances};
 
-/// What control has to tell: what it has found out, and how the vehicle does.
+/// Control's findings, and the state of the vehicle.
 #[derive(Clone, Debug, Default)]
 pub struct News {
     pub reports: Newest<Report>,
@@ -16,7 +16,7 @@ pub struct News {
     pub order: Option<What>,
 }
 
-/// How the vehicle does.
+/// The state of the vehicle, as far as the mission needs it.
 #[derive(Clone, Debug, Default)]
 pub struct Body {
     /// Whether it is on its way down.

@@ -1,4 +1,4 @@
-//! What the mission tells control.
+//! The mission's words to control.
 
 use std::time::Duration;
 
@@ -7,12 +7,12 @@ use skein_wire::{Limits, MissionState, State};
 use super::newest::Newest;
 use crate::instruction::Instruction;
 
-/// What the mission has decided.
+/// The mission's decisions.
 #[derive(Clone, Debug, Default)]
 pub struct Orders {
     /// When it has decided last, even if it was that nothing is to be done.
     pub decided: Duration,
-    /// What is to be done, each with the time when that was decided.
+    /// The things to be done, each with the time when that was decided.
     pub instructions: Newest<Instruction>,
     /// The newest, if they have changed; as the rest.
     pub limits: Option<Limits>,

@@ -1,5 +1,5 @@
-//! Lost promises: an agent that does not know what it has promised in a former life stands, or holds, until somebody
-//! with authority says otherwise.
+//! Lost promises: an agent that does not know what it has promised in a former life stands, or holds, until
+//! somebody with authority says otherwise.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! Control's thread: from the autopilot's bytes, scans, neighbours' states and the mission's orders to set-points. It
-//! waits for nothing but its next look.
+//! Control's thread: from the autopilot's bytes, scans, neighbours' states and the mission's orders to
+//! set-points. It waits for nothing but its next look.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -16,8 +16,8 @@ use crate::autopilot_link::AutopilotLink;
 
 /// The control loop's period.
 const TICK: Duration = Duration::from_millis(20);
-/// The autopilot's link is looked at this often. What has come since the last look counts as that old: so nothing that
-/// waited while the agent did not run passes for fresh.
+/// The autopilot's link is looked at this often. What has come since the last look counts as that old: so
+/// nothing that waited while the agent did not run passes for fresh.
 const LOOK: Duration = Duration::from_millis(5);
 
 /// All that control needs.
@@ -27,7 +27,7 @@ pub struct ControlThread {
     /// Others that the autopilot's line is shared with.
     pub stations: Vec<AutopilotLink>,
     pub scans: Option<LidarScans>,
-    /// What other vehicles say of themselves.
+    /// Other vehicles' words about themselves.
     pub vehicles: ZenohLink,
     pub exchange: Arc<Exchange>,
     pub log: Log,
@@ -41,14 +41,14 @@ pub struct ControlThread {
 pub struct Pace {
     looked: Duration,
     next_tick: Duration,
-    /// What the mission has yet to be told.
+    /// The news that the mission has yet to be told.
     news: News,
     is_ending: bool,
     told_silence: bool,
     last_set_point: Option<Duration>,
 }
 
-/// How it has ended.
+/// The way in which it has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
     /// As it was asked to.

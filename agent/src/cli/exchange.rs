@@ -1,4 +1,4 @@
-//! What the threads of control and of the mission have for one another.
+//! The exchange between the threads of control and of the mission.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError, TryLockError};
@@ -7,16 +7,16 @@ use skein_zenoh::Bell;
 
 use crate::apart::{News, Orders};
 
-/// Two trays, and what else is known to both. Control never waits here: where the other thread has its hand in a tray,
-/// it looks again at its next look.
+/// Two trays, and what else is known to both. Control never waits here: where the other thread has its hand
+/// in a tray, it looks again at its next look.
 pub struct Exchange {
     news: Mutex<News>,
     orders: Mutex<Orders>,
     to_control: Bell,
     to_mission: Bell,
-    /// How often control has gone on.
+    /// Counts how often control has gone on.
     pub beats: AtomicU64,
-    /// How often whoever is at this computer has asked the program to end.
+    /// Counts how often whoever is at this computer has asked the program to end.
     pub interruptions: AtomicU32,
     /// Whether the mission's thread has ended by itself.
     pub mission_is_gone: AtomicBool,

@@ -1,4 +1,4 @@
-//! What control has to write down: on a thread that may wait for a disk or a terminal.
+//! Control's lines, written down on a thread that may wait for a disk or a terminal.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;

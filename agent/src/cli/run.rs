@@ -1,8 +1,8 @@
 //! `run`: one vehicle's threads around its core.
 //!
-//! [Control](ControlThread) and [mission](MissionThread) have a thread each; a third writes control's lines, and the
-//! program's first watches over them. The program never flies on with half of itself: without its mission it lands and
-//! ends, without control it ends at once, and the autopilot's own failsafe acts.
+//! [Control](ControlThread) and [mission](MissionThread) have a thread each; a third writes control's lines,
+//! and the program's first watches over them. The program never flies on with half of itself: without its
+//! mission it lands and ends, without control it ends at once, and the autopilot's own failsafe acts.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;

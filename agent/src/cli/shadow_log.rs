@@ -35,8 +35,8 @@ impl ShadowLog {
         Ok(Self { file, path, room, is_full: false })
     }
 
-    /// Writes a set-point, made at this time of a vehicle that moved like this. In world ENU; what a set-point leaves to
-    /// the autopilot stays empty. The file grows to its greatest size and no further.
+    /// Writes a set-point, made at this time of a vehicle that moved like this. In world ENU; what a
+    /// set-point leaves to the autopilot stays empty. The file grows to its greatest size and no further.
     ///
     /// # Errors
     /// It cannot be written.

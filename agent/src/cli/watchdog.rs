@@ -1,22 +1,22 @@
 //! The watchdog: whether control goes on.
 
-/// How often it looks, in milliseconds.
+/// Between two looks, in milliseconds.
 pub const LOOK_MS: u64 = 50;
-/// After so many looks without a sign of life, control has let its set-points fall silent: the autopilot's own failsafe
-/// acts.
+/// After so many looks without a sign of life, control has let its set-points fall silent: the autopilot's
+/// own failsafe acts.
 const STALLED: u32 = 1000 / LOOK_MS as u32;
 /// After so many, the program ends: whoever watches over it starts it again.
 const HUNG: u32 = 10_000 / LOOK_MS as u32;
 
-/// Counts the looks at which nothing had moved. It counts its own looks and not time: a program that was stopped for a
-/// while as a whole does not hang.
+/// Counts the looks at which nothing had moved. It counts its own looks and not time: a program that was
+/// stopped for a while as a whole does not hang.
 #[derive(Debug, Default)]
 pub struct Watchdog {
     beats: u64,
     idle_looks: u32,
 }
 
-/// What one look has shown.
+/// The result of one look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
     Alive,

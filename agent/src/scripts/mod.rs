@@ -63,7 +63,7 @@ pub struct Scripts {
     now: Duration,
 }
 
-/// What has become of a script that was taken in.
+/// The fate of a script that was taken in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loaded {
     Runs,
@@ -184,8 +184,8 @@ impl Scripts {
         }
     }
 
-    /// Goes on with keeping. Adds the scripts that waited for it to the program, or gives them up; gives what has
-    /// become of each.
+    /// Goes on with keeping. Adds the scripts that waited for it to the program, or gives them up; gives what
+    /// has become of each.
     pub fn catch_up(&mut self, now: Duration, program: &mut Program) -> Vec<(String, Result<(), String>)> {
         self.now = now;
         let is_kept = self.store.as_mut().is_none_or(|store| store.go_on(now));

@@ -29,14 +29,15 @@ const TIME_TO_END: Duration = Duration::from_secs(5);
 /// Something to be written.
 type Write = Box<dyn FnOnce(&mut Recorder) -> Result<(), RecorderError> + Send>;
 
-/// A `mission.mcap` that grows with the mission, up to its greatest size, and as long as its disk has room for what
-/// matters more. When it can grow no more, the station says so and goes on without it. Nobody waits for its disk.
+/// A `mission.mcap` that grows with the mission, up to its greatest size, and as long as its disk has room
+/// for what matters more. When it can grow no more, the station says so and goes on without it. Nobody waits
+/// for its disk.
 pub struct Recording {
     /// None once it has ended.
     writes: Option<SyncSender<Write>>,
     thread: JoinHandle<()>,
     trouble: Arc<Mutex<Option<String>>>,
-    /// What was left out because the disk was too slow.
+    /// Counts what was left out because the disk was too slow.
     left_out: u64,
     /// The number of vehicles that the file shows by now.
     shown: usize,
@@ -166,7 +167,8 @@ fn named<T: Copy>(of: &[(NodeName, T)]) -> Vec<(&str, T)> {
     of.iter().map(|(node, value)| (node.as_str(), *value)).collect()
 }
 
-/// Writes what comes, until nothing more can come. What has been written before it ends by an error can be read.
+/// Writes what comes, until nothing more can come. What has been written before it ends by an error can be
+/// read.
 fn record(folder: &Path, most_bytes: u64, writes: &Receiver<Write>) -> anyhow::Result<()> {
     let path = folder.join("mission.mcap");
     let mut room = Room::new(&path, most_bytes);

@@ -42,8 +42,8 @@ pub struct NodeConfig {
     pub durable: bool,
     /// The promises of a former life of this node.
     pub kept: Kept,
-    /// Whether what a former life has kept is lost. As coordinator it then decides nothing before an operator begins a new
-    /// term, since it does not know what it has decided in this one.
+    /// Whether what a former life has kept is lost. As coordinator it then decides nothing before an operator
+    /// begins a new term, since it does not know what it has decided in this one.
     pub forgot: bool,
     /// The band that priorities of remote bids are brought into.
     pub remote_priority: RangeInclusive<i32>,

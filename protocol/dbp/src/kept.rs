@@ -8,10 +8,10 @@ use crate::name::NodeName;
 
 /// The promises that a node must keep on disk.
 ///
-/// A driver saves what [`Node::take_unsaved`](crate::Node::take_unsaved) gives. Until that is on disk, and it has said
-/// so by [`Node::saved`](crate::Node::saved), it sends of [`Node::take_outgoing`](crate::Node::take_outgoing) what
-/// [`Node::sort_out`](crate::Node::sort_out) lets pass. The saved value is handed to the node's next life in
-/// [`NodeConfig::kept`](crate::NodeConfig::kept).
+/// A driver saves what [`Node::take_unsaved`](crate::Node::take_unsaved) gives. Until that is on disk, and it
+/// has said so by [`Node::saved`](crate::Node::saved), it sends of
+/// [`Node::take_outgoing`](crate::Node::take_outgoing) what [`Node::sort_out`](crate::Node::sort_out) lets
+/// pass. The saved value is handed to the node's next life in [`NodeConfig::kept`](crate::NodeConfig::kept).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Kept {

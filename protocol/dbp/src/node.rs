@@ -60,7 +60,7 @@ pub struct Node {
     joint: Joint,
     /// The others, and what is heard from and sent to them.
     pub(crate) channel: Channel,
-    /// What the disk does not take, as far as it has been told.
+    /// The things that the disk does not take, as far as that has been told.
     disk_fails: BTreeSet<String>,
     stats: NodeStats,
 }
@@ -148,8 +148,8 @@ impl Node {
         self.channel.take_outgoing()
     }
 
-    /// The promises that must outlive this node, if they have changed since the last call: to be on disk before what
-    /// depends on them is [sent](Self::sort_out).
+    /// The promises that must outlive this node, if they have changed since the last call: to be on disk
+    /// before what depends on them is [sent](Self::sort_out).
     pub fn take_unsaved(&mut self) -> Option<Kept> {
         let blocks = self.home.table.take_unsaved();
         (self.joint.take_unsaved() || blocks).then(|| self.kept())
@@ -161,9 +161,9 @@ impl Node {
         self.joint.saved();
     }
 
-    /// The store does not take what it is given. From now until it has [`saved`](Self::saved), no new promise is given:
-    /// a block that would have to be kept is refused, nothing is decided together, and no new roster is taken on. What
-    /// was on disk before stays promised.
+    /// The store does not take what it is given. From now until it has [`saved`](Self::saved), no new promise
+    /// is given: a block that would have to be kept is refused, nothing is decided together, and no new
+    /// roster is taken on. What was on disk before stays promised.
     pub fn store_fails(&mut self) {
         let proxies = self.home.table.store_fails();
         self.run.change_proxies(proxies);
@@ -186,9 +186,9 @@ impl Node {
         }
     }
 
-    /// Sorts out of some messages those that would let others rely on what is not on disk yet: they are left in
-    /// `messages`, and the rest is given back, to be sent at once. A sign of life is sent without its word about joint
-    /// events.
+    /// Sorts out of some messages those that would let others rely on what is not on disk yet: they are left
+    /// in `messages`, and the rest is given back, to be sent at once. A sign of life is sent without its word
+    /// about joint events.
     pub fn sort_out(&self, messages: &mut Vec<(Recipient, Message)>) -> Vec<(Recipient, Message)> {
         let (depending, mut free): (Vec<_>, Vec<_>) =
             std::mem::take(messages).into_iter().partition(|(_, message)| match message {

@@ -6,11 +6,12 @@ use std::thread;
 
 use skein_wire::{Saving, Store};
 
-/// Saves on a thread of its own, so that nobody waits for a slow disk, nor for one that does not answer at all.
+/// Saves on a thread of its own, so that nobody waits for a slow disk, nor for one that does not answer at
+/// all.
 pub struct Background<T> {
     values: SyncSender<T>,
     outcomes: Receiver<Saving>,
-    /// What the thread has in hand.
+    /// The value that the thread has in hand.
     in_hand: Option<T>,
 }
 

@@ -48,12 +48,12 @@ impl Store<u64> for IncarnationStore {
     }
 }
 
-/// The next incarnation of `node`: greater than every one before that had this `folder`, and on disk before it is
-/// returned, if the disk takes it; at least `least`, for a node that has lost count. Others take a lower one for a node
-/// that is no more.
+/// The next incarnation of `node`: greater than every one before that had this `folder`, and on disk before
+/// it is returned, if the disk takes it; at least `least`, for a node that has lost count. Others take a lower
+/// one for a node that is no more.
 ///
-/// A number that is damaged is set aside. Without it, and where the disk does not take the new one, the clock gives a
-/// number: milliseconds since 1970, more than any node has had lives.
+/// A number that is damaged is set aside. Without it, and where the disk does not take the new one, the clock
+/// gives a number: milliseconds since 1970, more than any node has had lives.
 ///
 /// # Errors
 /// The clock is needed, and has not been set, and there is no `least` either.
@@ -119,8 +119,8 @@ enum Taken {
     Unreadable(String),
 }
 
-/// Puts the number that follows the file's into its place; `follow` is given none if the file holds no number. Two
-/// processes that start at once get two numbers: the lock goes with the file's handle.
+/// Puts the number that follows the file's into its place; `follow` is given none if the file holds no
+/// number. Two processes that start at once get two numbers: the lock goes with the file's handle.
 fn take(path: &Path, follow: impl FnOnce(Option<u64>) -> Option<u64>) -> io::Result<Taken> {
     begin(path)?;
     let mut file = OpenOptions::new().read(true).write(true).open(path)?;
@@ -144,7 +144,8 @@ fn number(text: &[u8]) -> Option<u64> {
     text.trim().parse().ok().filter(|_| is_whole)
 }
 
-/// Makes the file if there is none. It appears with a number in it, so that an empty one is known to be damaged.
+/// Makes the file if there is none. It appears with a number in it, so that an empty one is known to be
+/// damaged.
 fn begin(path: &Path) -> io::Result<()> {
     if path.symlink_metadata().is_ok() {
         return Ok(());

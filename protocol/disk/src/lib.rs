@@ -4,8 +4,9 @@
 //! - [`PromiseStore`]: what a node has promised to others ([`skein_dbp::Kept`]);
 //! - [`ScriptStore`]: the scripts that a vehicle was sent ([`skein_wire::KeptScript`]).
 //!
-//! [`Memory`] opens all that a life begins with. Libraries read no file: they know the seam [`skein_wire::Store`]. Programs open these files and hand them over, each
-//! behind a thread of its own ([`Background`]): who keeps something never waits for the disk.
+//! [`Memory`] opens all that a life begins with. Libraries read no file: they know the seam
+//! [`skein_wire::Store`]. Programs open these files and hand them over, each behind a thread of its own
+//! ([`Background`]): who keeps something never waits for the disk.
 //!
 //! A file that is damaged is [set aside](Lost), and its node starts without it.
 

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::{fmt, fs, io};
 
-/// What was kept cannot be had: what is wrong with its file, and what has become of that.
+/// Something that was kept cannot be had: the problem with its file, and the fate of that.
 #[derive(Debug, thiserror::Error)]
 #[error("`{}`: {problem}; {what}. {fate}", path.display())]
 pub struct Lost {
     pub path: PathBuf,
     pub problem: String,
-    /// What is kept there, and what its loss means.
+    /// The content, and what its loss means.
     what: &'static str,
     fate: Fate,
 }

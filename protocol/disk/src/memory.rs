@@ -28,8 +28,8 @@ pub struct Number {
 }
 
 impl Memory {
-    /// Opens the memory of `node` in `folder`, for a life whose number is at least `least`; `clock` is this computer's, and `done` is called when something has been
-    /// kept, or could not be.
+    /// Opens the memory of `node` in `folder`, for a life whose number is at least `least`; `clock` is this
+    /// computer's, and `done` is called when something has been kept, or could not be.
     ///
     /// # Errors
     /// There is no number for this life that is surely greater than those before, or no thread for the disk.

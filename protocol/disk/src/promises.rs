@@ -13,9 +13,9 @@ use crate::node_file;
 pub struct PromiseStore(PathBuf);
 
 impl PromiseStore {
-    /// The store of `node` in `folder`, and what a former life has kept there. A file that cannot be understood is set
-    /// aside as `<node>.kept.json.damaged`: the node starts, and does not move on before somebody who has been told
-    /// says so.
+    /// The store of `node` in `folder`, and what a former life has kept there. A file that cannot be
+    /// understood is set aside as `<node>.kept.json.damaged`: the node starts, and does not move on before
+    /// somebody who has been told says so.
     pub fn open(folder: &Path, node: &NodeName) -> (Self, Result<Kept, Lost>) {
         let path = node_file::path_of(folder, node, "kept.json");
         let kept = match node_file::read(&path) {

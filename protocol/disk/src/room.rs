@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// What is recorded leaves so much of a disk free, bytes; a tenth of it, if that is less.
+/// Recordings leave so much of a disk free, bytes; a tenth of it, if that is less.
 pub const RESERVE: u64 = 64 << 20;
 /// The disk is asked this often.
 const LOOK: Duration = Duration::from_secs(1);
 
-/// The room for one file that grows: up to a greatest size, and as long as its disk has enough left for what matters
-/// more.
+/// The room for one file that grows: up to a greatest size, and as long as its disk has enough left for what
+/// matters more.
 #[derive(Debug)]
 pub struct Room {
     path: PathBuf,

@@ -395,8 +395,8 @@ impl NodeLink {
         is_kept
     }
 
-    /// Holds back what depends on what is not kept, and gives the rest. If the store is in trouble, it is to the others
-    /// as if the network had lost it: they ask again.
+    /// Holds back what depends on what is not kept, and gives the rest. If the store is in trouble, it is to
+    /// the others as if the network had lost it: they ask again.
     fn withhold(&mut self, mut outgoing: Vec<(Recipient, Message)>) -> Vec<(Recipient, Message)> {
         let free = self.node.sort_out(&mut outgoing);
         if self.trouble().is_some() {

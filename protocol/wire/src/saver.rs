@@ -6,7 +6,7 @@ use crate::store::{Saving, Store};
 
 /// A store that takes longer than this for something counts as one that fails, until it is done.
 const PATIENCE: Duration = Duration::from_millis(200);
-/// What a store has failed to keep is tried again after so long.
+/// After a failure a store is asked again after so long.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 
 /// Brings values to a store, the newest in place of all before, until the store has it.

@@ -9,12 +9,13 @@ use skein_dbp::Kept;
 
 /// Keeps what must not be forgotten: a node's promises ([`Kept`]), or the scripts that it was sent ([`KeptScript`]).
 pub trait Store<T = Kept>: Debug + Send {
-    /// Keeps `kept` in place of what was kept before, so that it is still there after a crash. One that takes its time
-    /// is asked again with the same value until it is done, or has failed; asked after that, it tries again.
+    /// Keeps `kept` in place of what was kept before, so that it is still there after a crash. One that takes
+    /// its time is asked again with the same value until it is done, or has failed; asked after that, it
+    /// tries again.
     fn save(&mut self, kept: &T) -> Saving;
 }
 
-/// How far a store has come with what it was given last.
+/// The progress of a store with what it was given last.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Saving {
     /// It would be there after a crash.

@@ -1,4 +1,5 @@
-//! The words of vehicles about their bodies, apart from the protocol between nodes: for one who may not wait for it.
+//! The words of vehicles about their bodies, apart from the protocol between nodes: for one who may not wait
+//! for it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,8 +14,8 @@ const MOST_PER_LOOK: usize = 1024;
 
 /// Hears the states and checks of the vehicles of a roster, and tells those of one's own.
 ///
-/// Of what has arrived since the last look only the newest of each vehicle is read, and nothing that others say: what a
-/// member sends costs one reading in each look.
+/// Of what has arrived since the last look only the newest of each vehicle is read, and nothing that others
+/// say: what a member sends costs one reading in each look.
 #[derive(Debug)]
 pub struct VehicleLink {
     name: NodeName,

@@ -113,7 +113,8 @@ impl ZenohSession {
         self.listen_with(patterns, Inbox::new(self.0.incoming_capacity))
     }
 
-    /// The same, but of the messages under one key only the newest waits: one who says much takes nobody's place.
+    /// The same, but of the messages under one key only the newest waits: one who says much takes nobody's
+    /// place.
     pub fn listen_to_newest(&self, patterns: Vec<String>) -> Result<ZenohLink, ZenohError> {
         self.listen_with(patterns, Inbox::of_newest(self.0.incoming_capacity))
     }

@@ -128,7 +128,8 @@ impl Swarm {
         }
     }
 
-    /// From now on the mission of vehicle `index` is silent, or decides again, as if its thread hung or went on.
+    /// From now on the mission of vehicle `index` is silent, or decides again, as if its thread hung or went
+    /// on.
     pub fn halt_mission(&mut self, index: usize, is_silent: bool) {
         if let Some(vehicle) = self.vehicles.get_mut(index) {
             vehicle.has_mission = !is_silent;

@@ -83,8 +83,8 @@ impl Rights {
         self.home = home;
     }
 
-    /// The part of a bid that is honoured, by its place in a record, and why not the rest; whether its block is kept
-    /// already and `stays` as it is.
+    /// The part of a bid that is honoured, by its place in a record, and why not the rest; whether its block
+    /// is kept already and `stays` as it is.
     pub(super) fn judge(
         &self,
         node: &NodeName,

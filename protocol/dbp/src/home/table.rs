@@ -234,7 +234,8 @@ impl BidTable {
             self.owed.insert(record.node.clone());
         }
         if !self.rights.store_works {
-            // What is kept now is on disk: what is withdrawn may come back in this home's next life, but nothing is lost.
+            // What is kept now is on disk: what is withdrawn may come back in this home's next life, but
+            // nothing is lost.
             self.owed.remove(&record.node);
         }
         let before = std::mem::replace(&mut bidder.bids, taken);

@@ -1,4 +1,5 @@
-//! `skein-agent` with a b-thread that keeps the mission's thread busy, for tests of what control does meanwhile.
+//! `skein-agent` with a b-thread that keeps the mission's thread busy, for tests of what control does
+//! meanwhile.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -16,7 +17,7 @@ fn main() -> ExitCode {
 /// Some time after take-off a b-thread does not come back for a while.
 #[derive(Debug, Deserialize)]
 struct Dawdle {
-    /// How long after, in seconds.
+    /// So long after, in seconds.
     #[serde(deserialize_with = "field::positive")]
     after_s: f64,
     /// For how long, in seconds.
