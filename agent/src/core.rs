@@ -257,11 +257,6 @@ impl AgentCore {
         self.mission.scripts().running()
     }
 
-    /// Why this agent's next life would not run the scripts that run now, if so: they could not be written down yet.
-    pub fn unsaved_scripts(&self) -> Option<&str> {
-        self.mission.scripts().unsaved()
-    }
-
     /// The outcome of the mission, once it has ended.
     pub fn outcome(&self) -> Option<&Outcome> {
         self.mission.outcome()
