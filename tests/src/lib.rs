@@ -32,7 +32,6 @@ pub fn flight(scenario: &str, seed: u64) -> Fly {
         ground: None,
         console: ([127, 0, 0, 1], 0).into(),
         port_offset: 0,
-        secure: false,
     }
 }
 
