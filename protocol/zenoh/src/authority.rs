@@ -118,6 +118,9 @@ impl Authority {
         now: SystemTime,
     ) -> Result<Vec<Issued>, AuthorityError> {
         self.check_files(holders)?;
+        for Holder { node, hosts, .. } in holders {
+            hosts.iter().try_for_each(|host| name_of(node, host).map(drop))?;
+        }
         let issued = holders.iter().map(|holder| self.issue_one(holder, days, renew, now)).collect();
         let relays = holders.iter().filter(|holder| holder.relays).map(|holder| holder.node.clone());
         self.roster = std::mem::take(&mut self.roster).relayed_by(relays);
