@@ -130,7 +130,7 @@ bounds! {
         "Where there is one, its members alone are heard. First come, first kept; one silent for 45 s makes room.";
     RadiusMetres = "radius_m", 5, "m, the radius that a neighbour is believed",
         "The largest multicopters span 4 m. Who claims more is kept away from as if it were so large.";
-    SigmaMetres = "sigma_m", 10, "m, the standard deviation of a position that a neighbour is believed",
+    SigmaMetres = "sigma_m", 4, "m, the standard deviation of a position that a neighbour is believed",
         "Who knows less of its place lands; the separation widens by 4 m at most anyway.";
     SpeedMetresPerSecond = "speed_m_s", 50, "m/s, the speed that a neighbour is believed",
         "Twice what multicopters fly.";

@@ -268,6 +268,7 @@ impl NodeLink {
             }
             self.mailbox.push(key, payload);
         }
+        self.shares.begin(now);
         let (shares, node) = (&mut self.shares, &self.node);
         let due = self.mailbox.take(|key, bytes| shares.take(now, node.member(key.sender()), key, bytes));
         for (key, payload) in due {

@@ -190,7 +190,7 @@ fn a_place_beyond_the_world_is_none_and_long_words_are_cut() {
         panic!("it is not read")
     };
     assert!(read.bring_to_what_is_believed() && !State::new(name("uav/2")).bring_to_what_is_believed());
-    assert_eq!((read.radius_m, read.position_sigma_m), (5.0, 10.0));
+    assert_eq!((read.radius_m, read.position_sigma_m), (5.0, 4.0));
     assert!((read.velocity.norm() - 50.0).abs() < 1e-9, "{}", read.velocity);
     assert!(read.task.len() <= Bound::TextBytes.stated() && read.task.ends_with('…'));
 }

@@ -7,7 +7,6 @@ mod determinism;
 mod explain;
 mod faults;
 mod gazebo_worlds;
-mod hostile;
 mod landing;
 mod limits;
 mod no_lidar;
