@@ -48,6 +48,7 @@ macro_rules! messages {
         /// # Ok::<(), Box<dyn std::error::Error>>(())
         /// ```
         #[derive(Clone, Debug, PartialEq)]
+        #[allow(clippy::large_enum_variant)] // It is taken apart as soon as it is read.
         pub enum Payload {
             /// A message of the protocol between b-programs.
             Message(Message),
