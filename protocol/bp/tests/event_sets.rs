@@ -271,8 +271,8 @@ fn files_say_which_limit_a_set_exceeds() {
     assert!(read(&wrap(Bound::SetDepth.stated() - 1)).is_ok());
     let deep = read(&wrap(46)).unwrap_err();
     assert!(deep.contains("17 levels") && deep.contains("at most 16 (bound `set_depth`)"), "{deep}");
-    let wide = read(&format!("[{}]", vec!["\"a\""; 1024].join(", "))).unwrap_err();
-    assert!(wide.contains("1025 sets") && wide.contains("bound `set_nodes`"), "{wide}");
+    let wide = read(&format!("[{}]", vec!["\"a\""; 2048].join(", "))).unwrap_err();
+    assert!(wide.contains("2049 sets") && wide.contains("bound `set_nodes`"), "{wide}");
     let long = read(&format!("{{\"prefix\": \"{}\"}}", "x".repeat(257))).unwrap_err();
     assert!(long.contains("257 bytes of a name") && long.contains("bound `name_bytes`"), "{long}");
     let stars = read(&format!("{{\"named\": \"{}\"}}", vec!["**"; 17].join("/"))).unwrap_err();
