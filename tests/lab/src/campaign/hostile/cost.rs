@@ -14,7 +14,7 @@ const PER_MESSAGE: usize = 512;
 /// Sets looked at in a tick while one member's messages are taken in. What is read in a tick has some 4000 sets, each of
 /// which is looked at some twenty times; one comparison takes 16384.
 #[cfg(feature = "mutants")]
-const SETS_PER_TICK: usize = 1 << 18;
+const SETS_PER_TICK: usize = 1 << 17;
 
 /// The most that was counted of something, and the most that is stated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

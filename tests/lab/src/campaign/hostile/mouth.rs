@@ -115,7 +115,9 @@ impl Mouth {
     }
 
     fn say(&mut self, habit: &Habit, random: &mut ChaCha8Rng) {
-        let (size, count) = (habit.size, usize::try_from(habit.size).unwrap_or(usize::MAX));
+        // Sizes of every order, the large ones more often.
+        let size = (habit.size.max(1) as f64).powf(random.random_range(0.75_f64..=1.0)).round() as u64;
+        let count = usize::try_from(size).unwrap_or(usize::MAX);
         match habit.say {
             Say::Lives => {
                 for _ in 0..size {
@@ -308,7 +310,8 @@ impl Mouth {
             1 => Enter::any_of("*/*"),
             _ => EventSet::from("*/*/advance"),
         };
-        let bids = (0..count).map(|number| self.bid(&format!("b{number}"), block.clone())).collect();
+        let bids =
+            (0..count).map(|number| self.bid(&format!("b{number}of{}", self.life), block.clone())).collect();
         self.bid_to_some(bids, random);
     }
 

@@ -114,6 +114,7 @@ impl Say {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Habit {
     pub say: Say,
+    /// The greatest of its sizes.
     pub size: u64,
     /// Chance of what it says.
     pub seed: u64,
@@ -152,7 +153,7 @@ impl Story {
     pub fn of(seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let rank = if seed.is_multiple_of(4) { Rank::Operator } else { Rank::Vehicle };
-        let count = random.random_range(4..=9);
+        let count = random.random_range(6..=14);
         Self { seed, rank, habits: (0..count).map(|_| habit(&mut random)).collect() }
     }
 
@@ -214,9 +215,8 @@ fn habit(random: &mut ChaCha8Rng) -> Habit {
         }
     };
     let (common, worst) = say.sizes();
-    let most = if random.random_bool(0.25) { worst } else { common };
-    // Sizes of every order, the large ones as often as the small ones.
-    let size = (most as f64).powf(random.random_range(0.6_f64..=1.0)).round() as u64;
+    let most = if random.random_bool(0.35) { worst } else { common };
+    let size = (most as f64).powf(random.random_range(0.8_f64..=1.0)).round() as u64;
     let from = random.random_range(0..LAST_TICK / 2);
     let until = random.random_range(from + 1..=LAST_TICK);
     let every = if most == worst { random.random_range(2..=25) } else { random.random_range(1..=10) };
