@@ -79,7 +79,7 @@ bounds! {
         "Each is looked at whenever the home selects.";
     RecordNodes = "record_nodes", 1024, "sets in all blocks of one record",
         "Each may be looked at whenever the home selects. A hold of 300 vehicles by name has 900.";
-    HonouredBids = "honoured_bids", 256, "bids of one member that a home honours",
+    HonouredBids = "honoured_bids", 256, "bids of one member that a home honours, those kept of its former lives included",
         "Each stands in the home's program as a proxy.";
     BidRequests = "bid_requests", 64, "requests of one bid that a home honours",
         "One of them is to happen.";

@@ -409,6 +409,21 @@ fn lives_that_each_block_something_else_fill_no_disk() {
 }
 
 #[test]
+fn lives_that_each_block_under_other_names_fill_no_disk() {
+    let mut node = node_with(Some("uav/1"));
+    for life in 1..200 {
+        let hold = |n: u64| RemoteBid {
+            on_loss: OnLoss::Hold,
+            ..bid(&format!("hold{}", 20 * life + n), vec![], "uav/1/x".into())
+        };
+        node.handle(Duration::from_secs(life), record(life, 1, (0..20).map(hold).collect()));
+    }
+    let kept: Vec<String> = node.kept().blocks.iter().map(|block| block.bthread.clone()).collect();
+    assert_eq!(kept.len(), Bound::HonouredBids.stated());
+    assert!(kept.contains(&"hold20".to_owned()), "what was promised first is kept: {kept:?}");
+}
+
+#[test]
 fn a_record_that_is_too_much_names_the_bound() {
     let check = |bids: Vec<RemoteBid>| {
         let Message::Bid(record) = record(1, 1, bids) else { unreachable!() };

@@ -134,6 +134,11 @@ impl Mailbox {
         self.bytes
     }
 
+    /// The messages that wait of one sender, and their bytes.
+    pub fn waiting_of(&self, owner: &Owner) -> (usize, usize) {
+        self.queues.get(owner).map_or((0, 0), |queue| (queue.numbers.len(), queue.bytes))
+    }
+
     /// The messages that had to go, by sender.
     pub fn dropped(&self) -> &BTreeMap<Owner, u64> {
         &self.dropped

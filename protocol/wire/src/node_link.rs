@@ -77,6 +77,10 @@ pub struct SenderStats {
     pub strange: u64,
     /// States whose numbers were brought to what is believed.
     pub implausible: u64,
+    /// Messages that wait now for their share of the node's time.
+    pub waiting: usize,
+    /// Their bytes.
+    pub waiting_bytes: usize,
     /// What it has made the node do and keep beside.
     pub caused: Caused,
     /// Event sets looked at while its messages were taken in.
@@ -318,7 +322,8 @@ impl NodeLink {
         self.senders.iter().map(|(owner, stats)| {
             let dropped = self.mailbox.dropped().get(owner).copied().unwrap_or(0);
             let caused = owner.as_ref().map_or(Caused::default(), |name| self.node.caused_by(name));
-            (owner.as_ref(), SenderStats { dropped, caused, ..*stats })
+            let (waiting, waiting_bytes) = self.mailbox.waiting_of(owner);
+            (owner.as_ref(), SenderStats { dropped, caused, waiting, waiting_bytes, ..*stats })
         })
     }
 

@@ -180,10 +180,15 @@ fn what_others_would_not_take_in_is_not_said() {
 fn a_place_beyond_the_world_is_none_and_long_words_are_cut() {
     let mut far = State::new(name("uav/2"));
     far.position.x = 2e6;
-    let error = Payload::decode(&Payload::State(far).encode()).unwrap_err().to_string();
-    assert!(error.contains("bound `place_m`"), "{error}");
+    let mut far_ahead = State::new(name("uav/2"));
+    far_ahead.path = vec![[0.0, -1e300, 0.0].into()];
+    for far in [far, far_ahead] {
+        let error = Payload::decode(&Payload::State(far).encode()).unwrap_err().to_string();
+        assert!(error.contains("bound `place_m`"), "{error}");
+    }
     let mut wordy = State::new(name("uav/2"));
     wordy.task = "é".repeat(5000);
+    (wordy.holder, wordy.asked_by) = (wordy.task.clone(), wordy.task.clone());
     (wordy.radius_m, wordy.position_sigma_m) = (1e6, 1e6);
     wordy.velocity = [1e300, 0.0, -1e300].into();
     let Ok(Payload::State(mut read)) = Payload::decode(&Payload::State(wordy).encode()) else {
@@ -192,5 +197,7 @@ fn a_place_beyond_the_world_is_none_and_long_words_are_cut() {
     assert!(read.bring_to_what_is_believed() && !State::new(name("uav/2")).bring_to_what_is_believed());
     assert_eq!((read.radius_m, read.position_sigma_m), (5.0, 4.0));
     assert!((read.velocity.norm() - 50.0).abs() < 1e-9, "{}", read.velocity);
-    assert!(read.task.len() <= Bound::TextBytes.stated() && read.task.ends_with('…'));
+    for text in [&read.task, &read.holder, &read.asked_by] {
+        assert!(text.len() <= Bound::TextBytes.stated() && text.ends_with('…'));
+    }
 }

@@ -4,5 +4,6 @@
 
 mod benchmarks;
 mod command_line;
+mod hostile;
 mod published;
 mod routes;

@@ -188,7 +188,11 @@ impl BidTable {
         if self.rights.mutant == Some(Mutant::G2) {
             taken = bidder.bids.clone();
         }
-        for (place, bid) in record.bids.iter().enumerate() {
+        // What is kept of former lives under other names takes up room: names are free, and lives are many.
+        let named: FxHashSet<&String> = record.bids.iter().map(|bid| &bid.bthread).collect();
+        let is_left = |(name, bid): &(&String, &TakenBid)| bid.orphaned && !named.contains(name);
+        let left = bidder.bids.iter().filter(is_left).count();
+        for (place, bid) in (left..).zip(&record.bids) {
             let known = bidder.bids.get(&bid.bthread).filter(|known| known.keep);
             let stays = known.is_some_and(|known| known.asked_block == bid.block);
             let (honoured, reasons) = self.rights.judge(&record.node, bid, place, bidder.lease, stays);

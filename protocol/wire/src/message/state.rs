@@ -150,8 +150,8 @@ impl From<&State> for proto::State {
             path: state.path.iter().take(State::MAX_PATH).map(Into::into).collect(),
             mission: proto::Mission::from(state.mission).into(),
             scripts: state.scripts.iter().take(State::MAX_SCRIPTS).cloned().collect(),
-            holder: state.holder.clone(),
-            asked_by: state.asked_by.clone(),
+            holder: words(&state.holder),
+            asked_by: words(&state.asked_by),
             echo: state.echo.as_ref().map(|echo| proto::Echo {
                 node: text(&echo.node),
                 incarnation: echo.incarnation,
@@ -185,12 +185,12 @@ impl TryFrom<proto::State> for State {
             battery: state.battery,
             task: words(state.task),
             waiting_for: words(state.waiting_for),
-            path: state.path.iter().map(|point| vector("State.path", point)).collect::<Result<_>>()?,
+            path: state.path.iter().map(|point| place("State.path", point)).collect::<Result<_>>()?,
             // In a word of a later version, it is not over as far as this one can tell.
             mission: proto::Mission::try_from(state.mission).unwrap_or_default().into(),
             scripts: state.scripts.into_iter().map(words).collect(),
-            holder: state.holder,
-            asked_by: state.asked_by,
+            holder: words(state.holder),
+            asked_by: words(state.asked_by),
             echo: state.echo.map(Echo::try_from).transpose()?,
         })
     }
