@@ -179,7 +179,8 @@ impl Config {
         Self::parse(EXAMPLE, Path::new(""), &Behaviours::default()).context("agent/agent.toml")
     }
 
-    fn parse(text: &str, folder: &Path, known: &Behaviours) -> anyhow::Result<Self> {
+    /// Reads and checks the text of a configuration file whose paths are relative to `folder`.
+    pub fn parse(text: &str, folder: &Path, known: &Behaviours) -> anyhow::Result<Self> {
         configuration::read::<AgentFile>(text)?.check(folder, known)
     }
 }

@@ -175,7 +175,8 @@ impl Config {
         Self::parse(&text, folder, known).with_context(|| path.display().to_string())
     }
 
-    fn parse(text: &str, folder: &Path, known: &Behaviours) -> anyhow::Result<Self> {
+    /// Reads and checks the text of a configuration file whose paths are relative to `folder`.
+    pub fn parse(text: &str, folder: &Path, known: &Behaviours) -> anyhow::Result<Self> {
         configuration::read::<GroundFile>(text)?.check(folder, known)
     }
 }

@@ -424,3 +424,13 @@ fn an_item_inside_an_excluded_zone_is_refused_with_its_line() {
     let turned = fenced(&[waypoint(9.0, 0.0)]).replace("\"inclusion\": false", "\"inclusion\": 0");
     assert!(refusal(&turned).contains("expected true or false"), "{}", refusal(&turned));
 }
+
+#[test]
+fn of_many_warnings_a_hundred_are_listed_and_the_rest_is_said() {
+    let odd = || item(4000, 2, "0, 0, 0, 0, 0, 0, 0");
+    let way = item(16, 3, &format!("0, 0, 0, null, {}", at(&HOME, 10.0, 20.0, 5.0)));
+    let items: Vec<String> = (0..150).map(|_| odd()).chain([way]).collect();
+    let warnings = read(&plan(&HOME, &items)).warnings;
+    assert_eq!(warnings.len(), 101);
+    assert!(warnings[100].message.ends_with("from here on, warnings are not listed"), "{}", warnings[100]);
+}

@@ -29,7 +29,7 @@ use skein_dbp::Happened;
 use skein_wire::Scene;
 use tokio::sync::oneshot;
 
-pub use self::request::Wish;
+pub use self::request::{Wish, check_message};
 pub use self::session::Role;
 pub use self::tls::{ConsoleSecurity, ConsoleSecurityError};
 use self::{feed::Feed, request::Mailbox, subscription::Present};

@@ -199,6 +199,18 @@ pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
     }
 }
 
+/// Reads a browser's message, and does nothing with it.
+///
+/// # Errors
+/// What is wrong with it, for people.
+pub fn check_message(text: &str) -> Result<(), String> {
+    match read(text).1? {
+        Request::Order(message) => message.wanted(|| Ok(String::new())).map(drop),
+        Request::Hello(name) => Giver::new(&name).map(drop).map_err(|error| error.to_string()),
+        _ => Ok(()),
+    }
+}
+
 impl OrderMessage {
     /// What is wanted; a launch without its token is to be offered under `token`.
     pub(super) fn wanted(mut self, token: impl FnOnce() -> Result<String, String>) -> Result<Wanted, String> {

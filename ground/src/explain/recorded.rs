@@ -40,13 +40,18 @@ impl Recorded {
     pub fn open(path: &Path) -> Result<Self, RecordedError> {
         let file =
             std::fs::read(path).map_err(|source| RecordedError::Open { path: path.to_owned(), source })?;
+        Self::read(&file, path)
+    }
+
+    /// Reads the content of a recording, which errors call by `path`.
+    pub fn read(file: &[u8], path: &Path) -> Result<Self, RecordedError> {
         let unreadable = |source| RecordedError::Unreadable { path: path.to_owned(), source };
         let options = mcap::read::Options::IgnoreEndMagic.into();
-        let stream = mcap::MessageStream::new_with_options(&file, options).map_err(unreadable)?;
+        let stream = mcap::MessageStream::new_with_options(file, options).map_err(unreadable)?;
         let mut recorded = Self {
             notes: Vec::new(),
             span: (Duration::MAX, Duration::ZERO),
-            complete: ends_as_it_should(&file),
+            complete: ends_as_it_should(file),
         };
         for message in stream {
             let message = match message {

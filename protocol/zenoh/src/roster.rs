@@ -78,7 +78,11 @@ impl Roster {
         Self::parse(&text).map_err(fault)
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
+    /// Reads the text of a roster's file.
+    ///
+    /// # Errors
+    /// The field at fault, and what was expected.
+    pub fn parse(text: &str) -> Result<Self, String> {
         let file: RosterFile = toml::from_str(text).map_err(|error| error.to_string())?;
         let node = |name: &String| NodeName::new(name).map_err(|error| error.to_string());
         let members: BTreeMap<_, _> = file

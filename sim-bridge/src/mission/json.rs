@@ -4,17 +4,18 @@ use serde_json::Value;
 
 use super::{MissionError, Warning};
 
-/// A JSON document with the text it came from.
+/// A JSON document with the text it came from, comments blanked out.
 pub struct Document<'a> {
     file: &'a str,
-    text: &'a str,
+    text: String,
     root: Value,
 }
 
 impl<'a> Document<'a> {
     /// Parses `text`, in which a `#` outside of strings starts a comment; `file` is what errors call it.
-    pub fn parse(text: &'a str, file: &'a str) -> Result<Self, MissionError> {
-        match serde_json::from_str(&without_comments(text)) {
+    pub fn parse(text: &str, file: &'a str) -> Result<Self, MissionError> {
+        let text = without_comments(text);
+        match serde_json::from_str(&text) {
             Ok(root) => Ok(Self { file, text, root }),
             Err(error) => {
                 let full = error.to_string();
@@ -166,8 +167,7 @@ impl<'a> Node<'a> {
     }
 
     fn line(&self) -> usize {
-        let text = without_comments(self.document.text);
-        Scanner { rest: text.as_bytes(), line: 1 }.find(&self.path)
+        Scanner { rest: self.document.text.as_bytes(), line: 1 }.find(&self.path)
     }
 
     fn below(&self, value: &'a Value, step: Step<'a>) -> Node<'a> {

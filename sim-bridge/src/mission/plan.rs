@@ -28,6 +28,9 @@ mod command {
     pub const CHANGE_SPEED: u64 = 178;
 }
 
+/// Warnings that are listed: to know the line of each takes a walk through the file.
+const MOST_WARNINGS: usize = 100;
+
 /// Reads the plan under `root`; see [`MissionSet::read`] for the `datum`.
 pub fn read(root: &Node<'_>, datum: Option<Datum>) -> Result<MissionSet, MissionError> {
     let mission = root.member("mission")?;
@@ -289,7 +292,11 @@ impl Reader {
     }
 
     fn warn(&mut self, node: &Node<'_>, message: impl std::fmt::Display) {
-        self.warnings.push(node.warning(message));
+        match self.warnings.len() {
+            ..MOST_WARNINGS => self.warnings.push(node.warning(message)),
+            MOST_WARNINGS => self.warnings.push(node.warning("from here on, warnings are not listed")),
+            _ => {}
+        }
     }
 }
 

@@ -17,6 +17,10 @@ use crate::scene::Scene;
 
 /// Models may nest this deep.
 const DEPTH_LIMIT: usize = 32;
+/// Letters of one name: each body carries the names of all models around it.
+const MOST_LETTERS: usize = 64;
+/// Warnings that are listed: to know the line of each takes a walk through the file.
+const MOST_WARNINGS: usize = 100;
 /// Numbers beyond this are taken for mistakes, m.
 const LIMIT_M: f64 = 1e6;
 /// Models that every Gazebo has and that bring no obstacle.
@@ -484,8 +488,13 @@ impl<'a> Reader<'a> {
             .map(|(message, (offset, count))| (offset, message, count))
             .collect();
         warnings.sort();
+        let unlisted = warnings.split_off(warnings.len().min(MOST_WARNINGS));
+        let rest = unlisted.first().map(|(offset, ..)| {
+            (*offset, format!("from here on, {} more warnings are not listed", unlisted.len()), 1)
+        });
         warnings
             .into_iter()
+            .chain(rest)
             .map(|(offset, message, count)| Warning {
                 place: place(self.source_name, self.document.text_pos_at(offset)),
                 message,
@@ -506,6 +515,8 @@ impl Parent {
 
     /// `name` with the names of what holds it, as Gazebo writes them.
     fn scoped(&self, name: &str) -> String {
+        let end = name.char_indices().nth(MOST_LETTERS).map_or(name.len(), |(end, _)| end);
+        let name = name.get(..end).unwrap_or(name);
         if self.name.is_empty() { name.to_owned() } else { format!("{}::{name}", self.name) }
     }
 }

@@ -282,3 +282,20 @@ fn published_worlds_are_read_as_their_readme_says() {
         }
     }
 }
+
+#[test]
+fn long_names_and_many_warnings_cost_no_more_than_in_proportion() {
+    let shape = "<box><size>1 2 3</size></box>";
+    let collisions: String =
+        (0..100).map(|n| format!("<collision name='{n}'><geometry>{shape}</geometry></collision>")).collect();
+    let link = format!("<link name='l'>{collisions}</link>");
+    let named = format!("<model name='{}'>{link}</model>", "\u{e9}".repeat(10_000));
+    let (scene, _) = read(&format!("{GROUND}{named}"));
+    assert_eq!(scene.obstacles().len(), 100);
+    assert_eq!(scene.obstacles()[7].name, format!("{}::l::7", "\u{e9}".repeat(64)));
+
+    let unknown: String = (0..150).map(|n| format!("<odd{n}/>")).collect();
+    let (_, warnings) = read(&format!("{GROUND}{unknown}"));
+    assert_eq!(warnings.len(), 101);
+    assert_eq!(warnings[100].message, "from here on, 50 more warnings are not listed");
+}
