@@ -837,7 +837,7 @@ mod return_home {
         let home = ["battery_low", "return: battery low", "goto -1", "plan: waypoint"];
         assert_eq!(vehicle.reports(BatteryLow::NAME), home);
         assert_eq!(vehicle.reports(Airborne::NAME), ["airborne"]);
-        let why = "declined: it is not free to go: on the ground, landing or returning";
+        let why = "declined: it is not free to go: on the ground, climbing, landing or returning";
         assert_eq!(
             vehicle.hears(OrderTaken::go_to([4.0, 3.0, 2.0], "the operator").given_aboard().at(ME)),
             ["order goto", why]

@@ -11,7 +11,7 @@ const OTHERS = ['uav/2', 'uav/3', 'uav/4'];
 const PLACE = [-8, -9];
 
 await drive({}, async (console) => {
-  await console.until(`${ONE} flies`, () => console.vehicle(ONE)?.mode === 'offboard' && speed(console.vehicle(ONE)) > 1);
+  await console.until(`${ONE} flies`, () => console.vehicle(ONE)?.task.startsWith('leg') && speed(console.vehicle(ONE)) > 1);
   await console.select(ONE);
   await console.goTo(...PLACE);
   const order = await console.acknowledged('goto', [ONE]);

@@ -11,7 +11,7 @@ const STILL_M_S = 0.3;
 
 await drive({}, async (console) => {
   const all = (wanted) => NAMES.every((name) => wanted(console.vehicle(name) ?? {}));
-  await console.until('everyone flies', () => all((vehicle) => vehicle.mode === 'offboard' && speed(vehicle) > 1));
+  await console.until('everyone flies', () => all((vehicle) => vehicle.task.startsWith('leg') && speed(vehicle) > 1));
 
   const pressed = performance.now();
   await console.press('Hold');

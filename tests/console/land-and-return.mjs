@@ -10,7 +10,7 @@ const LAND = ['uav/2', 'uav/3'];
 const PLACE = [-8, -9];
 
 await drive({ renderer: 'svg' }, async (console) => {
-  const flies = (name) => console.vehicle(name)?.mode === 'offboard' && speed(console.vehicle(name)) > 1;
+  const flies = (name) => console.vehicle(name)?.task.startsWith('leg') && speed(console.vehicle(name)) > 1;
   await console.until(`${RETURNS} flies`, () => flies(RETURNS));
   const home = console.history(RETURNS).find(({ position }) => position)?.position;
 

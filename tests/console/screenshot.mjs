@@ -13,7 +13,7 @@ if (!url || !file || !['light', 'dark'].includes(colorScheme)) {
 const shown = await open(url, { colorScheme, before: holdFrames });
 try {
   const vehicles = () => shown.fleet?.vehicles ?? [];
-  const flying = () => vehicles().filter((vehicle) => vehicle.mode === 'offboard' && speed(vehicle) > 1);
+  const flying = () => vehicles().filter((vehicle) => vehicle.task.startsWith('leg') && speed(vehicle) > 1);
   await shown.until('most vehicles are in flight', () => flying().length > vehicles().length * 0.75, 60);
   // The forest's operator holds everyone a little later, which shows what orders do.
   const held = (vehicle) => vehicle.waiting_for.includes('hold') && speed(vehicle) < 0.5;

@@ -29,7 +29,7 @@ await drive({}, async (console) => {
     await console.press('Send a script…');
     await (await chooser).setFiles({ name, mimeType: 'text/plain', buffer: Buffer.from(text) });
   };
-  await console.until('everyone flies', () => all((vehicle) => vehicle.mode === 'offboard' && speed(vehicle) > 1));
+  await console.until('everyone flies', () => all((vehicle) => vehicle.task.startsWith('leg') && speed(vehicle) > 1));
   // Whoever types has time.
   await console.press('Hold');
   await console.acknowledged('hold', NAMES);

@@ -143,7 +143,9 @@ class Occurrences:
     def __init__(self, operator, offset):
         self.heard = []
         self._closing = False
-        self._swarm = operator.Swarm("sim", f"tcp/127.0.0.1:{7447 + offset}", ["occ/*/*"])
+        # The ground station, or all of `fly`; then the first agent of a swarm of processes.
+        nodes = ",".join(f"tcp/127.0.0.1:{port + offset}" for port in (7447, 7450))
+        self._swarm = operator.Swarm("sim", nodes, ["occ/*/*"])
         self._thread = threading.Thread(target=self._listen)
         self._thread.start()
 

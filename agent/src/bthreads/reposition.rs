@@ -53,7 +53,7 @@ impl Reposition {
         match (self.standing, self.goto(order)) {
             (Standing::Free, Some(to)) => Task::Turning { to, until: now + PATIENCE },
             (Standing::Free, None) => declining("it names no point"),
-            _ => declining("it is not free to go: on the ground, landing or returning"),
+            _ => declining("it is not free to go: on the ground, climbing, landing or returning"),
         }
     }
 }

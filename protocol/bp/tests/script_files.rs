@@ -463,7 +463,7 @@ fn a_script_that_is_too_much_is_refused_with_the_limit_s_name() {
     let syncs = vec!["{ sync = { wait = \"uav/1/ready\" } }"; 20].join(", ");
     let wide = refusal(&format!("{{ until = {wide}, do = [{syncs}] }}"), "");
     assert!(wide.contains("bound `script_nodes`"), "{wide}");
-    let points = vec!["[1.0, 2.0, 3.0]"; 200].join(", ");
+    let points = vec!["[1.0, 2.0, 3.0]"; 32].join(", ");
     let route = format!("[parameters.r]\nabout = \"x\"\ntype = \"route\"\ndefault = [{points}]");
     let long = refusal(&format!("{{ sync = {{ request = \"{}\" }} }}", "{r}".repeat(2000)), &route);
     assert!(long.contains("bound `script_bytes`"), "{long}");

@@ -261,7 +261,8 @@ async fn serve(session: zenoh::Session, waited: Vec<Command>, mut queue: Queue) 
                 publishers.reach(subscribers.len());
             }
             Some(Asked::Command(Command::CountPeers { answer })) => {
-                let _ = answer.send(session.info().peers_zid().await.count());
+                let info = session.info();
+                let _ = answer.send(info.peers_zid().await.count() + info.routers_zid().await.count());
             }
             None => break,
         }

@@ -12,7 +12,7 @@ use anyhow::Context as _;
 use skein_ground::console::Console;
 use skein_wire::{Fleet, Key, Link};
 use skein_world::STEP;
-use skein_zenoh::{NetworkSettings, ZenohConfig, ZenohSession};
+use skein_zenoh::{Mode, NetworkSettings, ZenohConfig, ZenohSession};
 
 use super::{
     Agents, Flight, Happenings, Host, Links, Recording, Swarm,
@@ -46,11 +46,14 @@ pub fn fly(
     let fleet = Fleet::new(FLEET)?;
     let open = |network| ZenohSession::open(ZenohConfig::new(fleet.clone(), network));
     let known = format!("tcp/127.0.0.1:{}", ZENOH_PORT + args.port_offset);
-    let vehicles = open(NetworkSettings { listen: vec![known], ..NetworkSettings::default() })
+    // Relays, so that who joins at the one address that is told reaches the ground station too.
+    let relay = NetworkSettings { mode: Mode::Router, ..NetworkSettings::default() };
+    let vehicles = open(NetworkSettings { listen: vec![known], ..relay.clone() })
         // Beside another swarm, anywhere.
-        .or_else(|_| open(NetworkSettings::default()))
+        .or_else(|_| open(relay))
         .context("Zenoh session of the vehicles")?;
-    let ground = open(NetworkSettings::connected_to(vehicles.locators().to_vec()))
+    let at_relay = NetworkSettings::connected_to(vehicles.locators().to_vec());
+    let ground = open(NetworkSettings { mode: Mode::Client, ..at_relay })
         .context("Zenoh session of the ground station")?;
     await_connection(&ground)?;
     let vehicle_links = (0..scenario.vehicles.len())
