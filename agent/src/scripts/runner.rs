@@ -137,10 +137,10 @@ impl BThread for Runner {
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         if self.withdrawal().contains(event) {
             // One that names nobody is refused.
-            return match Unload::read(event).and_then(|unload| unload.by) {
-                Some(_) => self.end(ScriptState::Withdrawn, "it was taken back", cx),
-                None => {}
-            };
+            if Unload::read(event).is_some_and(|unload| unload.by.is_some()) {
+                self.end(ScriptState::Withdrawn, "it was taken back", cx);
+            }
+            return;
         }
         if self.asleep {
             return self.begin(cx);

@@ -315,7 +315,7 @@ impl<'a> Flight<'a> {
         let read = self.nodes().find_map(|(name, node)| {
             let (_, stats) = node.senders().find(|(name, _)| *name == Some(&self.member))?;
             let sent = *self.mouth.too_long.get(name)?;
-            (stats.oversized < sent).then(|| (name, stats.oversized, sent))
+            (stats.oversized < sent).then_some((name, stats.oversized, sent))
         });
         read.map(|(name, passed_over, sent)| {
             let what =
