@@ -404,7 +404,7 @@ fn passed_over(stats: &SenderStats) -> Option<String> {
         (stats.oversized, "too long"),
         (stats.undecodable, "not understood, or beyond a bound"),
         (stats.forged, "under another's key"),
-        (stats.implausible, "of a radius, speed or position error that nobody has"),
+        (stats.implausible, "of a radius or speed that nobody has"),
         (stats.caused.facts_withheld, "facts too many"),
         (stats.caused.lives_refused, "lives too many"),
     ];

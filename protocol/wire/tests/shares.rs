@@ -196,6 +196,8 @@ fn a_place_beyond_the_world_is_none_and_long_words_are_cut() {
     };
     assert!(read.bring_to_what_is_believed() && !State::new(name("uav/2")).bring_to_what_is_believed());
     assert_eq!((read.radius_m, read.position_sigma_m), (5.0, 4.0));
+    let mut lost = State { position_sigma_m: 100.0, ..State::new(name("uav/2")) };
+    assert!(!lost.bring_to_what_is_believed() && lost.position_sigma_m == 4.0, "it has no satellites yet");
     assert!((read.velocity.norm() - 50.0).abs() < 1e-9, "{}", read.velocity);
     for text in [&read.task, &read.holder, &read.asked_by] {
         assert!(text.len() <= Bound::TextBytes.stated() && text.ends_with('…'));

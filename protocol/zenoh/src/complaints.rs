@@ -69,7 +69,7 @@ impl Complaints {
             "dropped because their sender sends more than its share",
             "of this node's own not sent because they are too long",
             "of nodes outside the roster",
-            "states with a radius, speed or position error that nobody has",
+            "states with a radius or speed that nobody has",
             "facts not told because one member caused too many",
             "lives of members that began too often",
         ];

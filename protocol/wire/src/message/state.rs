@@ -107,16 +107,16 @@ impl State {
 }
 
 impl State {
-    /// Brings radius, position error and speed down to the most that a neighbour is believed; says whether one was
-    /// beyond.
+    /// Brings radius, position error and speed down to the most that a neighbour is believed; says whether radius or
+    /// speed was beyond. Who does not know its place yet says so rightly.
     pub fn bring_to_what_is_believed(&mut self) -> bool {
-        let before = (self.radius_m, self.position_sigma_m, self.velocity);
+        let before = (self.radius_m, self.velocity);
         self.radius_m = self.radius_m.min(Bound::RadiusMetres.most_real());
         self.position_sigma_m = self.position_sigma_m.min(Bound::SigmaMetres.most_real());
         // A number near the largest has a length beyond all numbers.
         let fastest = Bound::SpeedMetresPerSecond.most_real();
         self.velocity = self.velocity.map(|speed| speed.clamp(-fastest, fastest)).cap_magnitude(fastest);
-        before != (self.radius_m, self.position_sigma_m, self.velocity)
+        before != (self.radius_m, self.velocity)
     }
 }
 
