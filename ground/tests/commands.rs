@@ -109,7 +109,8 @@ fn an_order_from_the_shell_names_who_gave_it_and_says_who_has_heard_it() {
 #[test]
 fn a_launch_from_the_shell_is_confirmed() {
     let station = Station::start(None);
-    std::thread::sleep(Duration::from_millis(300));
+    // Once it has acknowledged something, the station knows the vehicle.
+    assert!(station.shell(&["hold", "uav/1", "--by", "Anna"]).status.success());
     let unconfirmed = station.shell(&["launch", "--by", "Anna"]);
     assert_eq!(unconfirmed.status.code(), Some(2));
     assert!(said(&unconfirmed)["error"].as_str().unwrap().contains("--yes"));
