@@ -357,7 +357,7 @@ impl Control {
             battery: self.battery(),
             armed: telemetry.armed,
             incarnation: self.config.incarnation,
-            path: self.guidance.course.path_ahead().take(State::MAX_PATH).collect(),
+            path: self.guidance.way_ahead().take(State::MAX_PATH).collect(),
             echo: self.neighbours.echo(now),
             ..State::new(self.name.clone())
         })
@@ -422,6 +422,10 @@ impl Control {
                 return self.guidance.plan(is_stuck, &motion, map, self.neighbours.around());
             }
             Instruction::GrantLeave => self.guidance.grant_leave(at),
+            Instruction::MakeWay => {
+                let (motion, map) = (self.motion()?, self.perception.map());
+                return self.guidance.make_way(now, &motion, map, self.neighbours.around());
+            }
             Instruction::Land => self.settle(now),
             Instruction::EndFlight => self.guidance.forget(),
             Instruction::Hold => self.guidance.hold(),

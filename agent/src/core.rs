@@ -273,7 +273,7 @@ impl AgentCore {
 
     /// The path ahead, from the vehicle to its waypoint; empty without one.
     pub fn path_ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
-        self.side.control.guidance().course.path_ahead()
+        self.side.control.guidance().way_ahead()
     }
 
     /// The vehicle's node: its program, its peers, and what has come in that was not understood.

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 use skein_bp::Event;
 use skein_wire::event::{
-    Advance, Declared as _, Goto, HandBack, Hold, Homeward, Land, Landed, OrderTaken, Plan, PlanReason,
-    Takeoff,
+    Advance, Declared as _, Goto, HandBack, Hold, Homeward, Land, Landed, MakeWay, OrderTaken, Plan,
+    PlanReason, Takeoff,
 };
 
 use crate::bthreads::HOME_LEG;
@@ -29,6 +29,8 @@ pub enum Instruction {
     },
     /// Leave to move for one navigation cycle.
     GrantLeave,
+    /// Use it to make way for who was said to need it.
+    MakeWay,
     /// The flight is over.
     EndFlight,
 }
@@ -55,6 +57,7 @@ impl Instruction {
             Goto::NAME => Self::GoTo(Goto::read(event)?.into()),
             Plan::NAME => Self::Plan { is_stuck: Plan::read(event)?.why == PlanReason::Stuck },
             Advance::NAME | Homeward::NAME => Self::GrantLeave,
+            MakeWay::NAME => Self::MakeWay,
             Landed::NAME => Self::EndFlight,
             _ => return None,
         })

@@ -31,9 +31,11 @@ pub mod pipeline;
 pub mod positioning;
 pub mod precedence;
 mod preflight;
+mod rank;
 mod report;
 mod safety;
 pub mod scripts;
+pub mod stretch;
 pub mod verify;
 mod watches;
 

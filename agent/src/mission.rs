@@ -9,7 +9,7 @@ use skein_bp::script::Assignment;
 use skein_bp::{Event, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_wire::event::{
-    self, Advance, Complete, Declared as _, Enter, Failed, Goto, Hold, Land, Load, OrderTaken, Return,
+    self, Advance, Complete, Declared as _, Enter, Failed, Goto, Hold, Land, Load, OrderTaken, Return, Right,
     ScriptNews, Takeoff, Unload, What,
 };
 use skein_wire::{
@@ -218,8 +218,16 @@ impl Mission {
                 Some(Outcome::Complete) => MissionState::Complete,
                 Some(Outcome::Failed(_)) => MissionState::Failed,
             },
+            right: self.right(),
             scripts: self.scripts.running().map(|(name, _)| name.to_owned()).collect(),
         }
+    }
+
+    /// The vehicle's right to go first where there is room for one.
+    fn right(&self) -> Right {
+        let right_of_way =
+            self.node.node().program().state_of::<bthreads::RightOfWay>(bthreads::RIGHT_OF_WAY);
+        right_of_way.map_or(Right::Free, bthreads::RightOfWay::right)
     }
 
     /// Tells whoever decides what control has found out.

@@ -5,12 +5,13 @@
 //! what it has last heard of them. From the round trip follows where the other's clock stands (NTP, RFC 5905), and
 //! from that the age of everything it says, whichever way each message took.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use nalgebra::Vector3;
 use skein_bp::Bound;
 use skein_dbp::NodeName;
-use skein_planning::separation;
+use skein_planning::{Path, separation};
+use skein_wire::event::Right;
 use skein_wire::{Echo, State};
 
 use crate::config::Envelope;
@@ -51,6 +52,7 @@ pub struct Neighbours {
 #[derive(Debug)]
 struct Heard {
     state: State,
+    way: Option<Arc<Path>>,
     /// When it arrived, on this vehicle's clock.
     at: Duration,
     clock: Option<Clock>,
@@ -75,6 +77,10 @@ pub struct Neighbour {
     pub armed: bool,
     /// Its last word with age and uncertainty, as the separation takes it.
     pub track: separation::Neighbour,
+    /// The way that it means to fly, if it has one.
+    pub way: Option<Arc<Path>>,
+    /// Its right to go first where there is room for one.
+    pub right: Right,
 }
 
 impl Neighbour {
@@ -113,7 +119,8 @@ impl Neighbours {
             last.filter(|last| last.state.incarnation == state.incarnation).and_then(|last| last.clock);
         if newest && self.makes_room(now, &state.node) {
             let clock = better(now, known, self.clock_of(now, &state));
-            self.last.insert(state.node.clone(), Heard { state, at: now, clock });
+            let way = Some(&state.path).filter(|points| points.len() > 1).cloned().and_then(Path::new);
+            self.last.insert(state.node.clone(), Heard { way: way.map(Arc::new), state, at: now, clock });
         }
     }
 
@@ -173,6 +180,8 @@ impl Neighbours {
             Neighbour {
                 node: state.node.clone(),
                 armed: state.armed,
+                way: heard.way.clone(),
+                right: state.right,
                 track: separation::Neighbour {
                     id,
                     position: state.position,

@@ -2,18 +2,19 @@
 
 use std::time::Duration;
 
-use nalgebra::Vector3;
 use skein_bp::Event;
 use skein_dbp::NodeName;
 use skein_mav::FlightMode;
 use skein_wire::event::{
-    self, Airborne, Arrived, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed,
-    FenceBreached, FoundAirborne, Landed, Leave, OrderTaken, PathBlocked, PilotTook, Planned,
-    PositionDoubted, PositionTrusted, Ready, Slept, Stuck, TooClose, Unplannable, Unready, What,
+    Airborne, Arrived, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed, Cornered,
+    FenceBreached, FoundAirborne, InTheWay, Landed, Leave, OrderTaken, OutOfTheWay, PathBlocked, PilotTook,
+    Planned, PositionDoubted, PositionTrusted, Ready, Right, Slept, Stuck, TooClose, Unplannable, Unready,
+    What,
 };
 
 use crate::energy::Changed;
 use crate::me::Me;
+use crate::stretch::Stretch;
 
 /// A change of the vehicle, of what is around it, or of its path.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,10 +77,20 @@ pub enum Report {
     PathBlocked,
     /// The vehicle makes no progress in spite of leave to move.
     Stuck,
-    /// A narrow passage lies ahead.
-    Passage(Vector3<f64>),
-    /// The passage lies behind, or the path no longer leads through it.
+    /// A narrow stretch lies ahead, with that part of it in which the vehicle is.
+    Passage(Stretch),
+    /// It lies behind, or the path no longer leads through it.
     PassageLeft,
+    /// The vehicle stands in the way of another that has this right, and there is no room to pass.
+    InTheWay {
+        of: NodeName,
+        right: Right,
+    },
+    OutOfTheWay,
+    /// There is no place where it could make way for another.
+    Cornered {
+        by: NodeName,
+    },
 }
 
 impl Report {
@@ -109,8 +120,14 @@ impl Report {
             Self::Arrived { leg } => me.event(Arrived { leg }),
             Self::PathBlocked => me.event(PathBlocked),
             Self::Stuck => me.event(Stuck),
-            Self::Passage(at) => me.event(event::Passage { x: at.x, y: at.y, z: at.z }),
+            Self::Passage(stretch) => match stretch.passage() {
+                Some(passage) => me.event(passage),
+                None => me.event(Leave),
+            },
             Self::PassageLeft => me.event(Leave),
+            Self::InTheWay { of, right } => me.event(InTheWay { of: of.as_str().into(), right }),
+            Self::OutOfTheWay => me.event(OutOfTheWay),
+            Self::Cornered { by } => me.event(Cornered { by: by.as_str().into() }),
         }
     }
 }

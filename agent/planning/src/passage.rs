@@ -1,68 +1,121 @@
-//! Narrow passages ahead: places that two vehicles cannot pass at once.
+//! Narrow stretches of a path: places that two vehicles cannot pass at once.
 
 use nalgebra::Vector3;
 
-use crate::map::ClearanceMap;
+use crate::map::{ClearanceMap, VoxelState};
 use crate::path::Path;
 
-/// The definition of a narrow passage.
+/// The definition of a narrow stretch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PassageConfig {
-    /// The distance to look ahead on the path, metres.
+    /// The distance to look ahead on the path for its beginning, metres.
     pub look_m: f64,
-    /// Free width below which a passage is narrow, metres.
+    /// Free width below which a place is narrow, metres.
     pub width_m: f64,
+    /// A wide part of the path that is shorter than this is no place to let anybody pass, metres.
+    pub room_m: f64,
+    /// A stretch is looked along no further than this, metres.
+    pub most_m: f64,
 }
 
 impl Default for PassageConfig {
     fn default() -> Self {
-        PassageConfig { look_m: 8.0, width_m: 2.4 }
+        PassageConfig { look_m: 8.0, width_m: 2.4, room_m: 3.0, most_m: 24.0 }
     }
 }
 
-/// A gap between two obstacles.
+/// A place in a narrow stretch.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Passage {
-    /// Middle of the gap (ENU, metres), at the path's height.
+pub struct Piece {
+    /// Middle between the obstacles on either side (ENU, metres), at the path's height.
     pub centre: Vector3<f64>,
     /// Horizontal unit vector through the gap, the way the path goes.
     pub direction: Vector3<f64>,
-    /// Free width between the obstacles, metres.
-    pub width_m: f64,
-    /// Where on the path it is, metres from the station asked from.
-    pub distance_m: f64,
 }
 
-/// The first narrow passage on `path` within `look_m` of `from_m`.
+/// From one piece of a stretch to the next, metres.
+pub const PIECE_M: f64 = 1.0;
+/// A gap is looked for at every so many metres of the path.
+const SAMPLE_M: f64 = 0.4;
+/// The stretch begins so far before what is narrow and ends so far behind it, metres.
+const MARGIN_M: f64 = 1.0;
+
+/// The first narrow stretch on `path` that begins within `look_m` of `from_m`, piece by piece in the order in which they
+/// are flown through; nothing if there is none.
 ///
-/// A passage is a place where the path runs between two obstacles less than `width_m` apart. The gap is
+/// A place is narrow where the path runs between two obstacles less than `width_m` apart. The gap is
 /// looked at itself, by going to the middle between the obstacle points nearest on either side, so that it
-/// does not depend on how the path runs through it: vehicles that come from both sides mean the same passage.
-/// Of a gap with depth, as an opening in a wall, it is the middle of the part that is narrowest and known.
-/// One obstacle beside the path is no passage.
-///
-/// A vehicle that is inside the passage, or has its middle just behind it, is told of it with distance 0.
-pub fn first_passage(
+/// does not depend on how the path runs through it: vehicles that come from both sides mean the same place.
+/// One obstacle beside the path makes nothing narrow. Where the path leads out of what the vehicle has seen, nothing is
+/// known to be narrow.
+pub fn narrow_stretch(map: &ClearanceMap, path: &Path, from_m: f64, config: &PassageConfig) -> Vec<Piece> {
+    let gaps = narrow_samples(map, path, from_m, config);
+    let (Some(first), Some(last)) = (gaps.first(), gaps.last()) else { return Vec::new() };
+    let before = Piece { centre: first.centre - first.direction * MARGIN_M, ..*first };
+    let behind = Piece { centre: last.centre + last.direction * MARGIN_M, ..*last };
+    let mut pieces = vec![before];
+    let mut apart_m = 0.0;
+    let all: Vec<&Piece> = std::iter::once(&before).chain(&gaps).chain([&behind]).collect();
+    for pair in all.windows(2) {
+        let [from, to] = [pair[0], pair[1]];
+        let step = to.centre - from.centre;
+        // Through a wide part in between, and over what is told with the piece before.
+        let pieces_in_step = (step.norm() / PIECE_M).floor();
+        let between = (1..=pieces_in_step as usize).map(|k| k as f64 / (pieces_in_step + 1.0));
+        if pieces_in_step > 0.0 {
+            pieces.extend(between.map(|share| Piece { centre: from.centre + step * share, ..*to }));
+            apart_m = PIECE_M;
+        }
+        apart_m += step.norm();
+        if apart_m >= PIECE_M {
+            pieces.push(*to);
+            apart_m = 0.0;
+        }
+    }
+    if apart_m > 0.0 {
+        pieces.push(behind);
+    }
+    pieces
+}
+
+/// The gaps of the first stretch, in the order in which they are flown through.
+fn narrow_samples(map: &ClearanceMap, path: &Path, from_m: f64, config: &PassageConfig) -> Vec<Piece> {
+    let mut found = Vec::new();
+    let (mut station_m, mut ends_m) = (from_m, from_m + config.look_m);
+    let mut most_m = f64::INFINITY;
+    let mut was_seen = false;
+    while station_m <= path.length_m().min(ends_m).min(most_m) {
+        let place = path.point_at(station_m);
+        let is_seen = map.voxels().state(&place) != VoxelState::Unknown;
+        if was_seen && !is_seen {
+            break;
+        }
+        was_seen = is_seen;
+        if let Some(gap) = gap_at(map, path, station_m, config.width_m) {
+            if found.is_empty() {
+                most_m = station_m + config.most_m;
+            }
+            ends_m = station_m + config.room_m;
+            found.extend(gap.piece(&path.direction_at(station_m)));
+        }
+        station_m += SAMPLE_M;
+    }
+    found
+}
+
+/// Whether a path is less than `width_m` wide within `around_m` of a station.
+pub fn is_narrow_around(
     map: &ClearanceMap,
     path: &Path,
-    from_m: f64,
-    config: &PassageConfig,
-) -> Option<Passage> {
-    let step_m = map.voxels().config().resolution_m;
-    let gaps = |from_m: f64, look_m: f64| {
-        let end_m = (from_m + look_m).min(path.length_m());
-        let samples = ((end_m - from_m) / step_m).floor().max(0.0) as usize;
-        (0..=samples)
-            .map(move |k| from_m + k as f64 * step_m)
-            .filter_map(|station_m| Some((station_m, gap_at(map, path, station_m, config.width_m)?)))
-    };
-    let (first_m, _) = gaps(from_m, config.look_m).next()?;
-    let here: Vec<_> = gaps(first_m, config.width_m).collect();
-    let least = here.iter().map(|(_, gap)| gap.width_m()).min_by(f64::total_cmp)?;
-    let narrow: Vec<_> = here.iter().filter(|(_, gap)| gap.width_m() <= least + step_m / 2.0).collect();
-    let (station_m, gap) = *narrow.get(narrow.len() / 2)?;
-    let centre = narrow.iter().map(|(_, gap)| gap.centre()).sum::<Vector3<f64>>() / narrow.len() as f64;
-    Some(passage(path, from_m, *station_m, gap, centre))
+    station_m: f64,
+    around_m: f64,
+    width_m: f64,
+) -> bool {
+    let samples = (around_m / SAMPLE_M).ceil() as i32;
+    let station = |k: i32| station_m + f64::from(k) * SAMPLE_M;
+    let mut stations =
+        (-samples..=samples).map(station).filter(|at_m| (0.0..=path.length_m()).contains(at_m));
+    stations.any(|at_m| gap_at(map, path, at_m, width_m).is_some())
 }
 
 /// The obstacle points on the left and on the right that close a gap.
@@ -79,6 +132,14 @@ impl Gap {
 
     fn centre(&self) -> Vector3<f64> {
         (self.left + self.right) / 2.0
+    }
+
+    /// The way through it, as a path goes that leads `ahead`.
+    fn piece(&self, ahead: &Vector3<f64>) -> Option<Piece> {
+        let across = self.left - self.right;
+        let through = Vector3::new(across.y, -across.x, 0.0).try_normalize(1e-6)?;
+        let direction = if through.dot(ahead) < 0.0 { -through } else { through };
+        Some(Piece { centre: self.centre(), direction })
     }
 }
 
@@ -116,18 +177,4 @@ fn narrowed(map: &ClearanceMap, mut gap: Gap, width_m: f64) -> Option<Gap> {
         gap = nearest_sides(map, &gap.centre(), &across, width_m)?;
     }
     (gap.width_m() < width_m).then_some(gap)
-}
-
-fn passage(path: &Path, from_m: f64, station_m: f64, gap: &Gap, centre: Vector3<f64>) -> Passage {
-    let across = gap.left - gap.right;
-    let ahead = path.direction_at(station_m);
-    let through = Vector3::new(across.y, -across.x, 0.0).try_normalize(1e-6).unwrap_or(ahead);
-    let width_m = gap.width_m();
-    let on_path = path.project_within(&centre, station_m - width_m, station_m + width_m);
-    Passage {
-        centre,
-        direction: if through.dot(&ahead) < 0.0 { -through } else { through },
-        width_m,
-        distance_m: (on_path.station_m - from_m).max(0.0),
-    }
 }

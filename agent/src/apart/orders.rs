@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use skein_wire::event::Right;
 use skein_wire::{Limits, MissionState, State};
 
 use super::newest::Newest;
@@ -29,6 +30,8 @@ pub struct Words {
     /// Who commands the vehicle, and who asks to; empty for nobody.
     pub holder: String,
     pub asked_by: String,
+    /// The vehicle's right to go first where there is room for one.
+    pub right: Right,
 }
 
 impl Orders {
@@ -45,7 +48,7 @@ impl Words {
     /// The state of a body, with these words.
     #[must_use]
     pub fn said_of(&self, body: State) -> State {
-        let Self { task, waiting_for, mission, scripts, holder, asked_by } = self.clone();
-        State { task, waiting_for, mission, scripts, holder, asked_by, ..body }
+        let Self { task, waiting_for, mission, scripts, holder, asked_by, right } = self.clone();
+        State { task, waiting_for, mission, scripts, holder, asked_by, right, ..body }
     }
 }

@@ -1,9 +1,15 @@
-//! Right of way: one vehicle at a time in a narrow passage, wherever the others' programs run.
+//! Right of way: where there is room for one, whoever may be there is agreed on, wherever the others' programs run.
 //!
-//! The vehicle blocks `enter` for everyone else around the passage, awaits confirmation from every home, and only
-//! then requests its own `enter` (*block, await confirmation, act*). Two that claim at once block each other; the
-//! one with the higher number then gives way. Nothing but this block keeps the others out, so it is held until the
-//! passage lies behind.
+//! Before the vehicle flies into a narrow stretch of its way, it blocks `enter` for everyone else who would go against
+//! it there or across, awaits confirmation from every home, and only then requests its own `enter` for each place of
+//! the stretch (*block, await confirmation, act*). Those who go the same way are not kept out. As the way unfolds the
+//! stretch grows, and is claimed anew; what lies behind is let go. Nothing but this block keeps the others out.
+//!
+//! Two that claim at once block each other; the one with the higher number then gives way. Who waits outside withdraws
+//! its claim now and then, so that whoever is inside gets on with its own.
+//!
+//! Vehicles may meet inside, where neither could know of the other. Who stands in the way of one that goes before it
+//! makes way: see [`Right`]. If it cannot, it is cornered, and goes first.
 //!
 //! A vehicle that is lost confirms nothing, and must not close every passage for ever. It is done without while most of
 //! the fleet is in reach, unless it had a claim when it was lost: to claim one since, it would have needed the
@@ -17,22 +23,23 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::facts::{BlockLapsed, Confirmed, PeerJoined, PeerLost, Stalled};
 use skein_wire::event::{
-    Advance, Declared as _, Enter, Homeward, Landed, Leave, Passage, of, of_every_vehicle,
+    Advance, Cornered, Declared as _, Enter, Homeward, InTheWay, Landed, Leave, MakeWay, OutOfTheWay,
+    Passage, Right, of, of_every_vehicle,
 };
 
-use crate::{me::Me, precedence};
+use crate::{me::Me, precedence, rank::goes_before, stretch::Stretch};
 
 /// The name under which this b-thread runs, as confirmations name it.
 pub const NAME: &str = "right_of_way";
-/// Two passages nearer than this, per axis, are one: vehicles see the same opening from different sides.
-const SAME_PASSAGE_M: f64 = 3.0;
 /// A vehicle that gave way claims again when it hears that another has left a passage, or after this long.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// Who waits outside for others to come out claims no longer than this at a time.
+const INSISTS_FOR: Duration = Duration::from_secs(3);
 /// Claims that were made apart are known to both sides so many leases after they have met again: records are repeated
 /// every tenth of one.
 const MEETING_LEASES: f64 = 1.5;
 
-/// Claims a passage, enters it when the claim is confirmed, and lets go behind it.
+/// Claims narrow stretches, enters them when the claim is confirmed, lets go behind, and makes way.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct RightOfWay {
     me: Me,
@@ -42,6 +49,12 @@ pub struct RightOfWay {
     meeting: Duration,
     /// No claim counts before this.
     met: Duration,
+    /// The stretch that it is in, entered place by place.
+    held: Stretch,
+    /// The stretch of its way that lies ahead, with that part of it in which it is.
+    ahead: Stretch,
+    /// It could not make way, and has not come out since.
+    cornered: bool,
     phase: Phase,
 }
 
@@ -57,14 +70,24 @@ enum Other {
     LostClaiming,
 }
 
-/// `passage` is the event that announced it, with the centre in `x`, `y`, `z`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 enum Phase {
+    /// It may fly on: nothing narrow lies ahead that it has not entered.
     Clear,
-    Claiming { passage: Event },
-    Entering { passage: Event },
-    Yielding { passage: Event, until: Duration },
-    Inside { passage: Event },
+    Claiming,
+    /// `next` is the place to enter next; who is outside insists until then.
+    Entering {
+        next: usize,
+        until: Duration,
+    },
+    Yielding {
+        until: Duration,
+    },
+    /// It is to make way for another, and control has not been told.
+    Asked {
+        of: String,
+    },
+    MakingWay,
 }
 
 impl RightOfWay {
@@ -73,31 +96,44 @@ impl RightOfWay {
     pub fn new<'a>(me: Me, others: impl IntoIterator<Item = &'a str>, lease: Duration) -> Self {
         let others = others.into_iter().map(|node| (node.to_owned(), Other::Unheard)).collect();
         let meeting = lease.mul_f64(MEETING_LEASES);
-        Self { me, others, meeting, met: Duration::ZERO, phase: Phase::Clear }
+        let (held, ahead) = (Stretch::default(), Stretch::default());
+        Self { me, others, meeting, met: Duration::ZERO, held, ahead, cornered: false, phase: Phase::Clear }
     }
 
-    /// `enter` into the same passage, of everyone else.
-    fn others_enter(&self, passage: &Event) -> EventSet {
-        of_every_vehicle::<Enter>().and(self.me.any::<Enter>().not()).and(around(passage))
+    /// Its right to go first.
+    pub fn right(&self) -> Right {
+        match (self.cornered, self.held.is_empty()) {
+            (true, _) => Right::Cornered,
+            (false, false) => Right::Inside,
+            (false, true) => Right::Free,
+        }
     }
 
-    /// The same, without those whose confirmation is not needed.
-    fn claim(&self, passage: &Event) -> EventSet {
+    /// `enter` of everyone else, against a stretch.
+    fn of_everyone(&self, against: EventSet) -> EventSet {
+        of_every_vehicle::<Enter>().and(self.me.any::<Enter>().not()).and(against)
+    }
+
+    /// `enter` against what it is in and what lies ahead, of those whose confirmation is needed.
+    fn claim(&self) -> EventSet {
+        let against = self.held.against().or(self.ahead.against());
         let alive = 1 + self.others.values().filter(|other| **other == Other::Alive).count();
         if 2 * alive <= self.others.len() + 1 {
-            return self.others_enter(passage);
+            return self.of_everyone(against);
         }
         let needed =
             self.others.iter().filter(|(_, other)| matches!(other, Other::Alive | Other::LostClaiming));
-        EventSet::any_of(needed.map(|(node, _)| of::<Enter>(node))).and(around(passage))
+        EventSet::any_of(needed.map(|(node, _)| of::<Enter>(node))).and(against)
     }
 
-    /// Whether the vehicle `other` goes first when both claim: the lower number does.
-    fn goes_before_me(&self, other: &str) -> bool {
+    /// Whether the claim is to be withdrawn because another vehicle's is in its way: outside, if that has the lower
+    /// number. Who is inside makes way before it withdraws anything.
+    fn gives_in_to(&self, stalled: &Stalled) -> bool {
         // Facts name a remote b-thread `node#bthread`.
-        let node = other.split('#').next().unwrap_or_default();
-        let rank = |node: &str| node.rsplit('/').next().and_then(|number| number.parse::<u32>().ok());
-        (rank(node), node) < (rank(self.me.name()), self.me.name())
+        let node = stalled.by.split('#').next().unwrap_or_default();
+        stalled.event.ends_with(Enter::NAME)
+            && self.held.is_empty()
+            && goes_before((node, self.right()), (self.me.name(), self.right()))
     }
 
     /// Takes in that another node is heard or lost.
@@ -117,91 +153,136 @@ impl RightOfWay {
         }
     }
 
-    /// A claim is made anew, or, where two sides have just met, a little later.
-    fn claim_again(&self, passage: Event, now: Duration) -> Phase {
-        if now < self.met {
-            Phase::Yielding { passage, until: self.met }
+    /// What becomes of it where nobody is made way for: what lies ahead is claimed unless it is entered already; where
+    /// two sides have just met, a little later.
+    fn go_on(&mut self, now: Duration) -> Phase {
+        if self.ahead.is_part_of(&self.held) {
+            self.held = self.ahead.clone();
+            Phase::Clear
+        } else if now < self.met {
+            Phase::Yielding { until: self.met }
         } else {
-            Phase::Claiming { passage }
+            Phase::Claiming
         }
     }
-}
 
-/// The events about the same passage.
-pub fn around(passage: &Event) -> EventSet {
-    let [min, max] =
-        [-SAME_PASSAGE_M, SAME_PASSAGE_M].map(|margin| centre(passage).map(|coordinate| coordinate + margin));
-    EventSet::region(min, max)
-}
+    /// Enters the next place, from that number on, in which it is not yet.
+    fn enter_from(&mut self, index: usize, until: Duration) -> Phase {
+        match self.ahead.first_outside(&self.held, index) {
+            Some(next) => Phase::Entering { next, until },
+            None => {
+                self.held = self.ahead.clone();
+                Phase::Clear
+            }
+        }
+    }
 
-pub fn entering(me: &Me, passage: &Event) -> Event {
-    let [x, y, z] = centre(passage);
-    me.event(Enter { x, y, z })
-}
+    /// Takes in what lies ahead now.
+    fn look_ahead(&mut self, stretch: Stretch, now: Duration) -> Phase {
+        self.ahead = stretch;
+        match &self.phase {
+            Phase::Yielding { until } if !self.ahead.is_part_of(&self.held) => {
+                Phase::Yielding { until: *until }
+            }
+            // Nothing is told then but where it is.
+            Phase::MakingWay => {
+                self.held = self.ahead.clone();
+                Phase::MakingWay
+            }
+            Phase::Asked { of } => Phase::Asked { of: of.clone() },
+            _ => self.go_on(now),
+        }
+    }
 
-fn centre(passage: &Event) -> [f64; 3] {
-    Passage::read(passage).map_or([0.0; 3], |Passage { x, y, z }| [x, y, z])
+    /// What happened to it as a whole: what is ahead, whether it is made way for, whether it is out.
+    fn hear(&mut self, event: &Event, now: Duration) -> Option<Phase> {
+        let me = &self.me;
+        if let Some(stretch) = Stretch::read(event).filter(|_| me.heard::<Passage>(event)) {
+            return Some(self.look_ahead(stretch, now));
+        }
+        if let Some(InTheWay { of, right }) = me.read(event) {
+            let goes_first = goes_before((&of, right), (me.name(), self.right()));
+            return goes_first.then(|| Phase::Asked { of: of.to_string() });
+        }
+        match me.verb(event)? {
+            Leave::NAME | Landed::NAME => {
+                (self.held, self.ahead, self.cornered) = (Stretch::default(), Stretch::default(), false);
+                let makes_way = matches!(self.phase, Phase::Asked { .. } | Phase::MakingWay);
+                Some(if makes_way && me.heard::<Leave>(event) { self.phase.clone() } else { Phase::Clear })
+            }
+            MakeWay::NAME => Some(Phase::MakingWay),
+            Cornered::NAME => {
+                self.cornered = true;
+                Some(self.go_on(now))
+            }
+            OutOfTheWay::NAME => Some(self.go_on(now)),
+            PeerJoined::NAME | PeerLost::NAME => {
+                self.note(event, now);
+                let claims = matches!(self.phase, Phase::Claiming | Phase::Entering { .. });
+                Some(if claims { self.go_on(now) } else { self.phase.clone() })
+            }
+            _ => None,
+        }
+    }
 }
 
 impl BThread for RightOfWay {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::COLLISION).wait_for(me.any::<(PeerJoined, PeerLost)>());
-        let gone = me.any::<(Leave, Landed)>();
+        let bid = Bid::new().priority(precedence::COLLISION).wait_for(me.any::<(
+            PeerJoined,
+            PeerLost,
+            Passage,
+            InTheWay,
+            Leave,
+            Landed,
+        )>());
+        // Whoever comes back meanwhile stays out too.
+        let holds = |bid: Bid| bid.block(self.of_everyone(self.held.against()));
+        let stands = |bid: Bid| bid.block(me.any::<(Advance, Homeward)>());
         Some(match &self.phase {
-            Phase::Clear => bid.wait_for(me.any::<Passage>()),
-            Phase::Claiming { passage } => bid
-                .block(self.claim(passage))
-                .block(me.any::<(Advance, Homeward)>())
-                .wait_for(me.any::<Confirmed>())
-                .wait_for(gone),
-            Phase::Entering { passage } => bid
-                .request(entering(me, passage))
-                .block(self.claim(passage))
-                .block(me.any::<(Advance, Homeward)>())
-                .wait_for(me.any::<(Stalled, BlockLapsed)>())
-                .wait_for(gone),
-            Phase::Yielding { until, .. } => bid
-                .block(me.any::<(Advance, Homeward)>())
-                .wait_for(of_every_vehicle::<Leave>())
-                .deadline(*until)
-                .wait_for(gone),
-            // Whoever comes back meanwhile stays out too.
-            Phase::Inside { passage } => bid.block(self.others_enter(passage)).wait_for(gone),
+            Phase::Clear => holds(bid),
+            Phase::Claiming => stands(bid).block(self.claim()).wait_for(me.any::<Confirmed>()),
+            Phase::Entering { next, until } => {
+                let bid = stands(bid).block(self.claim()).wait_for(me.any::<(Stalled, BlockLapsed)>());
+                let bid = if self.held.is_empty() { bid.deadline(*until) } else { bid };
+                self.ahead.enter(*next, me).into_iter().fold(bid, Bid::request)
+            }
+            Phase::Yielding { until } => {
+                stands(holds(bid)).wait_for(of_every_vehicle::<Leave>()).deadline(*until)
+            }
+            Phase::Asked { of } => {
+                let make_way = me.event(MakeWay { of: of.as_str().into() });
+                holds(bid).request(make_way).wait_for(me.any::<OutOfTheWay>())
+            }
+            Phase::MakingWay => holds(bid).wait_for(me.any::<(Cornered, OutOfTheWay)>()),
         })
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        let (now, verb) = (cx.now(), self.me.verb(event));
-        let fleet_changed = matches!(verb, Some(PeerJoined::NAME | PeerLost::NAME));
-        if fleet_changed {
-            self.note(event, now);
+        let now = cx.now();
+        if let Some(phase) = self.hear(event, now) {
+            self.phase = phase;
+            return;
         }
         let confirmed = Confirmed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
         let lapsed = BlockLapsed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
-        self.phase = match (self.phase.clone(), verb) {
-            (_, Some(Leave::NAME | Landed::NAME)) => Phase::Clear,
-            (Phase::Claiming { passage } | Phase::Entering { passage }, _) if fleet_changed => {
-                self.claim_again(passage, now)
-            }
-            (phase, _) if fleet_changed => phase,
-            (Phase::Clear, _) => self.claim_again(event.clone(), now),
-            (Phase::Claiming { passage }, _) if confirmed => Phase::Entering { passage },
-            (Phase::Entering { passage }, Some(Enter::NAME)) => Phase::Inside { passage },
-            (Phase::Entering { passage }, _) if lapsed => Phase::Claiming { passage },
-            (Phase::Entering { passage }, _)
-                if Stalled::read(event).is_some_and(|stalled| {
-                    stalled.event.ends_with(Enter::NAME) && self.goes_before_me(&stalled.by)
-                }) =>
+        self.phase = match (self.phase.clone(), self.me.verb(event)) {
+            (Phase::Claiming, _) if confirmed => self.enter_from(0, now + INSISTS_FOR),
+            (Phase::Entering { next, until }, Some(Enter::NAME)) => self.enter_from(next + 1, until),
+            (Phase::Entering { .. }, _) if lapsed => Phase::Claiming,
+            (Phase::Entering { .. }, _)
+                if Stalled::read(event).is_some_and(|stalled| self.gives_in_to(&stalled)) =>
             {
-                Phase::Yielding { passage, until: now + PATIENCE }
+                Phase::Yielding { until: now + PATIENCE }
             }
-            (Phase::Yielding { passage, until }, None) if self.met <= until => {
+            (Phase::Entering { .. }, None) => Phase::Yielding { until: now + PATIENCE },
+            (Phase::Yielding { until }, None) if self.met <= until => {
                 self.met = Duration::ZERO;
-                Phase::Claiming { passage }
+                Phase::Claiming
             }
             // Time is up, or a vehicle that is not this one has left.
-            (Phase::Yielding { passage, .. }, None) => self.claim_again(passage, now),
+            (Phase::Yielding { .. }, None) => self.go_on(now),
             (phase, _) => phase,
         };
     }

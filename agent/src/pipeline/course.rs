@@ -1,7 +1,7 @@
 //! The course: the waypoint that a vehicle flies to, and the path that leads there.
 
 use nalgebra::Vector3;
-use skein_planning::{Path, Region, map::ClearanceMap, passage::Passage};
+use skein_planning::{Path, Region, map::ClearanceMap};
 
 use super::global::Found;
 use crate::instruction::Waypoint;
@@ -44,31 +44,6 @@ impl Course {
     pub fn landing_place(&self) -> Option<Vector3<f64>> {
         self.waypoint.filter(|waypoint| waypoint.lands && self.has_arrived).map(|waypoint| waypoint.target)
     }
-
-    /// The path ahead, from the vehicle's place on it to its end; empty without one.
-    pub fn path_ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
-        self.following.iter().flat_map(|following| {
-            let here = following.path.point_at(following.station_m);
-            let mut station_m = 0.0;
-            let points = following.path.points();
-            let ahead = points.iter().enumerate().filter_map(move |(index, point)| {
-                if let Some(before) = index.checked_sub(1).and_then(|before| points.get(before)) {
-                    station_m += (point - before).norm();
-                }
-                (station_m > following.station_m).then_some(*point)
-            });
-            std::iter::once(here).chain(ahead)
-        })
-    }
-
-    /// Whether the path ahead leads through a passage, as far as there is a path.
-    pub fn leads_through(&self, passage: &Passage) -> bool {
-        self.following.as_ref().is_none_or(|following| {
-            let end_m = following.path.length_m();
-            following.path.project_within(&passage.centre, following.station_m, end_m).distance_m
-                < passage.width_m
-        })
-    }
 }
 
 impl Following {
@@ -80,6 +55,13 @@ impl Following {
     /// The place so far ahead of the vehicle, or the path's end.
     pub fn place_ahead(&self, reach_m: f64) -> Vector3<f64> {
         self.path.point_at((self.station_m + reach_m).min(self.path.length_m()))
+    }
+
+    /// The path ahead, from the vehicle's place on it to its end.
+    pub fn ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
+        let stations = self.path.points().iter().zip(self.path.stations());
+        let ahead = stations.filter(|(_, station_m)| **station_m > self.station_m).map(|(point, _)| *point);
+        std::iter::once(self.path.point_at(self.station_m)).chain(ahead)
     }
 
     /// Whether a vehicle at `position` that is to stay `within` a region can fly on along the path, as far as the map

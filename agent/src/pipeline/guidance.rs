@@ -7,17 +7,23 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_mav::SetPoint;
-use skein_planning::map::ClearanceMap;
+use skein_planning::{
+    Path,
+    global::{RefugeRequest, astar::Disc, refuge, simplify},
+    map::ClearanceMap,
+};
 
 use super::{
     allowed::Allowed,
-    course::Course,
+    course::{Course, Following},
+    global::Found,
     headroom::Headroom,
     layers::Layers,
     planning::Planning,
     progress::Progress,
     steering::{Lead, Steering},
     surroundings::Surroundings,
+    way_of_others::{WayOfOthers, goes_first},
 };
 use crate::{
     config::Envelope, instruction::Waypoint, neighbours::Neighbour, positioning::Motion, report::Report,
@@ -27,6 +33,10 @@ use crate::{
 const LEAVE_LASTS: Duration = Duration::from_millis(250);
 /// From where a vehicle that is held stops to the place that it was held from, at least, m.
 const ROOM_AHEAD_M: f64 = 1.5;
+/// Places looked at for a refuge, at most: those of a room of 40 m by 40 m.
+const REFUGE_BUDGET: usize = 10_000;
+/// A refuge is not looked for again before so long.
+const REFUGE_PAUSE: Duration = Duration::from_secs(1);
 
 /// Follows paths with leave, hovers without.
 #[derive(Debug)]
@@ -41,6 +51,9 @@ pub struct Guidance {
     pub course: Course,
     pub planning: Planning,
     progress: Progress,
+    way_of_others: WayOfOthers,
+    /// The way to a refuge, and when it was found, while the vehicle makes way.
+    aside: Option<(Following, Duration)>,
     pub steering: Steering,
 }
 
@@ -57,6 +70,8 @@ impl Guidance {
             course: Course::default(),
             planning: Planning::new(envelope, finder),
             progress: Progress::new(envelope.separation_m, passages, escape),
+            way_of_others: WayOfOthers::new(envelope.separation_m, &passages),
+            aside: None,
             steering: Steering::new(envelope, follower, repulsion, filter),
         }
     }
@@ -125,7 +140,100 @@ impl Guidance {
         self.is_held = false;
         self.course = Course::default();
         self.progress.forget();
+        self.way_of_others.forget();
+        self.aside = None;
         self.planning.abandon();
+    }
+
+    /// The way ahead: to a refuge while the vehicle makes way, else along its path; empty without one.
+    pub fn way_ahead(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
+        let aside = self.aside.as_ref().map(|(following, _)| following);
+        aside.or(self.course.following.as_ref()).into_iter().flat_map(Following::ahead)
+    }
+
+    /// Leave to move leads out of the way of who was said to need it, from now on.
+    pub fn make_way(
+        &mut self,
+        now: Duration,
+        motion: &Motion,
+        map: &ClearanceMap,
+        neighbours: &[Neighbour],
+    ) -> Option<Report> {
+        let Some(other) = self.way_of_others.hindered(neighbours) else { return Some(Report::OutOfTheWay) };
+        match self.refuge_from(other, motion, map, neighbours) {
+            Some(path) => {
+                let clearance_m = Some(self.envelope.obstacle_clearance_m());
+                let following = Following::new(Found { path, clearance_m }, self.allowed().region);
+                self.aside = Some((following, now));
+                None
+            }
+            None => {
+                self.aside = None;
+                Some(Report::Cornered { by: other.node.clone() })
+            }
+        }
+    }
+
+    fn refuge_from(
+        &self,
+        other: &Neighbour,
+        motion: &Motion,
+        map: &ClearanceMap,
+        neighbours: &[Neighbour],
+    ) -> Option<Path> {
+        let way = other.way.as_deref()?;
+        // The other comes along there, or whoever comes behind it, as far as it cannot see yet.
+        let own = self.course.following.as_ref().and_then(|path| Path::new(path.ahead().collect()));
+        let out = self.progress.way_out();
+        let ways: Vec<&Path> = std::iter::once(way).chain(&own).chain(&out).collect();
+        let of_others = || neighbours.iter().filter(|neighbour| neighbour.armed);
+        let standing: Vec<_> = of_others().map(Neighbour::position).collect();
+        // Nobody else in the way of the other one stays there, but who goes before it.
+        let stays = |neighbour: &&Neighbour| neighbour.node == other.node || goes_first(neighbour, other);
+        let radius_m = self.envelope.separation_m;
+        let discs: Vec<_> = of_others()
+            .filter(stays)
+            .map(|neighbour| Disc { centre: neighbour.position(), radius_m })
+            .collect();
+        let request = RefugeRequest {
+            from: motion.position,
+            ways: &ways,
+            keep_m: self.way_of_others.kept_m(),
+            standing: &standing,
+            discs: &discs,
+            clearance_m: self.envelope.obstacle_clearance_m(),
+            within: self.allowed().region,
+            budget: REFUGE_BUDGET,
+        };
+        let path = refuge(map, &request)?;
+        Some(simplify(map, &path, request.clearance_m))
+    }
+
+    /// Goes on with making way: no longer than another needs it, and by another way if this one is blocked or ends where
+    /// the other wants to go by now.
+    fn keep_aside(
+        &mut self,
+        now: Duration,
+        motion: &Motion,
+        map: &ClearanceMap,
+        neighbours: &[Neighbour],
+    ) -> Option<Report> {
+        let ahead = self.course.following.as_ref().map(|path| path.path.direction_at(path.station_m));
+        let report = self.way_of_others.look(now, motion, ahead, map, neighbours);
+        if report == Some(Report::OutOfTheWay) {
+            self.aside = None;
+        }
+        let Some((following, found_at)) = &self.aside else { return report };
+        let is_blocked = !following.can_be_flown(&motion.position, &self.allowed().region, map);
+        let ends_in_the_way = || {
+            let other = self.way_of_others.hindered(neighbours)?;
+            let end = following.path.end();
+            Some(other.way.as_deref()?.project(&end).distance_m < self.envelope.separation_m)
+        };
+        if now.saturating_sub(*found_at) < REFUGE_PAUSE || !(is_blocked || ends_in_the_way() == Some(true)) {
+            return report;
+        }
+        report.or(self.make_way(now, motion, map, neighbours))
     }
 
     /// A place on the path so far ahead that a vehicle whose leave to move ends now stops well before it; none
@@ -173,10 +281,14 @@ impl Guidance {
         map: &ClearanceMap,
         neighbours: &[Neighbour],
     ) -> Vec<Report> {
-        let (has_leave, allowed) = (self.has_leave(now), self.allowed());
-        let moves_at = has_leave.then_some(now);
+        let aside = self.keep_aside(now, motion, map, neighbours);
+        let (has_leave, allowed, makes_way) = (self.has_leave(now), self.allowed(), self.aside.is_some());
+        let moves_at = (has_leave && !makes_way).then_some(now);
         let room = (&allowed, self.headroom);
-        self.progress.look_ahead(moves_at, &mut self.course, room, motion, map, neighbours)
+        let mut reports =
+            self.progress.look_ahead(moves_at, makes_way, &mut self.course, room, motion, map, neighbours);
+        reports.extend(aside);
+        reports
     }
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles
@@ -184,7 +296,8 @@ impl Guidance {
     pub fn steer(&mut self, now: Duration, motion: &Motion, surroundings: &Surroundings<'_>) -> SetPoint {
         let (has_leave, allowed) = (self.has_leave(now), self.allowed());
         // Until there is a new path, a blocked one is not flown.
-        let following = self.course.following.as_mut().filter(|path| has_leave && !path.is_blocked);
+        let aside = self.aside.as_mut().map(|(following, _)| following);
+        let following = aside.or(self.course.following.as_mut()).filter(|path| has_leave && !path.is_blocked);
         let attraction = self.progress.attraction();
         let lead = following.map(|following| Lead { following, attraction });
         let set_point = self.steering.steer(now, motion, lead, &allowed, surroundings);

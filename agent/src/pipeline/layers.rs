@@ -10,7 +10,7 @@ use super::{
 use crate::config::{Envelope, Fence, Planners};
 
 /// A passage is announced this far ahead, m: far enough to stop well clear of it.
-const PASSAGE_AHEAD_M: f64 = 5.0;
+const PASSAGE_AHEAD_M: f64 = 6.0;
 
 /// The layers of guidance. Every one is there for a reason: [`Layers::of`] has them all.
 #[derive(Debug)]

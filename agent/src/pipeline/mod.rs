@@ -24,3 +24,4 @@ pub mod set_point;
 pub mod steering;
 pub mod surroundings;
 pub mod touchdown;
+pub mod way_of_others;

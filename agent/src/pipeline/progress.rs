@@ -3,13 +3,18 @@
 use std::time::Duration;
 
 use skein_planning::{
+    Path,
     local::escape::{EscapeConfig, EscapeDetector, Verdict},
     map::ClearanceMap,
-    passage::{Passage, PassageConfig, first_passage},
+    passage::{PIECE_M, PassageConfig, Piece, is_narrow_around, narrow_stretch},
 };
 
-use super::{allowed::Allowed, course::Course, headroom::Headroom};
-use crate::{neighbours::Neighbour, positioning::Motion, report::Report};
+use super::{
+    allowed::Allowed,
+    course::{Course, Following},
+    headroom::Headroom,
+};
+use crate::{neighbours::Neighbour, positioning::Motion, report::Report, stretch::Stretch};
 
 /// The last waypoint is reached within this distance, m.
 const ARRIVAL_M: f64 = 0.35;
@@ -19,8 +24,17 @@ const PASSING_M: f64 = 0.7;
 const ARRIVAL_HEIGHT_M: f64 = 0.5;
 /// A home that is covered is reached within this distance, m.
 const COVERED_M: f64 = 1.5;
-/// A passage lies behind once the vehicle is this far past it, m.
-const PASSAGE_BEHIND_M: f64 = 2.5;
+/// A place of a narrow stretch lies behind once the vehicle is this far from it, m: who has made way for others, who
+/// keep further from it, is in none.
+const PASSAGE_BEHIND_M: f64 = 1.5;
+/// So many places more or less of a stretch are worth a word, or a new one that is as near as that, m.
+const PASSAGE_CHANGES_PIECES: usize = 3;
+const PASSAGE_CHANGES_M: f64 = 5.0;
+/// Who comes out of a narrow stretch needs so much of the way straight on, m.
+const WAY_OUT_M: f64 = 4.0;
+/// A vehicle that is less than this ahead in a narrow place is waited for, m, and no longer than so.
+const QUEUES_M: f64 = 3.0;
+const QUEUES_FOR: Duration = Duration::from_secs(60);
 
 /// Watches the vehicle on its course.
 #[derive(Debug)]
@@ -28,15 +42,17 @@ pub struct Progress {
     /// Centre-to-centre distance that is kept between vehicles, m.
     separation_m: f64,
     passages: PassageConfig,
-    /// The narrow passage that was announced last.
-    passage: Option<Passage>,
+    /// The narrow stretch that was announced last.
+    announced: Vec<Piece>,
+    /// Since when another vehicle is in front of this one in a narrow place.
+    queues_since: Option<Duration>,
     escape: EscapeDetector,
 }
 
 impl Progress {
     /// Watches a vehicle that keeps so far from others, m. Passages and local minima are found as configured.
     pub fn new(separation_m: f64, passages: PassageConfig, escape: EscapeConfig) -> Self {
-        Self { separation_m, passages, passage: None, escape: EscapeDetector::new(escape) }
+        Self { separation_m, passages, announced: Vec::new(), queues_since: None, escape: EscapeDetector::new(escape) }
     }
 
     pub fn begin_path(&mut self) {
@@ -45,7 +61,7 @@ impl Progress {
 
     /// The flight is over.
     pub fn forget(&mut self) {
-        self.passage = None;
+        self.announced.clear();
     }
 
     /// The share of the attraction that is left: 1, and less while a local minimum is escaped from.
@@ -53,10 +69,12 @@ impl Progress {
         self.escape.attraction()
     }
 
-    /// Looks along the path, once in each navigation cycle; `moves_at` is the time, if there is leave to move now.
+    /// Looks along the path, once in each navigation cycle; `moves_at` is the time, if there is leave to move along it
+    /// now. A vehicle that makes way does not follow it.
     pub fn look_ahead(
         &mut self,
         moves_at: Option<Duration>,
+        makes_way: bool,
         course: &mut Course,
         (allowed, headroom): (&Allowed, Headroom),
         motion: &Motion,
@@ -65,10 +83,19 @@ impl Progress {
     ) -> Vec<Report> {
         let mut reports = Vec::new();
         reports.extend(self.check_arrival(course, (allowed, headroom), motion, neighbours));
-        reports.extend(check_path(course, allowed, motion, map));
-        reports.extend(self.check_passage(course, motion, map));
+        if !makes_way {
+            reports.extend(check_path(course, allowed, motion, map));
+        }
+        reports.extend(self.check_passage(course.following.as_ref(), makes_way, motion, map));
+        let moves_at = moves_at.filter(|now| !self.queues(*now, course, motion, map, neighbours));
         reports.extend(self.check_progress(moves_at, course, motion));
         reports
+    }
+
+    /// Where whoever comes out of the narrow stretch that the vehicle is at will be, if there is one.
+    pub fn way_out(&self) -> Option<Path> {
+        let Piece { centre, direction } = self.announced.first()?;
+        Path::new(vec![*centre, centre - direction * WAY_OUT_M])
     }
 
     fn check_arrival(
@@ -98,21 +125,65 @@ impl Progress {
             .then_some(Report::Arrived { leg: waypoint.leg })
     }
 
-    fn check_passage(&mut self, course: &Course, motion: &Motion, map: &ClearanceMap) -> Option<Report> {
-        if let Some(passage) = self.passage {
-            let offset = motion.position - passage.centre;
-            let is_past = offset.dot(&passage.direction) > PASSAGE_BEHIND_M;
-            let turned_away = offset.norm() > PASSAGE_BEHIND_M && !course.leads_through(&passage);
-            if is_past || turned_away || offset.norm() > self.passages.look_m + PASSAGE_BEHIND_M {
-                self.passage = None;
-                return Some(Report::PassageLeft);
-            }
+    /// Announces what is narrow ahead, with what the vehicle is in; nothing of what is ahead while it makes way.
+    fn check_passage(
+        &mut self,
+        following: Option<&Following>,
+        makes_way: bool,
+        motion: &Motion,
+        map: &ClearanceMap,
+    ) -> Option<Report> {
+        let ahead = match following {
+            _ if makes_way => Vec::new(),
+            Some(following) => narrow_stretch(map, &following.path, following.station_m, &self.passages),
+            None => return None,
+        };
+        let is_ahead =
+            |piece: &Piece| ahead.iter().any(|other| (piece.centre - other.centre).norm() < PIECE_M);
+        let is_here = |piece: &&Piece| (piece.centre - motion.position).xy().norm() < PASSAGE_BEHIND_M;
+        let behind: Vec<_> =
+            self.announced.iter().filter(is_here).filter(|piece| !is_ahead(piece)).copied().collect();
+        let pieces = [behind, ahead].concat();
+        let (stretch, announced) = (Stretch::of(&pieces), Stretch::of(&self.announced));
+        let is_less = self.announced.len() >= pieces.len() + PASSAGE_CHANGES_PIECES;
+        let is_new = |piece: &&Piece| !Stretch::of(&[**piece]).is_part_of(&announced);
+        let new: Vec<&Piece> = pieces.iter().filter(is_new).collect();
+        let is_more = new.len() >= PASSAGE_CHANGES_PIECES
+            || new.first().is_some_and(|piece| (piece.centre - motion.position).norm() < PASSAGE_CHANGES_M);
+        if !(is_less || is_more || pieces.is_empty() && !self.announced.is_empty()) {
             return None;
         }
-        let following = course.following.as_ref()?;
-        let passage = first_passage(map, &following.path, following.station_m, &self.passages)?;
-        self.passage = Some(passage);
-        Some(Report::Passage(passage.centre))
+        self.announced = pieces;
+        Some(if stretch.is_empty() { Report::PassageLeft } else { Report::Passage(stretch) })
+    }
+
+    /// Whether the vehicle waits for one in front of it, where there is no room to pass.
+    fn queues(
+        &mut self,
+        now: Duration,
+        course: &Course,
+        motion: &Motion,
+        map: &ClearanceMap,
+        neighbours: &[Neighbour],
+    ) -> bool {
+        let is_ahead = |following: &Following| {
+            let Following { path, station_m, .. } = following;
+            let around = neighbours.iter().filter(|neighbour| neighbour.armed && neighbour.track.cooperative);
+            let mut near = around
+                .map(Neighbour::position)
+                .filter(|place| (place - motion.position).norm() < QUEUES_M)
+                .map(|place| path.project_within(&place, *station_m, station_m + QUEUES_M))
+                .filter(|on_path| on_path.distance_m < self.separation_m && on_path.station_m > *station_m);
+            near.any(|on_path| {
+                let width_m = self.passages.width_m;
+                is_narrow_around(map, path, on_path.station_m, self.separation_m, width_m)
+            })
+        };
+        if !course.following.as_ref().is_some_and(is_ahead) {
+            self.queues_since = None;
+            return false;
+        }
+        now.saturating_sub(*self.queues_since.get_or_insert(now)) < QUEUES_FOR
     }
 
     fn check_progress(

@@ -101,6 +101,7 @@ impl Scene {
         }
         if is_in(&[Self::Passage]) {
             add("passage", world::passage(me, other));
+            add("in the way", world::in_the_way(me));
         }
         if let Some(ground) = ground.filter(|_| is_in(&[Self::Launch, Self::Passage, Self::Link])) {
             add("ground station", world::peer(me, ground));

@@ -9,10 +9,10 @@ use skein_dbp::NodeName;
 use skein_dbp::facts::{BlockLapsed, Confirmed, DuplicateName, InStep, PeerJoined, PeerLost, Stalled};
 use skein_wire::event::{
     Abort, Advance, Ahead, Airborne, Arrived, At, BatteryCritical, BatteryLevel, BatteryLow, Clear,
-    CommandFailed, Declared as _, Enter, FenceBreached, FoundAirborne, Goto, HandBack, Handover, Land,
-    Landed, Launch, Leave, Load, NeighbourAt, OrderTaken, Passage, PathBlocked, PilotTook, Plan, Planned,
-    PositionDoubted, PositionTrusted, Ready, SWARM, Slept, Stuck, Takeoff, TooClose, Unload, Unplannable,
-    Unready, What,
+    CommandFailed, Cornered, Declared as _, Enter, FenceBreached, FoundAirborne, Goto, HandBack, Handover,
+    InTheWay, Land, Landed, Launch, Leave, Load, MakeWay, NeighbourAt, OrderTaken, OutOfTheWay, Passage,
+    PathBlocked, PilotTook, Plan, Planned, PositionDoubted, PositionTrusted, Ready, Right, SWARM, Slept,
+    Stuck, Takeoff, TooClose, Unload, Unplannable, Unready, What,
 };
 
 use super::part::{Part, Place};
@@ -26,6 +26,8 @@ pub(super) const UNHEARD_OF: &str = "not heard of";
 
 /// Reports of the autopilot and the guidance that come only while the agent flies the vehicle.
 type OnTheWay = (Arrived, PathBlocked, Stuck, Passage, At, Ahead, NeighbourAt, BatteryLevel);
+/// The same about the ways of others.
+type AmongOthers = (InTheWay, Cornered);
 /// Reports of watches that look in the air only.
 type InTheAir =
     (BatteryLow, BatteryCritical, FenceBreached, TooClose, Clear, PositionDoubted, PositionTrusted);
@@ -37,9 +39,14 @@ pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
             .hears(me.any::<Takeoff>(), "taking off")
             .rules_out(me.any::<InTheAir>())
             .rules_out(me.any::<OnTheWay>())
+            .rules_out(me.any::<AmongOthers>())
     };
-    let not_flying =
-        |name: &str| Place::new(name).rules_out(me.any::<OnTheWay>()).rules_out(me.any::<Ready>());
+    let not_flying = |name: &str| {
+        Place::new(name)
+            .rules_out(me.any::<OnTheWay>())
+            .rules_out(me.any::<AmongOthers>())
+            .rules_out(me.any::<Ready>())
+    };
     let taken = |place: Place| match disturbed.pilot {
         true => place.offers(me.event(PilotTook { mode: "manual".into(), by: "pilot".into() }), "taken"),
         false => place,
@@ -53,8 +60,12 @@ pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
         true => taken(grounded(UNHEARD_OF)).offers(me.event(FoundAirborne), "adopted"),
         false => grounded(UNHEARD_OF),
     };
-    let taking_off =
-        lands(Place::new("taking off").rules_out(me.any::<OnTheWay>()).offers(me.event(Airborne), "flying"));
+    let taking_off = lands(
+        Place::new("taking off")
+            .rules_out(me.any::<OnTheWay>())
+            .rules_out(me.any::<AmongOthers>())
+            .offers(me.event(Airborne), "flying"),
+    );
     let taking_off = match disturbed.refusals {
         true => taking_off.offers(me.event(CommandFailed { why: "Arm: denied".into() }), ON_THE_GROUND),
         false => taking_off,
@@ -151,7 +162,22 @@ pub(super) fn passage(me: &Me, other: Option<&NodeName>) -> Part {
     if let Some(other) = other {
         ahead = ahead.keeps_offering(Leave.at(other));
     }
-    Part::new(vec![Place::new("none").offers(me.event(Passage { x: 5.0, y: 0.0, z: 2.0 }), "ahead"), ahead])
+    let way = Some("5 0 2 0; 6 0 2 0".into());
+    let passage = Passage { x: 5.0, y: 0.0, z: 2.0, way };
+    Part::new(vec![Place::new("none").offers(me.event(passage), "ahead"), ahead])
+}
+
+/// Another vehicle that wants to go where this one is.
+pub(super) fn in_the_way(me: &Me) -> Part {
+    let asks = |right| me.event(InTheWay { of: "uav/0".into(), right });
+    let gone = |place: Place| place.offers(me.event(OutOfTheWay), "free").hears(me.any::<Landed>(), "free");
+    Part::new(vec![
+        Place::new("free")
+            .offers(asks(Right::Free), "in the way")
+            .offers(asks(Right::Cornered), "in the way"),
+        gone(Place::new("in the way").hears(me.any::<MakeWay>(), "making way")),
+        gone(Place::new("making way").offers(me.event(Cornered { by: "uav/0".into() }), "in the way")),
+    ])
 }
 
 /// Preflight checks. Once the vehicle is up, or another has armed it, they fail in the same tick.

@@ -6,9 +6,11 @@ pub mod dstar;
 mod dstar_lite;
 mod open_list;
 mod potential;
+mod refuge;
 mod simplify;
 
 pub use anytime::{Effort, Route, Search, Unsolved, cost_of};
 pub use dstar_lite::DStarLite;
 pub use potential::{Potential, PotentialObstacle, is_in_field};
+pub use refuge::{RefugeRequest, refuge};
 pub use simplify::{elide_collinear, simplify, simplify_around};

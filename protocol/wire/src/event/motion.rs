@@ -43,11 +43,18 @@ skein_bp::events! {
     }
     /// Leave to move on the way home. Unlike `advance`, nobody can block it from afar.
     Homeward = "homeward", Own;
-    /// Enter the narrow passage around this place.
+    /// Enter this narrow place. One after another, all places of a stretch are entered before the vehicle flies there.
     Enter = "enter", Anyone {
         x: f64 ["m"],
         y: f64 ["m"],
         z: f64 ["m"],
+        /// Where it will be flown to from there, counter-clockwise from east.
+        heading: Option<f64> ["deg"],
+    }
+    /// Leave to move leads out of the way of another for now, not to the waypoint.
+    MakeWay = "make_way", Own {
+        /// Of which one.
+        of: Text,
     }
     /// Stop and hover at once.
     Hold = "hold", Own {

@@ -2,6 +2,27 @@
 
 use super::Text;
 
+skein_bp::words! {
+    /// The right to go first where there is room for one. Who has more of it goes before who has less; of two with
+    /// the same right, the one with the lower number.
+    pub enum Right {
+        /// It is in no narrow place.
+        Free = "free",
+        /// It is in a narrow place that the others have confirmed.
+        Inside = "inside",
+        /// It is in a narrow place and cannot make way.
+        Cornered = "cornered",
+    }
+}
+
+// Nobody has a right that was not told.
+#[allow(clippy::derivable_impls)]
+impl Default for Right {
+    fn default() -> Self {
+        Self::Free
+    }
+}
+
 skein_bp::events! {
     /// What is found out about the way, the vehicle's surroundings and its battery.
     pub const SENSES;
@@ -27,14 +48,30 @@ skein_bp::events! {
     PathBlocked = "path_blocked", Own;
     /// Leave to move was given, and yet the vehicle makes no way.
     Stuck = "stuck", Own;
-    /// A narrow passage lies ahead, around this place.
+    /// A narrow stretch of the way lies ahead, or goes on further, or less of it is left: its first place.
     Passage = "passage", Own {
         x: f64 ["m"],
         y: f64 ["m"],
         z: f64 ["m"],
+        /// All its places, as `x y z heading` in metres and degrees, with `; ` between two; without it, this one.
+        way: Option<Text>,
     }
-    /// The narrow passage lies behind.
+    /// The narrow stretch lies behind.
     Leave = "leave", Own;
+    /// The vehicle stands where another wants to go, and there is no room to pass.
+    InTheWay = "in_the_way", Own {
+        /// Of which one.
+        of: Text,
+        /// The right that it has.
+        right: Right,
+    }
+    /// It does not any more, or the other does not want to go there any more.
+    OutOfTheWay = "out_of_the_way", Own;
+    /// There is no place where it could make way for another.
+    Cornered = "cornered", Own {
+        /// By which one.
+        by: Text,
+    }
     /// A neighbour is nearer than the emergency distance.
     TooClose = "too_close", Own {
         /// Which one.

@@ -12,6 +12,7 @@ use super::field::{
 };
 use super::record::{Addressee, Kind, Record};
 use crate::decode_error::DecodeError;
+use crate::event::Right;
 use crate::proto;
 
 /// A vehicle's state. World frame ENU, SI units.
@@ -39,7 +40,7 @@ pub struct State {
     pub task: String,
     /// Its reason to wait; empty if it does not.
     pub waiting_for: String,
-    /// Points of the planned path, metres, for display; only the first [`State::MAX_PATH`] travel.
+    /// Points of the way ahead, metres, along which others make way; only the first [`State::MAX_PATH`] travel.
     pub path: Vec<Vector3<f64>>,
     pub mission: MissionState,
     /// The names of the scripts that run on it; only the first [`State::MAX_SCRIPTS`] travel.
@@ -48,6 +49,8 @@ pub struct State {
     pub holder: String,
     /// Who asks the holder for it; empty if nobody does.
     pub asked_by: String,
+    /// Its right to go first where there is room for one.
+    pub right: Right,
     /// The last word of one other vehicle, each in turn: from it that one learns how long messages take.
     pub echo: Option<Echo>,
 }
@@ -101,6 +104,7 @@ impl State {
             scripts: Vec::new(),
             holder: String::new(),
             asked_by: String::new(),
+            right: Right::Free,
             echo: None,
         }
     }
@@ -129,6 +133,7 @@ impl Record for State {
     }
 }
 
+same_variants!(Right, proto::Right: Free, Inside, Cornered);
 same_variants!(MissionState, proto::Mission: UnderWay, Complete, Failed);
 
 impl From<&State> for proto::State {
@@ -152,6 +157,7 @@ impl From<&State> for proto::State {
             scripts: state.scripts.iter().take(State::MAX_SCRIPTS).cloned().collect(),
             holder: words(&state.holder),
             asked_by: words(&state.asked_by),
+            right: proto::Right::from(state.right).into(),
             echo: state.echo.as_ref().map(|echo| proto::Echo {
                 node: text(&echo.node),
                 incarnation: echo.incarnation,
@@ -191,6 +197,7 @@ impl TryFrom<proto::State> for State {
             scripts: state.scripts.into_iter().map(words).collect(),
             holder: words(state.holder),
             asked_by: words(state.asked_by),
+            right: proto::Right::try_from(state.right).unwrap_or_default().into(),
             echo: state.echo.map(Echo::try_from).transpose()?,
         })
     }

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use skein_agent::bthreads::right_of_way::{around, entering};
+use skein_agent::stretch::Stretch;
 use skein_agent::{AgentConfig, Me, Mind, bthreads, precedence};
 use skein_bp::{BThread, Bid, Context, Event, Program};
 use skein_wire::event::{Advance, Declared, Enter, Homeward, Landed, Leave, Passage, of_every_vehicle};
@@ -25,17 +25,21 @@ impl Mind for Naive {
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct NaiveRightOfWay {
     me: Me,
-    /// Who was heard to enter and not yet to leave: the `enter` of each vehicle.
-    inside: BTreeMap<String, Event>,
-    /// The passage that lies ahead, as it was announced.
-    ahead: Option<Event>,
+    /// Who was heard to enter and not yet to leave: the `enter`s of each vehicle.
+    inside: BTreeMap<String, Vec<Event>>,
+    /// The stretch that lies ahead, as it was announced last.
+    ahead: Stretch,
+    /// What of it was entered.
+    entered: Stretch,
+    /// The place of it to enter next.
+    next: usize,
 }
 
 impl NaiveRightOfWay {
     /// The b-thread of vehicle `me`.
     #[must_use]
     pub fn new(me: Me) -> Self {
-        Self { me, inside: BTreeMap::new(), ahead: None }
+        Self { me, inside: BTreeMap::new(), ahead: Stretch::default(), entered: Stretch::default(), next: 0 }
     }
 }
 
@@ -46,19 +50,32 @@ impl BThread for NaiveRightOfWay {
             .priority(precedence::COLLISION)
             .wait_for(of_every_vehicle::<(Enter, Leave, Landed)>())
             .wait_for(me.any::<Passage>());
-        let Some(passage) = &self.ahead else { return Some(bid) };
-        let taken = self.inside.values().any(|enter| around(passage).contains(enter));
+        if self.ahead.is_part_of(&self.entered) {
+            return Some(bid);
+        }
+        let against = self.ahead.against();
+        let taken = self.inside.values().flatten().any(|enter| against.contains(enter));
         let bid = bid.block(me.any::<(Advance, Homeward)>());
-        Some(if taken { bid } else { bid.request(entering(me, passage)) })
+        Some(if taken { bid } else { self.ahead.enter(self.next, me).into_iter().fold(bid, Bid::request) })
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
         let mine = event.home() == self.me.name();
         match event.kind() {
-            Passage::NAME => self.ahead = Some(event.clone()),
-            Enter::NAME if !mine => drop(self.inside.insert(event.home().to_owned(), event.clone())),
+            Passage::NAME => {
+                (self.ahead, self.next) = (Stretch::read(event).unwrap_or_default(), 0);
+            }
+            Enter::NAME if !mine => {
+                self.inside.entry(event.home().to_owned()).or_default().push(event.clone())
+            }
+            Enter::NAME => {
+                self.next += 1;
+                if self.ahead.enter(self.next, &self.me).is_none() {
+                    self.entered = self.ahead.clone();
+                }
+            }
             _ if !mine => drop(self.inside.remove(event.home())),
-            _ => self.ahead = None,
+            _ => (self.ahead, self.entered) = (Stretch::default(), Stretch::default()),
         }
     }
 }

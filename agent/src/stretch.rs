@@ -1,0 +1,238 @@
+//! A narrow stretch of a vehicle's way, as b-threads claim it: places and the headings in which they are flown through.
+//!
+//! Vehicles that see a place from different sides place it differently by some decimetres, and begin to count
+//! elsewhere. So two stretches meet where a place of one is near a place of the other, and are flown the same way where
+//! the headings are alike, too: those who go the same way may be inside together, one behind the other.
+
+use nalgebra::Vector3;
+use serde::Serialize;
+use skein_bp::{Event, EventSet};
+use skein_planning::passage::Piece;
+use skein_wire::event::{Declared as _, Enter, Passage};
+
+use crate::me::Me;
+
+/// Two places nearer than this, per horizontal axis, are one for two vehicles, m.
+const NEAR_M: f64 = 1.3;
+/// The same for heights: vehicles pass over one another beyond it.
+const NEAR_HEIGHT_M: f64 = 2.2;
+/// A place nearer than this, per axis, to one of a stretch is of that stretch, m.
+const SAME_PLACE_M: f64 = 0.9;
+/// Headings that differ by less are the same way, degrees.
+const SAME_WAY_DEG: f64 = 60.0;
+/// Boxes around places become one box if that is no wider than this across, m.
+const STRAIGHT_M: f64 = 2.0 * NEAR_M + 0.5;
+
+/// Narrow places in the order in which they are flown through.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+pub struct Stretch(Vec<Place>);
+
+/// A narrow place. Whole decimetres and degrees tell all that matters, and can be compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct Place {
+    at_dm: [i32; 3],
+    /// Counter-clockwise from east, 0 to 359 degrees; unknown where nobody said.
+    heading_deg: Option<i32>,
+}
+
+impl Stretch {
+    /// The stretch of these pieces.
+    pub fn of(pieces: &[Piece]) -> Self {
+        Self(pieces.iter().map(|piece| Place::new(&piece.centre, Some(&piece.direction))).collect())
+    }
+
+    /// The stretch that is announced, if the event is a `passage`.
+    pub fn read(event: &Event) -> Option<Self> {
+        let Passage { x, y, z, way } = Passage::read(event)?;
+        let places =
+            way.as_deref().and_then(|way| way.split("; ").map(Place::parse).collect::<Option<Vec<_>>>());
+        Some(Self(places.unwrap_or_else(|| vec![Place::new(&Vector3::new(x, y, z), None)])))
+    }
+
+    /// The announcement of the stretch; none of an empty one.
+    pub fn passage(&self) -> Option<Passage> {
+        let [x, y, z] = self.0.first()?.at_m();
+        let way = self.0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+        Some(Passage { x, y, z, way: Some(way.into()) })
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The `enter` of its place number `index`, counted from 0.
+    pub fn enter(&self, index: usize, me: &Me) -> Option<Event> {
+        self.0.get(index).map(|place| me.event(place.enter()))
+    }
+
+    /// Whether each of its places is of another stretch, and flown through the same way.
+    pub fn is_part_of(&self, other: &Self) -> bool {
+        self.first_outside(other, 0).is_none()
+    }
+
+    /// The number of its first place, from `index` on, that is none of another stretch or flown through another way.
+    pub fn first_outside(&self, other: &Self, index: usize) -> Option<usize> {
+        let same = other.same_way(SAME_PLACE_M);
+        let is_inside =
+            |place: &Place| other.0.contains(place) || same.contains(&place.enter().at("uav/0"));
+        self.0.iter().enumerate().skip(index).find(|(_, place)| !is_inside(place)).map(|(index, _)| index)
+    }
+
+    /// `enter` events, whosever, that go against it, or across.
+    pub fn against(&self) -> EventSet {
+        if self.0.is_empty() {
+            return EventSet::None;
+        }
+        let along = self.same_way(NEAR_M);
+        EventSet::any_of(self.boxes().map(|[min, max]| EventSet::region(min, max))).and(along.not())
+    }
+
+    /// `enter` events so near to a place of it, per horizontal axis, m, and flown through the same way.
+    fn same_way(&self, near_m: f64) -> EventSet {
+        EventSet::any_of(self.0.iter().map(|place| place.same_way(near_m)))
+    }
+
+    /// Boxes around all its places, as few as its bends allow, m.
+    fn boxes(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
+        let mut boxes: Vec<[Vector3<f64>; 2]> = Vec::new();
+        for place in &self.0 {
+            let at = Vector3::from(place.at_m());
+            let margin = Vector3::new(NEAR_M, NEAR_M, NEAR_HEIGHT_M);
+            let [min, max] = [at - margin, at + margin];
+            let joined = boxes.last().map(|[low, high]| [low.inf(&min), high.sup(&max)]);
+            match (boxes.last_mut(), joined.filter(|[low, high]| (high - low).xy().min() <= STRAIGHT_M)) {
+                (Some(last), Some(joined)) => *last = joined,
+                _ => boxes.push([min, max]),
+            }
+        }
+        boxes.into_iter().map(|corners| corners.map(Into::into))
+    }
+}
+
+impl Place {
+    fn new(at: &Vector3<f64>, direction: Option<&Vector3<f64>>) -> Self {
+        let heading =
+            |ahead: &Vector3<f64>| ahead.y.atan2(ahead.x).to_degrees().rem_euclid(360.0).round() as i32 % 360;
+        Self {
+            at_dm: (at * 10.0).map(|metres| metres.round() as i32).into(),
+            heading_deg: direction.map(heading),
+        }
+    }
+
+    fn parse(text: &str) -> Option<Self> {
+        let mut words =
+            text.split(' ').map(|word| word.parse::<f64>().ok().filter(|number| number.is_finite()));
+        let [x, y, z, heading] = [words.next()??, words.next()??, words.next()??, words.next()??];
+        let (sin, cos) = heading.to_radians().sin_cos();
+        Some(Self::new(&Vector3::new(x, y, z), Some(&Vector3::new(cos, sin, 0.0))))
+    }
+
+    fn at_m(&self) -> [f64; 3] {
+        self.at_dm.map(|decimetres| f64::from(decimetres) / 10.0)
+    }
+
+    fn enter(&self) -> Enter {
+        let [x, y, z] = self.at_m();
+        Enter { x, y, z, heading: self.heading_deg.map(f64::from) }
+    }
+
+    /// `enter` events so near to this place, m, and flown through the same way.
+    fn same_way(&self, near_m: f64) -> EventSet {
+        let Some(heading_deg) = self.heading_deg.map(f64::from) else { return EventSet::None };
+        let at = Vector3::from(self.at_m());
+        let margin = Vector3::new(near_m, near_m, NEAR_HEIGHT_M);
+        // Headings begin anew at a full turn.
+        let alike =
+            [-360.0, 0.0, 360.0].map(|turn| heading_deg + turn).into_iter().filter_map(|heading_deg| {
+                let (low, high) = (heading_deg - SAME_WAY_DEG, heading_deg + SAME_WAY_DEG);
+                (high >= 0.0 && low <= 360.0).then(|| EventSet::field_range("heading", low, high))
+            });
+        EventSet::region((at - margin).into(), (at + margin).into()).and(EventSet::any_of(alike))
+    }
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [x, y, z] = self.at_m();
+        write!(f, "{x} {y} {z} {}", self.heading_deg.unwrap_or_default())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use skein_wire::event::Declared as _;
+
+    use super::*;
+
+    /// Straight on from a place, metres, for so many places.
+    fn straight(from: [f64; 2], heading_deg: f64, places: i32) -> Vec<Piece> {
+        let (sin, cos) = heading_deg.to_radians().sin_cos();
+        let direction = Vector3::new(cos, sin, 0.0);
+        let start = Vector3::new(from[0], from[1], 2.0);
+        (0..places).map(|k| Piece { centre: start + direction * f64::from(k), direction }).collect()
+    }
+
+    fn meets(one: &Stretch, other: &Stretch) -> bool {
+        let me = Me::new("uav/7");
+        (0..).map_while(|index| other.enter(index, &me)).any(|enter| one.against().contains(&enter))
+    }
+
+    fn stretch(from: [f64; 2], heading_deg: f64, places: i32) -> Stretch {
+        Stretch::of(&straight(from, heading_deg, places))
+    }
+
+    #[test]
+    fn who_comes_the_other_way_is_kept_out_and_who_follows_is_not() {
+        let east = stretch([0.0, 0.0], 0.0, 20);
+        assert!(meets(&east, &stretch([19.4, 0.3], 180.0, 20)));
+        assert!(!meets(&east, &stretch([0.5, -0.2], 8.0, 19)));
+        assert!(meets(&east, &stretch([10.0, -8.0], 90.0, 16)), "who crosses");
+        assert!(!meets(&east, &stretch([19.0, 4.0], 180.0, 20)), "another corridor");
+        assert!(meets(&stretch([0.0, 0.0], 350.0, 5), &stretch([5.0, 0.0], 170.0, 5)));
+        assert!(
+            !meets(&stretch([0.0, 0.0], 350.0, 5), &stretch([0.0, 0.0], 10.0, 3)),
+            "across north of east"
+        );
+    }
+
+    #[test]
+    fn those_who_go_the_same_way_round_a_bend_are_a_convoy() {
+        let bend = |shift: f64| {
+            let mut pieces = straight([shift, 0.0], 0.0, 6);
+            pieces.extend(straight([shift + 5.5, 1.0], 90.0, 6));
+            Stretch::of(&pieces)
+        };
+        assert!(!meets(&bend(0.0), &bend(0.3)));
+        let mut back = straight([5.5, 6.0], 270.0, 6);
+        back.extend(straight([4.5, 0.0], 180.0, 5));
+        assert!(meets(&bend(0.0), &Stretch::of(&back)));
+    }
+
+    #[test]
+    fn what_is_told_is_what_is_read() {
+        let stretch = stretch([1.25, -3.0], 217.0, 4);
+        let told = stretch.passage().unwrap().at("uav/7");
+        assert_eq!(Stretch::read(&told), Some(stretch));
+    }
+
+    #[test]
+    fn of_a_stretch_of_which_less_is_left_every_place_is_part() {
+        let whole = stretch([0.0, 0.0], 0.0, 10);
+        assert!(stretch([4.3, 0.2], 3.0, 6).is_part_of(&whole));
+        assert!(!stretch([4.3, 0.2], 3.0, 9).is_part_of(&whole), "it goes on further");
+        assert!(!stretch([9.0, 0.0], 180.0, 4).is_part_of(&whole), "back");
+    }
+
+    #[test]
+    fn where_no_heading_is_told_everybody_is_kept_out() {
+        let announced = Passage { x: 5.0, y: 0.0, z: 2.0, way: None }.at("uav/7");
+        let place = Stretch::read(&announced).unwrap();
+        assert!(meets(&place, &stretch([4.0, 0.0], 0.0, 3)) && meets(&place, &place));
+    }
+
+    #[test]
+    fn a_straight_stretch_is_one_box() {
+        assert_eq!(stretch([0.0, 0.0], 0.0, 24).boxes().count(), 1);
+        assert!(stretch([0.0, 0.0], 45.0, 24).boxes().count() > 6);
+    }
+}
