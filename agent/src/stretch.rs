@@ -78,6 +78,13 @@ impl Stretch {
         self.0.iter().enumerate().skip(index).find(|(_, place)| !is_inside(place)).map(|(index, _)| index)
     }
 
+    /// Those of its places that are places of another stretch, too, whichever way that is flown through.
+    #[must_use]
+    pub fn at(&self, other: &Self) -> Self {
+        let is_there = |place: &&Place| other.0.iter().any(|there| there.is_same(place));
+        Self(self.0.iter().filter(is_there).copied().collect())
+    }
+
     /// `enter` events, whosever, that go against it, or across.
     pub fn against(&self) -> EventSet {
         if self.0.is_empty() {
@@ -129,6 +136,12 @@ impl Place {
 
     fn at_m(&self) -> [f64; 3] {
         self.at_dm.map(|decimetres| f64::from(decimetres) / 10.0)
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        let [here, there] = [self, other].map(|place| Vector3::from(place.at_m()));
+        let off = (here - there).abs();
+        off.xy().max() <= SAME_PLACE_M && off.z <= NEAR_HEIGHT_M
     }
 
     fn enter(&self) -> Enter {

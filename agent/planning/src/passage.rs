@@ -53,29 +53,21 @@ pub fn narrow_stretch(map: &ClearanceMap, path: &Path, from_m: f64, config: &Pas
     let (Some(first), Some(last)) = (gaps.first(), gaps.last()) else { return Vec::new() };
     let before = Piece { centre: first.centre - first.direction * MARGIN_M, ..*first };
     let behind = Piece { centre: last.centre + last.direction * MARGIN_M, ..*last };
-    let mut pieces = vec![before];
-    let mut apart_m = 0.0;
-    let all: Vec<&Piece> = std::iter::once(&before).chain(&gaps).chain([&behind]).collect();
-    for pair in all.windows(2) {
-        let [from, to] = [pair[0], pair[1]];
-        let step = to.centre - from.centre;
-        // Through a wide part in between, and over what is told with the piece before.
-        let pieces_in_step = (step.norm() / PIECE_M).floor();
-        let between = (1..=pieces_in_step as usize).map(|k| k as f64 / (pieces_in_step + 1.0));
-        if pieces_in_step > 0.0 {
-            pieces.extend(between.map(|share| Piece { centre: from.centre + step * share, ..*to }));
-            apart_m = PIECE_M;
-        }
-        apart_m += step.norm();
-        if apart_m >= PIECE_M {
-            pieces.push(*to);
-            apart_m = 0.0;
-        }
-    }
-    if apart_m > 0.0 {
-        pieces.push(behind);
-    }
-    pieces
+    let through: Vec<Piece> = std::iter::once(before).chain(gaps.iter().copied()).chain([behind]).collect();
+    evenly(&through)
+}
+
+/// Places along a line through others, no further than [`PIECE_M`] apart, each flown through like the nearest of these.
+fn evenly(through: &[Piece]) -> Vec<Piece> {
+    let Some(line) = Path::new(through.iter().map(|piece| piece.centre).collect()) else { return Vec::new() };
+    let steps = (line.length_m() / PIECE_M).ceil().max(1.0);
+    let nearest = |place: &Vector3<f64>| {
+        let far_m = |piece: &&Piece| (piece.centre - place).norm();
+        through.iter().min_by(|a, b| far_m(a).total_cmp(&far_m(b)))
+    };
+    let place = |k: usize| line.point_at(line.length_m() * k as f64 / steps);
+    let piece = |centre: Vector3<f64>| nearest(&centre).map(|nearest| Piece { centre, ..*nearest });
+    (0..=steps as usize).filter_map(|k| piece(place(k))).collect()
 }
 
 /// The gaps of the first stretch, in the order in which they are flown through.

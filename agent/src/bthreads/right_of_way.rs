@@ -186,7 +186,7 @@ impl RightOfWay {
             }
             // Nothing is told then but where it is.
             Phase::MakingWay => {
-                self.held = self.ahead.clone();
+                self.held = self.held.at(&self.ahead);
                 Phase::MakingWay
             }
             Phase::Asked { of } => Phase::Asked { of: of.clone() },

@@ -285,10 +285,9 @@ impl Guidance {
         let (has_leave, allowed, makes_way) = (self.has_leave(now), self.allowed(), self.aside.is_some());
         let moves_at = (has_leave && !makes_way).then_some(now);
         let room = (&allowed, self.headroom);
-        let mut reports =
+        let along =
             self.progress.look_ahead(moves_at, makes_way, &mut self.course, room, motion, map, neighbours);
-        reports.extend(aside);
-        reports
+        aside.into_iter().chain(along).collect()
     }
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles
