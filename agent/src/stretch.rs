@@ -73,8 +73,7 @@ impl Stretch {
     /// The number of its first place, from `index` on, that is none of another stretch or flown through another way.
     pub fn first_outside(&self, other: &Self, index: usize) -> Option<usize> {
         let same = other.same_way(SAME_PLACE_M);
-        let is_inside =
-            |place: &Place| other.0.contains(place) || same.contains(&place.enter().at("uav/0"));
+        let is_inside = |place: &Place| other.0.contains(place) || same.contains(&place.enter().at("uav/0"));
         self.0.iter().enumerate().skip(index).find(|(_, place)| !is_inside(place)).map(|(index, _)| index)
     }
 

@@ -658,8 +658,8 @@ mod right_of_way {
     fn keeps_out(vehicle: &Vehicle) -> bool {
         [LOWER, HIGHER].iter().all(|other| {
             let enter = |x| at(Event::new(format!("{other}/enter")), [x, 1.0, 2.0]);
-            assert!(vehicle.allows(enter(8.5)), "another passage is free");
-            !vehicle.allows(enter(7.5))
+            assert!(vehicle.allows(enter(6.5)), "another place is free");
+            !vehicle.allows(enter(6.2))
         })
     }
 
@@ -714,6 +714,76 @@ mod right_of_way {
         vehicle.program.remove_proxy("uav/11#right_of_way");
         assert_eq!(vehicle.after(SECOND), NOTHING);
         assert_eq!(vehicle.learns(confirmed()), ["confirmed", "enter", "advance"]);
+    }
+
+    const WAY: &str = "5 0 2 0; 6 0 2 0; 7 0 2 0";
+
+    fn announced(way: &str) -> Event {
+        Passage { x: 5.0, y: 0.0, z: 2.0, way: Some(way.into()) }.at(ME)
+    }
+
+    fn enters(node: &str, x: f64, heading: f64) -> Event {
+        Enter { x, y: 0.0, z: 2.0, heading: Some(heading) }.at(node)
+    }
+
+    /// A vehicle that has entered a stretch of three places, eastward.
+    fn inside() -> Vehicle {
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.hears(announced(WAY));
+        assert_eq!(vehicle.learns(confirmed())[..4], ["confirmed", "enter", "enter", "enter"]);
+        assert!(vehicle.may(Advance::NAME));
+        vehicle
+    }
+
+    #[test]
+    fn a_stretch_is_entered_place_by_place_and_kept_from_those_who_come_against_or_across() {
+        let vehicle = inside();
+        for (heading, may) in [(0.0, true), (40.0, true), (90.0, false), (180.0, false)] {
+            assert_eq!(vehicle.allows(enters(LOWER, 6.0, heading)), may, "{heading}");
+        }
+        assert!(vehicle.allows(enters(LOWER, 9.0, 180.0)), "beyond its end");
+    }
+
+    #[test]
+    fn what_lies_behind_is_let_go_and_what_comes_to_light_is_claimed_before_it_is_flown() {
+        let mut vehicle = inside();
+        assert_eq!(vehicle.hears(announced("7 0 2 0")), ["passage"]);
+        assert!(vehicle.allows(enters(LOWER, 5.0, 180.0)) && !vehicle.allows(enters(LOWER, 7.0, 180.0)));
+        vehicle.hears(announced("7 0 2 0; 8 0 2 0; 9 0 2 0"));
+        assert!(!vehicle.may(Advance::NAME));
+        assert_eq!(vehicle.learns(confirmed())[..3], ["confirmed", "enter", "enter"]);
+        assert!(vehicle.may(Advance::NAME));
+    }
+
+    #[test]
+    fn who_is_inside_does_not_give_in_and_who_is_outside_insists_for_a_while_only() {
+        let mut vehicle = inside();
+        let claim_of_other = Bid::new().block(EventSet::named(mine(Enter::NAME).name()));
+        vehicle.program.put_proxy("uav/9#right_of_way", &claim_of_other);
+        vehicle.hears(announced("7 0 2 0; 8 0 2 0; 9 0 2 0"));
+        vehicle.learns(confirmed());
+        vehicle.learns(stalled(LOWER));
+        assert!(!vehicle.allows(enters(LOWER, 9.0, 180.0)), "it claims on");
+        let mut outside = against(HIGHER);
+        assert!(keeps_out(&outside));
+        outside.after(3 * SECOND);
+        assert!(!keeps_out(&outside));
+    }
+
+    #[test]
+    fn way_is_made_for_who_goes_first_and_for_nobody_else() {
+        let asks = |of: &str, right| InTheWay { of: of.into(), right }.at(ME);
+        let mut vehicle = inside();
+        assert_eq!(vehicle.hears(asks(LOWER, Right::Free)), ["in_the_way"], "it is inside");
+        assert_eq!(vehicle.hears(asks(HIGHER, Right::Inside)), ["in_the_way"], "the lower number goes first");
+        assert_eq!(vehicle.hears(asks(LOWER, Right::Inside)), ["in_the_way", "make_way"]);
+        assert!(vehicle.may(Advance::NAME), "leave leads out of the way");
+        assert_eq!(vehicle.hears(announced("5 0 2 0")), ["passage"]);
+        assert!(vehicle.allows(enters(LOWER, 7.0, 180.0)), "it is there no more");
+        vehicle.hears(Cornered { by: LOWER.into() }.at(ME));
+        assert_eq!(vehicle.hears(asks(LOWER, Right::Inside)), ["in_the_way"], "the cornered goes first");
+        assert_eq!(vehicle.hears(asks(LOWER, Right::Cornered)), ["in_the_way", "make_way"]);
+        assert_eq!(vehicle.reports(OutOfTheWay::NAME)[0], "out_of_the_way");
     }
 
     #[test]

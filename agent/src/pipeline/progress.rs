@@ -52,7 +52,13 @@ pub struct Progress {
 impl Progress {
     /// Watches a vehicle that keeps so far from others, m. Passages and local minima are found as configured.
     pub fn new(separation_m: f64, passages: PassageConfig, escape: EscapeConfig) -> Self {
-        Self { separation_m, passages, announced: Vec::new(), queues_since: None, escape: EscapeDetector::new(escape) }
+        Self {
+            separation_m,
+            passages,
+            announced: Vec::new(),
+            queues_since: None,
+            escape: EscapeDetector::new(escape),
+        }
     }
 
     pub fn begin_path(&mut self) {

@@ -144,6 +144,7 @@ impl Descent<'_> {
 mod tests {
     use skein_planning::map::VoxelMapConfig;
     use skein_planning::separation::Neighbour as Track;
+    use skein_wire::event::Right;
 
     use super::*;
 
@@ -164,7 +165,7 @@ mod tests {
             radius_m: 0.25,
             cooperative: true,
         };
-        Neighbour { node: name(node), armed, track }
+        Neighbour { node: name(node), armed, track, way: None, right: Right::Free }
     }
 
     fn map() -> ClearanceMap {

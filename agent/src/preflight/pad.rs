@@ -175,6 +175,7 @@ fn offset_words(offset: &Vector3<f64>, tolerance: &Vector3<f64>) -> String {
 mod tests {
     use skein_planning::separation::Neighbour as Track;
     use skein_wire::CheckState;
+    use skein_wire::event::Right;
 
     use super::*;
 
@@ -221,7 +222,13 @@ mod tests {
                 radius_m: 0.25,
                 cooperative: true,
             };
-            self.neighbours.push(Neighbour { node: NodeName::new("uav/2").unwrap(), armed: false, track });
+            self.neighbours.push(Neighbour {
+                node: NodeName::new("uav/2").unwrap(),
+                armed: false,
+                track,
+                way: None,
+                right: Right::Free,
+            });
             self
         }
 

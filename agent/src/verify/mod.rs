@@ -20,7 +20,9 @@ use skein_bp::script::{Assignment, Script};
 use skein_bp::verify::{Coverage, Inspection, Progress, Report, Timers, Verifier, View};
 use skein_bp::{BThread, Bid, Event, Program, ProgramConfig};
 use skein_wire::NodeName;
-use skein_wire::event::{Declaration, Declared as _, Goto, Hold, Homeward, Land, Plan, Return, SCRIPT_FACTS};
+use skein_wire::event::{
+    Declaration, Declared as _, Goto, Hold, Homeward, Land, MakeWay, Plan, Return, SCRIPT_FACTS,
+};
 
 pub use self::part::{Part, Place};
 pub use self::requirement::{Requirement, requirements};
@@ -43,13 +45,14 @@ const SAFETY_RULE: &str = "nobody blocks a safety event but who goes before it";
 
 /// Which b-threads may block an event that is for the vehicle's safety; nobody may block those that are not named.
 /// `goto` is that to home.
-const MAY_BLOCK: [(&str, &[&str]); 6] = [
+const MAY_BLOCK: [(&str, &[&str]); 7] = [
     (Hold::NAME, &["pilot"]),
     (Land::NAME, &["pilot"]),
     // An empty battery does not carry it home.
     (Return::NAME, &["pilot", "battery"]),
     (Goto::NAME, &["pilot", "battery", "found_airborne"]),
     (Plan::NAME, &["pilot"]),
+    (MakeWay::NAME, &["pilot"]),
     (
         Homeward::NAME,
         &["pilot", "positioning", "separation", "obstacle_avoidance", RIGHT_OF_WAY, "found_airborne"],

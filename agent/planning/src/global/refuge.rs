@@ -18,7 +18,7 @@ const ACROSS: u32 = 17;
 /// The way that a cost of one stands for, metres.
 const COST_M: f64 = STEP_M / ALONG as f64;
 /// A refuge with room around it is worth so much more of a way, metres.
-const WORTH_M: f64 = 8.0;
+const WORTH_M: f64 = 3.0;
 /// Steps in a row of the eight directions: along an axis, and across.
 const STEPS: [[i32; 2]; 8] = [[1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [-1, 1], [-1, -1], [1, -1]];
 

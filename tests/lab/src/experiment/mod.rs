@@ -7,6 +7,7 @@ mod dstar_grid;
 mod feasibility;
 mod lsc;
 mod naive_right_of_way;
+mod narrow;
 mod performance;
 mod right_of_way;
 mod sphere;
@@ -24,6 +25,7 @@ pub const TASKS: &[Entry] = &[
     Entry::of::<Reported<ablation::Ablation>>(),
     Entry::of::<Reported<autopilots::Autopilots>>(),
     Entry::of::<Reported<right_of_way::RightOfWay>>(),
+    Entry::of::<Reported<narrow::Narrow>>(),
     Entry::of::<Reported<sphere::Sphere>>(),
     Entry::of::<Reported<dstar_grid::DstarGrid>>(),
     Entry::of::<Reported<lsc::Lsc>>(),
