@@ -47,7 +47,7 @@ pub struct Guidance {
 impl Guidance {
     /// Guidance for a vehicle of this envelope.
     pub fn new(envelope: Envelope, layers: Layers) -> Self {
-        let Layers { finder, follower, repulsion, filter, escape, passages } = layers;
+        let Layers { fence, finder, follower, repulsion, filter, escape, passages } = layers;
         Self {
             envelope,
             leave_until: Duration::ZERO,
@@ -55,7 +55,7 @@ impl Guidance {
             allowed: Allowed::ANYTHING,
             headroom: Headroom::OPEN,
             course: Course::default(),
-            planning: Planning::new(envelope, finder),
+            planning: Planning::new(envelope, fence, finder),
             progress: Progress::new(envelope.separation_m, passages, escape),
             steering: Steering::new(envelope, follower, repulsion, filter),
         }
@@ -176,7 +176,11 @@ impl Guidance {
         let (has_leave, allowed) = (self.has_leave(now), self.allowed());
         let moves_at = has_leave.then_some(now);
         let room = (&allowed, self.headroom);
-        self.progress.look_ahead(moves_at, &mut self.course, room, motion, map, neighbours)
+        let reports = self.progress.look_ahead(moves_at, &mut self.course, room, motion, map, neighbours);
+        if has_leave {
+            self.planning.extend(&mut self.course, allowed.region, motion, map, neighbours);
+        }
+        reports
     }
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles
