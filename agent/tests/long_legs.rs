@@ -36,7 +36,7 @@ impl Flight {
         guidance.head_for(Waypoint { leg: 0, target, lands: true, is_home: false });
         Self {
             guidance,
-            perception: Perception::new(&FENCE, start, [2.0, 7.0]).unwrap(),
+            perception: Perception::new(&FENCE, Vector3::zeros(), [2.0, 7.0]).unwrap(),
             now: Duration::from_secs(1),
             motion: Motion::new(start, Vector3::zeros(), [0.05; 3]),
             wall_m: None,

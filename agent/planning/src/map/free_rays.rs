@@ -18,10 +18,10 @@ const ALONG: f64 = 0.015;
 ///
 /// let mut rays = FreeRays::default();
 /// rays.add(RayEnd { point: Vector3::new(40.0, 0.0, 3.0), hit: false });
-/// rays.add(RayEnd { point: Vector3::new(25.0, 0.3, 3.0), hit: true });
+/// rays.add(RayEnd { point: Vector3::new(25.0, 0.6, 3.0), hit: true });
 /// let from = Vector3::new(1.0, 0.0, 3.0);
-/// assert_eq!(rays.free_m(&from, &Vector3::x(), 0.2), 39.0);
-/// assert_eq!(rays.free_m(&from, &Vector3::x(), 0.4), 24.0);
+/// assert_eq!(rays.free_m(&from, &Vector3::x(), 0.5), 39.0);
+/// assert_eq!(rays.free_m(&from, &Vector3::x(), 0.7), 24.0);
 /// assert_eq!(rays.free_m(&from, &Vector3::y(), 0.4), 0.0);
 /// ```
 #[derive(Clone, Debug, Default)]
