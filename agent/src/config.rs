@@ -113,12 +113,24 @@ pub enum LocalPlanner {
     Vfh,
 }
 
-/// Which planners the pipeline is made of.
+/// Where the vehicle's nose points while it flies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Nose {
+    /// Where it pointed after take-off.
+    #[default]
+    Held,
+    /// Along the way.
+    Along,
+}
+
+/// Which planners the pipeline is made of, and where they point the nose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planners {
     pub global: GlobalPlanner,
     pub local: LocalPlanner,
+    pub nose: Nose,
 }
 
 /// See [`AgentConfig::sigma_limit_m`].

@@ -7,7 +7,7 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_bp::Bound;
 use skein_dbp::NodeName;
-use skein_mav::{Companion, CompanionConfig, Landed, MavEvent, SetPoint, Station, Telemetry, Text};
+use skein_mav::{Companion, CompanionConfig, Landed, MavEvent, SetPoint, Station, Telemetry, Text, axes};
 use skein_planning::map::MapError;
 use skein_wire::{Limits, Readiness, Scan, State};
 
@@ -22,6 +22,7 @@ use crate::{
         allowed::Allowed,
         ground_seen::GroundSeen,
         guidance::Guidance,
+        heading::Heading,
         headroom::{Headroom, Look},
         layers::Layers,
         perception::{Other, Perception, Pose},
@@ -48,6 +49,8 @@ pub struct SetPointRecord {
     pub stops: u64,
     /// Age of the oldest input that a command was made from.
     pub oldest_input: Duration,
+    /// Stops that the safety filter asked for beyond a tilt of 5 degrees.
+    pub hard_brakes: u64,
 }
 
 const STOP: SetPoint = SetPoint::Velocity { velocity: Vector3::new(0.0, 0.0, 0.0), yaw: None };
@@ -81,6 +84,7 @@ pub struct Control {
     watches: Watches,
     energy: Energy,
     guidance: Guidance,
+    heading: Heading,
     set_points: SetPointRecord,
     /// The newest set-point, and when it was made.
     last_set_point: Option<(Duration, SetPoint)>,
@@ -123,6 +127,7 @@ impl Control {
             watches: Watches::default(),
             energy: Energy::new(config.clone()),
             guidance: Guidance::new(config.envelope, layers),
+            heading: Heading::new(config.planners.nose),
             set_points: SetPointRecord::default(),
             last_set_point: None,
             decisions: Decisions::default(),
@@ -470,6 +475,7 @@ impl Control {
         self.settle(now);
         if !self.flight.sends_set_points() {
             self.guidance.steering.rest();
+            self.heading.rest();
             self.climb(now);
             return;
         }
@@ -481,6 +487,7 @@ impl Control {
                 let surroundings = Surroundings {
                     map: self.perception.map(),
                     sees: self.config.lidar,
+                    rays: self.perception.rays(),
                     obstacles: self.perception.obstacles(),
                     neighbours: &armed.map(|neighbour| neighbour.track).collect::<Vec<_>>(),
                     rank: self.rank(around),
@@ -489,6 +496,8 @@ impl Control {
                 self.set_points.commands += 1;
                 let age = oldest_age(now, &self.inputs()).unwrap_or_default();
                 self.set_points.oldest_input = self.set_points.oldest_input.max(age);
+                let attitude = self.estimate.attitude.map(|attitude| attitude.value.body_to_world);
+                let set_point = self.heading.give(set_point, attitude.as_ref().map(axes::yaw));
                 self.send(now, set_point);
             }
             KeepAlive::Stop => {
@@ -594,7 +603,7 @@ impl Control {
     /// What set-points were made from so far.
     #[must_use]
     pub fn set_points(&self) -> SetPointRecord {
-        self.set_points
+        SetPointRecord { hard_brakes: self.guidance.steering.hard_brakes.count, ..self.set_points }
     }
 
     /// The checks before take-off, as others should know them.

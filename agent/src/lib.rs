@@ -45,7 +45,7 @@ pub use self::{
     agent_error::AgentError,
     airspace_table::{AirspaceError, AirspaceTable},
     config::{
-        AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, GlobalPlanner, LocalPlanner, Planners,
+        AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, GlobalPlanner, LocalPlanner, Nose, Planners,
         PositionSource,
     },
     control::SetPointRecord,

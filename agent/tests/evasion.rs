@@ -50,7 +50,14 @@ fn second_in(
     let envelope = Envelope::default();
     let mut guidance = Guidance::new(envelope, Layers::of(&envelope, FENCE, Planners::default()));
     let motion = Motion::new(place, Vector3::zeros(), [0.05, 0.05, 0.1]);
-    let surroundings = Surroundings { map: perception.map(), sees: true, obstacles: &[], neighbours, rank };
+    let surroundings = Surroundings {
+        map: perception.map(),
+        sees: true,
+        rays: perception.rays(),
+        obstacles: &[],
+        neighbours,
+        rank,
+    };
     (0..50).map(|tick| guidance.steer(Duration::from_millis(20 * tick), &motion, &surroundings)).collect()
 }
 

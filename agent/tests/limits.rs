@@ -79,6 +79,7 @@ impl Flight {
         let surroundings = Surroundings {
             map: self.perception.map(),
             sees: true,
+            rays: self.perception.rays(),
             obstacles: &[],
             neighbours: &self.others,
             rank: 0,

@@ -6,6 +6,7 @@ mod behaviours;
 mod bthreads;
 mod evasion;
 mod limits;
+mod long_legs;
 mod scripts;
 mod verify;
 mod verify_command;

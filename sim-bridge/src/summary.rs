@@ -154,6 +154,8 @@ pub struct VehicleSummary {
     pub set_points: u64,
     /// See `set_points`.
     pub oldest_input_ms: f64,
+    /// Stops that the safety filter asked for beyond a tilt of 5 degrees.
+    pub hard_brakes: u64,
     /// Share of the battery's energy left, 0 to 1.
     pub battery: f64,
 }
@@ -268,6 +270,7 @@ mod tests {
                 path_length_m: 71.5,
                 set_points: 1830,
                 oldest_input_ms: 120.0,
+                hard_brakes: 0,
                 battery: 0.875,
             }],
         }

@@ -168,7 +168,7 @@ impl PathFinder for Straight {
         _: &mut usize,
     ) -> Option<Result<Found, PlanError>> {
         let path = Path::new(vec![task.start, task.goal]);
-        path.map(|path| Ok(Found { path, clearance_m: None }))
+        path.map(|path| Ok(Found { path, clearance_m: None, is_level: false }))
     }
 }
 

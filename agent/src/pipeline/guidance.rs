@@ -60,7 +60,7 @@ pub struct Guidance {
 impl Guidance {
     /// Guidance for a vehicle of this envelope.
     pub fn new(envelope: Envelope, layers: Layers) -> Self {
-        let Layers { finder, follower, repulsion, filter, escape, passages } = layers;
+        let Layers { fence, finder, follower, repulsion, filter, escape, passages } = layers;
         Self {
             envelope,
             leave_until: Duration::ZERO,
@@ -68,7 +68,7 @@ impl Guidance {
             allowed: Allowed::ANYTHING,
             headroom: Headroom::OPEN,
             course: Course::default(),
-            planning: Planning::new(envelope, finder),
+            planning: Planning::new(envelope, fence, finder),
             progress: Progress::new(envelope.separation_m, passages, escape),
             way_of_others: WayOfOthers::new(envelope.separation_m, &passages),
             aside: None,
@@ -287,6 +287,9 @@ impl Guidance {
         let room = (&allowed, self.headroom);
         let along =
             self.progress.look_ahead(moves_at, makes_way, &mut self.course, room, motion, map, neighbours);
+        if has_leave && !makes_way {
+            self.planning.extend(&mut self.course, allowed.region, motion, map, neighbours);
+        }
         aside.into_iter().chain(along).collect()
     }
 

@@ -15,6 +15,8 @@ const PASSAGE_AHEAD_M: f64 = 6.0;
 /// The layers of guidance. Every one is there for a reason: [`Layers::of`] has them all.
 #[derive(Debug)]
 pub struct Layers {
+    /// Where paths stay, as far from its walls as the filter keeps the vehicle.
+    pub fence: Fence,
     /// Finds a path through the map.
     pub finder: Box<dyn PathFinder>,
     /// Turns a path into a velocity.
@@ -33,6 +35,7 @@ impl Layers {
     /// The layers that fly: those of a vehicle of this envelope inside this fence, with these planners.
     pub fn of(envelope: &Envelope, fence: Fence, planners: Planners) -> Self {
         Self {
+            fence,
             finder: path_finder(planners.global),
             follower: path_follower(planners.local, envelope),
             repulsion: RepulsionConfig::default(),

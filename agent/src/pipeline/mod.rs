@@ -12,6 +12,8 @@ pub mod evasion;
 pub mod global;
 pub mod ground_seen;
 pub mod guidance;
+pub mod hard_brakes;
+pub mod heading;
 pub mod headroom;
 pub mod layers;
 pub mod local;

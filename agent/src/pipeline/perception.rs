@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use skein_planning::airspace::{Airspace, KeepOut};
-use skein_planning::map::{ClearanceMap, MapError, RayEnd, Sectors, VoxelMapConfig};
+use skein_planning::map::{ClearanceMap, FreeRays, MapError, RayEnd, Sectors, VoxelMapConfig};
 use skein_wire::Scan;
 
 use crate::config::{AgentConfig, Envelope, Fence};
@@ -75,6 +75,7 @@ pub struct Perception {
     heights_m: [f64; 2],
     last_scan: Option<Duration>,
     ends: Vec<RayEnd>,
+    rays: FreeRays,
     near: Vec<Vector3<f64>>,
     /// Obstacle points this near are told to the safety filter, m.
     near_m: f64,
@@ -127,6 +128,7 @@ impl Perception {
             heights_m: [floor_m, ceiling_m],
             last_scan: None,
             ends: Vec::new(),
+            rays: FreeRays::default(),
             near: Vec::new(),
             near_m: NEAR_M,
             returns: Vec::new(),
@@ -219,6 +221,11 @@ impl Perception {
         &self.returns
     }
 
+    /// The rays of the newest scan, which reach further than the map.
+    pub fn rays(&self) -> &FreeRays {
+        &self.rays
+    }
+
     /// When the newest scan was taken.
     pub fn last_scan(&self) -> Option<Duration> {
         self.last_scan
@@ -234,6 +241,7 @@ impl Perception {
         }
         self.last_scan = Some(scan.stamp);
         self.ends.clear();
+        self.rays.clear();
         self.returns.clear();
         let mut near = Sectors::new(pose.position);
         let to_world = pose.attitude.to_rotation_matrix();
@@ -244,13 +252,14 @@ impl Perception {
             }
             let range = f64::from(range);
             let hit = range.is_finite() && range <= scan.max_range_m;
+            let (sin, cos) = (scan.angle_min + f64::from(ray) * scan.angle_step).sin_cos();
+            let reach = if hit { range } else { scan.max_range_m };
+            let point = pose.position + to_world * Vector3::new(reach * cos, reach * sin, 0.0);
+            self.rays.add(RayEnd { point, hit: hit && point.z > self.ground_m });
             // The voxels are wider than the rays are far apart.
             if (!hit || range > MAP_RANGE_M) && ray % FAR_RAYS != self.far_ray {
                 continue;
             }
-            let (sin, cos) = (scan.angle_min + f64::from(ray) * scan.angle_step).sin_cos();
-            let reach = if hit { range } else { scan.max_range_m };
-            let point = pose.position + to_world * Vector3::new(reach * cos, reach * sin, 0.0);
             let off_m = |other: &Other| (point - other.position).norm();
             if hit && neighbours.iter().any(|other| off_m(other) < NEIGHBOUR_M) {
                 // The way to the neighbour is free; what lies behind it is not known.

@@ -10,11 +10,15 @@ use skein_planning::{
 
 use super::{
     course::{Course, Following},
-    global::{PathFinder, Task},
+    global::{Found, PathFinder, Task},
     route_search::{ALLOWANCE, RouteSearch},
 };
 use crate::{
-    config::Envelope, instruction::Waypoint, neighbours::Neighbour, positioning::Motion, report::Report,
+    config::{Envelope, Fence},
+    instruction::Waypoint,
+    neighbours::Neighbour,
+    positioning::Motion,
+    report::Report,
 };
 
 /// Neighbours within this distance are gone around when the vehicle is stuck, m.
@@ -26,23 +30,51 @@ const SAME_PLACE_M: f64 = 1e-6;
 /// A vehicle slower than this stands, m/s.
 const STANDING_M_S: f64 = 0.5;
 
+/// What lies beyond the goal of a search.
+#[derive(Clone, Copy, Debug)]
+enum Beyond {
+    /// Nothing: it is the waypoint.
+    Nothing,
+    /// The waypoint, and nothing that is known lies in the way there.
+    Waypoint(Vector3<f64>),
+    /// The waypoint, behind what is closed.
+    Closed,
+}
+
 /// Plans paths, a little in each tick.
 #[derive(Debug)]
 pub struct Planning {
     envelope: Envelope,
+    fence: Fence,
     filter: FilterConfig,
     routes: RouteSearch,
     /// The region that the plan under way is to stay in.
     within: Region,
+    /// Where it is to lead.
+    goal: Vector3<f64>,
+    /// The waypoint, if it lies beyond the map.
+    beyond: Beyond,
+    /// Whether it is to take the place of a path that is flown meanwhile.
+    extends: bool,
     /// The effort left to the search for a path in this tick.
     allowance: usize,
 }
 
 impl Planning {
-    /// Plans for a vehicle of this envelope by this planner.
-    pub fn new(envelope: Envelope, finder: Box<dyn PathFinder>) -> Self {
+    /// Plans for a vehicle of this envelope inside this fence by this planner.
+    pub fn new(envelope: Envelope, fence: Fence, finder: Box<dyn PathFinder>) -> Self {
         let (filter, routes) = (envelope.filter(), RouteSearch::new(finder));
-        Self { envelope, filter, routes, within: Region::EVERYWHERE, allowance: ALLOWANCE }
+        Self {
+            envelope,
+            fence,
+            filter,
+            routes,
+            within: Region::EVERYWHERE,
+            goal: Vector3::zeros(),
+            beyond: Beyond::Nothing,
+            extends: false,
+            allowance: ALLOWANCE,
+        }
     }
 
     /// Gives up the plan that is under way.
@@ -67,10 +99,41 @@ impl Planning {
         map: &mut ClearanceMap,
         neighbours: &[Neighbour],
     ) -> Option<Report> {
-        self.within = within;
         let Some(waypoint) = &mut course.waypoint else {
             return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() });
         };
+        self.extends = false;
+        self.prepare(is_stuck, waypoint, within, motion, map, neighbours);
+        self.search(course, map)
+    }
+
+    /// Begins to plan on from where the vehicle is, if the path that it flies ends short of the waypoint and half of
+    /// it lies behind: a leg longer than the map is flown without a stop. The answer comes from [`Planning::go_on`].
+    pub fn extend(
+        &mut self,
+        course: &mut Course,
+        within: Region,
+        motion: &Motion,
+        map: &ClearanceMap,
+        neighbours: &[Neighbour],
+    ) {
+        let needs_more = course.following.as_ref().is_some_and(Following::needs_more);
+        if let Some(waypoint) = course.waypoint.as_mut().filter(|_| needs_more && !self.is_under_way()) {
+            self.extends = true;
+            self.prepare(false, waypoint, within, motion, map, neighbours);
+        }
+    }
+
+    fn prepare(
+        &mut self,
+        is_stuck: bool,
+        waypoint: &mut Waypoint,
+        within: Region,
+        motion: &Motion,
+        map: &ClearanceMap,
+        neighbours: &[Neighbour],
+    ) {
+        self.within = within;
         // Outside the map, as beyond the fence, the way begins and ends where the map does.
         let inside = |place: Vector3<f64>| match map.voxels().index_of(&place) {
             Some(_) => place,
@@ -79,6 +142,7 @@ impl Planning {
         let goal = inside(within.clamp_height(&open_goal(waypoint, map)));
         // The vehicle comes to an allowed height first.
         let start = inside(within.clamp_height(&motion.position));
+        (self.goal, self.beyond) = (goal, beyond(&goal, &within.clamp_height(&waypoint.target), map));
         let standing: Vec<Vector3<f64>> = neighbours
             .iter()
             .filter(|neighbour| neighbour.armed && neighbour.track.cooperative)
@@ -95,10 +159,10 @@ impl Planning {
         let discs = standing.iter().filter(in_the_way).map(|&centre| Disc { centre, radius_m });
         let discs = discs.chain(self.ghosts(neighbours, motion, [start, goal])).collect();
         let potential = self.potential(&standing, motion, &goal);
+        let within = self.inside_fence(within, &goal);
         let Envelope { hull_m, margin_m, .. } = self.envelope;
         let task = Task { start, goal, potential, discs, within, hull_m, margin_m };
         self.routes.begin(waypoint.leg, task, map);
-        self.search(course, map)
     }
 
     /// Goes on with a plan that the ticks before were not enough for. Once in each tick, before anything else is
@@ -112,15 +176,42 @@ impl Planning {
         let (leg, found) = self.routes.advance(map, &mut self.allowance)?;
         Some(match found {
             Ok(found) => {
-                let length_m = found.path.length_m();
-                course.following = Some(Following::new(found, self.within));
-                Report::Planned { leg, length_m }
+                let following = course.following.insert(self.following(found));
+                Report::Planned { leg, length_m: following.path.length_m() }
+            }
+            // What is flown is still good as far as it goes.
+            Err(_) if self.extends => {
+                course.following.as_mut()?.end_where_searched();
+                return None;
             }
             Err(error) => {
                 course.following = None;
                 Report::Unplannable { leg, why: error.to_string() }
             }
         })
+    }
+
+    /// The part of a region from whose sides the filter does not keep the vehicle, and the goal.
+    fn inside_fence(&self, within: Region, goal: &Vector3<f64>) -> Region {
+        let kept_m = self.envelope.obstacle_clearance_m();
+        let Fence { min, max } = self.fence;
+        let Region { min: mut low, max: mut high } = within;
+        for axis in 0..2 {
+            low[axis] = low[axis].max((min[axis] + kept_m).min(goal[axis]));
+            high[axis] = high[axis].min((max[axis] - kept_m).max(goal[axis]));
+        }
+        Region { min: low, max: high }
+    }
+
+    fn following(&self, found: Found) -> Following {
+        let leads_there = (found.path.end() - self.goal).norm() < SAME_PLACE_M;
+        match self.beyond {
+            Beyond::Nothing if leads_there => Following::new(found, self.within),
+            Beyond::Waypoint(place) if leads_there => {
+                Following::part_of_the_way(found, Some(place), self.within)
+            }
+            _ => Following::part_of_the_way(found, None, self.within),
+        }
     }
 
     /// What makes places near those who stand dearer, on the way ahead.
@@ -150,6 +241,17 @@ impl Planning {
             let radius_m = to_ends.into_iter().fold(kept_m, f64::min);
             (radius_m > 0.0).then_some(Disc { centre, radius_m })
         })
+    }
+}
+
+/// What lies beyond the goal of a search for the way to a waypoint.
+fn beyond(goal: &Vector3<f64>, waypoint: &Vector3<f64>, map: &ClearanceMap) -> Beyond {
+    if (waypoint - goal).xy().norm() < SAME_PLACE_M {
+        Beyond::Nothing
+    } else if map.is_open(goal, waypoint) {
+        Beyond::Waypoint(*waypoint)
+    } else {
+        Beyond::Closed
     }
 }
 

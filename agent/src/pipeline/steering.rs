@@ -18,14 +18,19 @@ use super::{
     acceleration::Acceleration,
     allowed::{Allowed, Wish},
     course::Following,
+    hard_brakes::HardBrakes,
     local::{PathFollower, Place},
     safety_filter::{Kept, VelocityFilter},
     surroundings::Surroundings,
 };
 use crate::{config::Envelope, positioning::Motion};
 
-/// The speed cap looks this far ahead, m.
-const SENSED_AHEAD_M: f64 = 9.0;
+/// The map tells so far ahead what is free, m: what is darkest is seen so far, and can be stopped for, if not gently.
+const MAPPED_AHEAD_M: f64 = 9.0;
+/// The rays of a scan count so far ahead, m: from there one slows down gently.
+const SEEN_AHEAD_M: f64 = 40.0;
+/// What the rays see nearer to the way than this may make it bend, m.
+const BESIDE_WAY_M: f64 = 2.0;
 /// Height differences below this are flown in planar mode, m.
 const PLANAR_BAND_M: f64 = 0.4;
 /// A hovering vehicle that others have pushed this far does not come back, m.
@@ -46,6 +51,7 @@ pub struct Steering {
     moving: Tracker,
     repulsion: RepulsionConfig,
     filter: Box<dyn VelocityFilter>,
+    pub hard_brakes: HardBrakes,
     /// Where to hover while there is no leave to move.
     hover_at: Option<Vector3<f64>>,
     /// Where to go, without leave, to land there; `None` to follow the path.
@@ -75,6 +81,7 @@ impl Steering {
             moving,
             repulsion,
             filter,
+            hard_brakes: HardBrakes::default(),
             hover_at: None,
             settles_at: None,
         }
@@ -154,6 +161,7 @@ impl Steering {
             planar: is_level,
         };
         let Kept { velocity, evades } = self.filter.keep_apart(now, request, &others, surroundings);
+        self.hard_brakes.take_in(now, &request.desired, &velocity);
         self.follower.flew(&velocity);
         if is_level && !evades {
             SetPoint::Planar { vx: velocity.x, vy: velocity.y, z: wish.height_m, yaw: None }
@@ -183,15 +191,29 @@ impl Steering {
         let Lead { following: Following { path, station_m, .. }, attraction } = lead;
         self.hover_at = None;
         let ahead = path.direction_at(*station_m);
-        let sensed_free_m = match surroundings.sees {
-            true => map.voxels().sensed_free_m(&motion.position, &ahead, SENSED_AHEAD_M),
-            false => SENSED_AHEAD_M,
-        };
-        let (cap_m_s, _) = braking::speed_cap(path, *station_m, sensed_free_m, self.follower.braking());
+        let [mapped_m, seen_m] = self.free_ahead_m(&motion.position, &ahead, surroundings);
+        let (gentle_m_s, _) = braking::speed_cap(path, *station_m, seen_m, self.follower.braking());
+        let hard = self.envelope.braking(self.envelope.brake_m_s2);
+        let cap_m_s = gentle_m_s.min(braking::sensed_cap(mapped_m, &hard));
         let place = Place { path, station_m: *station_m, position: &motion.position };
         let step = self.follower.follow(&place, cap_m_s.min(allowed.speed_m_s), attraction, map);
         *station_m = step.station_m;
         Wish { velocity: step.velocity, height_m: step.carrot.z }
+    }
+
+    /// How far the way ahead is free, m: as far as the map tells, and as far as the newest scan saw.
+    fn free_ahead_m(
+        &self,
+        position: &Vector3<f64>,
+        ahead: &Vector3<f64>,
+        surroundings: &Surroundings<'_>,
+    ) -> [f64; 2] {
+        if !surroundings.sees {
+            return [MAPPED_AHEAD_M, SEEN_AHEAD_M];
+        }
+        let mapped_m = surroundings.map.voxels().sensed_free_m(position, ahead, MAPPED_AHEAD_M);
+        let seen_m = surroundings.rays.free_m(position, ahead, BESIDE_WAY_M).min(SEEN_AHEAD_M);
+        [mapped_m, seen_m.max(mapped_m)]
     }
 
     /// At the place where the vehicle came to a stop, or to where others have pushed it.

@@ -1,7 +1,10 @@
 //! The surroundings of a vehicle, as a set-point is made from them.
 
 use nalgebra::Vector3;
-use skein_planning::{map::ClearanceMap, separation};
+use skein_planning::{
+    map::{ClearanceMap, FreeRays},
+    separation,
+};
 
 /// The vehicle's surroundings now.
 #[derive(Clone, Copy, Debug)]
@@ -9,6 +12,8 @@ pub struct Surroundings<'a> {
     pub map: &'a ClearanceMap,
     /// Whether the vehicle has a lidar: then it flies no faster than it sees the way free.
     pub sees: bool,
+    /// How far the newest scan saw, further than the map reaches.
+    pub rays: &'a FreeRays,
     /// Obstacle points of the newest scan, metres ENU: more exact than the map.
     pub obstacles: &'a [Vector3<f64>],
     /// The other vehicles in the air.

@@ -96,8 +96,8 @@ pub(super) struct Disturbed {
     pub(super) pilot: bool,
 }
 
-/// Paths and progress along them, as guidance reports them; `hard`: paths are not found or turn out blocked, and the
-/// vehicle gets stuck.
+/// Paths and progress along them, as guidance reports them; `hard`: paths are not found or turn out blocked, the
+/// vehicle gets stuck, and long ones are planned on while they are flown.
 pub(super) fn guidance(me: &Me, legs: &[i64], hard: bool) -> Part {
     let to = |leg: i64| format!("heading for {leg}");
     let new_leg = |place: Place| {
@@ -118,8 +118,8 @@ pub(super) fn guidance(me: &Me, legs: &[i64], hard: bool) -> Part {
                 .map(|what| format!("{what} {leg}"));
         let place = |name: &str| new_leg(Place::new(name).hears(me.any::<Plan>(), planning.as_str()));
         let arrives = |place: Place| place.offers(me.event(Arrived { leg: *leg }), arrived.as_str());
-        let plans = Place::new(planning.as_str())
-            .offers(me.event(Planned { leg: *leg, length_m: 20.0 }), following.as_str());
+        let planned = me.event(Planned { leg: *leg, length_m: 20.0 });
+        let plans = Place::new(planning.as_str()).offers(planned.clone(), following.as_str());
         let no_path = me.event(Unplannable { leg: *leg, why: "no path".into() });
         let follows = arrives(place(&following));
         places.push(arrives(place(&to(*leg))));
@@ -127,7 +127,10 @@ pub(super) fn guidance(me: &Me, legs: &[i64], hard: bool) -> Part {
         if hard {
             places.push(new_leg(plans.offers(no_path, to(*leg))));
             places.push(
-                follows.offers(me.event(PathBlocked), blocked.as_str()).keeps_offering(me.event(Stuck)),
+                follows
+                    .offers(me.event(PathBlocked), blocked.as_str())
+                    .keeps_offering(me.event(Stuck))
+                    .keeps_offering(planned),
             );
             places.push(arrives(place(&blocked)).keeps_offering(me.event(Stuck)));
         } else {

@@ -103,6 +103,7 @@ fn vehicle(account: &Account<'_>, index: usize) -> VehicleSummary {
         path_length_m: truth.map_or(0.0, |vehicle| vehicle.path_length_m),
         set_points: set_points.commands,
         oldest_input_ms: set_points.oldest_input.as_secs_f64() * 1000.0,
+        hard_brakes: set_points.hard_brakes,
         battery: truth.map_or(0.0, |vehicle| vehicle.battery.fraction),
     }
 }

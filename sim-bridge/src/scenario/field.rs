@@ -16,6 +16,11 @@ pub fn share<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error
     number(deserializer, "a number from 0 to below 1", |v| (0.0..1.0).contains(&v))
 }
 
+/// A number from 0 to 1.
+pub fn reflectivity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    within(deserializer, "a number from 0 to 1", 0.0..=1.0)
+}
+
 /// The time that a message takes, in milliseconds.
 pub fn latency_ms<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     within(deserializer, "a number from 0 to 60000", 0.0..=60_000.0)

@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AirspaceTable, GlobalPlanner, LocalPlanner, Planners};
+use skein_agent::{AirspaceTable, GlobalPlanner, LocalPlanner, Nose, Planners};
 use skein_bp::behaviour::{Behaviours, Settings};
 use skein_bp::configuration::{self, Malformed};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
@@ -63,6 +63,8 @@ struct FileTable {
     global: GlobalPlanner,
     #[serde(default)]
     local: LocalPlanner,
+    #[serde(default)]
+    nose: Nose,
     #[serde(default, deserialize_with = "field::optional_positive")]
     takeoff_height_m: Option<f64>,
     #[serde(default, deserialize_with = "field::optional_positive")]
@@ -187,6 +189,13 @@ struct ObstacleTable {
     box_m: Option<Vector3<f64>>,
     cylinder: Option<CylinderTable>,
     sphere: Option<SphereTable>,
+    #[serde(default = "white", deserialize_with = "field::reflectivity")]
+    reflectivity: f64,
+}
+
+/// What sends back all light.
+fn white() -> f64 {
+    1.0
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -261,7 +270,7 @@ impl ScenarioFile {
             vehicles: plans,
             muster: table.formation.is_some() || table.targets.is_some(),
             cruise_speed_m_s,
-            planners: Planners { global: table.global, local: table.local },
+            planners: Planners { global: table.global, local: table.local, nose: table.nose },
             takeoff_height_m,
             without_ground: table.without_ground,
             time_limit_s,
@@ -567,11 +576,9 @@ impl ScenarioFile {
             }
         };
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), table.yaw_rad);
-        Ok(Obstacle {
-            name: table.name.clone().unwrap_or_else(|| format!("obstacle {}", index + 1)),
-            shape,
-            pose: Isometry3::from_parts(table.centre_m.into(), turn),
-        })
+        let name = table.name.clone().unwrap_or_else(|| format!("obstacle {}", index + 1));
+        let pose = Isometry3::from_parts(table.centre_m.into(), turn);
+        Ok(Obstacle { reflectivity: table.reflectivity, ..Obstacle::new(name, shape, pose) })
     }
 
     fn orders(&self, vehicles: usize) -> Result<Vec<Order>, ScenarioError> {

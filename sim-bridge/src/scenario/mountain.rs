@@ -15,11 +15,11 @@ pub fn steps(number: usize, mountain: &Mountain) -> impl Iterator<Item = Obstacl
         // z = h exp(-(r / s)^2), at the step's upper edge and on the steeper axis.
         let radius = mountain.slope_m.min() * (count / (k as f64 + 1.0)).ln().sqrt();
         let middle_m = (k as f64 + 0.5) * rise_m;
-        Obstacle {
-            name: format!("mountain {number} step {}", k + 1),
-            shape: Shape::Cylinder { radius, half_height: 0.5 * rise_m },
-            pose: Isometry3::translation(mountain.centre.x, mountain.centre.y, middle_m),
-        }
+        Obstacle::new(
+            format!("mountain {number} step {}", k + 1),
+            Shape::Cylinder { radius, half_height: 0.5 * rise_m },
+            Isometry3::translation(mountain.centre.x, mountain.centre.y, middle_m),
+        )
     };
     // The last would be the peak, a point.
     (0..(count as usize).saturating_sub(1)).map(step)

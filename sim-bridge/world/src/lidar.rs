@@ -72,8 +72,8 @@ pub struct Lidar {
     model: LidarModel,
     /// Cosine and sine of each ray's angle.
     rays: Vec<(f64, f64)>,
-    /// Exact ranges of the scan in work.
-    ranges_m: Vec<f64>,
+    /// The first thing that each ray of the scan in work meets.
+    met: Vec<Met>,
     noise: Noise,
 }
 
@@ -87,7 +87,7 @@ impl Lidar {
                 (cos, sin)
             })
             .collect();
-        Self { model, rays, ranges_m: Vec::new(), noise: Noise::new(seed, stream) }
+        Self { model, rays, met: Vec::new(), noise: Noise::new(seed, stream) }
     }
 
     /// Turns a second.
@@ -115,10 +115,11 @@ impl Lidar {
     fn trace(&mut self, pose: &Isometry3<f64>, surroundings: &Surroundings<'_>) {
         let plane = ScanPlane::of(pose);
         let height = pose.translation.vector.z;
-        self.ranges_m.clear();
-        self.ranges_m.extend(self.rays.iter().map(|(cos, sin)| {
+        self.met.clear();
+        let reach_m = self.model.range_m;
+        self.met.extend(self.rays.iter().map(|(cos, sin)| {
             let slope = plane.forward.z * cos + plane.left.z * sin;
-            ground_range(height, slope).unwrap_or(f64::INFINITY)
+            Met { range_m: ground_range(height, slope).unwrap_or(f64::INFINITY), reach_m }
         }));
         for obstacle in surroundings.scene.obstacles() {
             self.trace_obstacle(&plane, obstacle);
@@ -126,7 +127,7 @@ impl Lidar {
         for hull in surroundings.others() {
             let place = Point3::from(pose.translation.vector - hull.centre);
             let ball = Shape::Sphere { radius: hull.radius_m };
-            self.trace_shape(&plane.at(place), &ball);
+            self.trace_shape(&plane.at(place), &ball, reach_m);
         }
     }
 
@@ -136,37 +137,34 @@ impl Lidar {
             forward: obstacle.pose.inverse_transform_vector(&plane.forward),
             left: obstacle.pose.inverse_transform_vector(&plane.left),
         };
-        self.trace_shape(&local, &obstacle.shape);
+        self.trace_shape(&local, &obstacle.shape, self.model.range_to(obstacle.reflectivity));
     }
 
-    /// Shortens the rays that meet `shape`; `plane` is given in the shape's frame.
-    fn trace_shape(&mut self, plane: &ScanPlane, shape: &Shape) {
+    /// Shortens the rays that meet `shape`, which can be seen from `reach_m`; `plane` is given in the shape's frame.
+    fn trace_shape(&mut self, plane: &ScanPlane, shape: &Shape, reach_m: f64) {
         let Some(span) = plane.span_of(shape, self.model.range_m) else {
             return;
         };
         for ray in span.rays(self.rays.len()) {
-            let (Some(&(cos, sin)), Some(range)) = (self.rays.get(ray), self.ranges_m.get_mut(ray)) else {
+            let (Some(&(cos, sin)), Some(met)) = (self.rays.get(ray), self.met.get_mut(ray)) else {
                 continue;
             };
             let direction = plane.forward * cos + plane.left * sin;
-            if let Some(hit) = shape.cast_ray(&plane.origin, &direction) {
-                *range = range.min(hit);
+            let hit = shape.cast_ray(&plane.origin, &direction);
+            if let Some(range_m) = hit.filter(|range_m| *range_m < met.range_m) {
+                *met = Met { range_m, reach_m };
             }
         }
     }
 
     /// Ranges as the instrument tells them: noisy, and none beyond its reach.
     fn report_ranges(&mut self) -> Vec<f32> {
-        let (reach, sigma) = (self.model.range_m, self.model.sigma_m);
-        let noise = &mut self.noise;
-        self.ranges_m
-            .iter()
-            .map(
-                |&range| {
-                    if range <= reach { (range + noise.normal(sigma)).max(0.0) as f32 } else { f32::INFINITY }
-                },
-            )
-            .collect()
+        let (sigma, noise) = (self.model.sigma_m, &mut self.noise);
+        let range = |met: &Met| match met.range_m <= met.reach_m {
+            true => (met.range_m + noise.normal(sigma)).max(0.0) as f32,
+            false => f32::INFINITY,
+        };
+        self.met.iter().map(range).collect()
     }
 
     /// Shortest range inside of the cone about the unit vector `axis`.
@@ -191,6 +189,14 @@ impl Lidar {
             .reduce(f64::min)?;
         Some((shortest + self.noise.normal(self.model.sigma_m)).max(0.0) as f32)
     }
+}
+
+/// The first thing that a ray meets.
+#[derive(Debug, Clone, Copy)]
+struct Met {
+    range_m: f64,
+    /// From so far it is seen; what stands behind it is not seen either way.
+    reach_m: f64,
 }
 
 /// The plane in which the scanner turns, in the frame of whatever is looked at.

@@ -154,25 +154,26 @@ pub struct Obstacle {
     pub shape: Shape,
     /// Own frame to world ENU, metres.
     pub pose: Isometry3<f64>,
+    /// Share of light that it sends back, 0 (black) to 1 (white): how far a lidar sees it.
+    pub reflectivity: f64,
 }
 
 impl Obstacle {
+    /// A white obstacle.
+    pub fn new(name: impl Into<String>, shape: Shape, pose: Isometry3<f64>) -> Self {
+        Self { name: name.into(), shape, pose, reflectivity: 1.0 }
+    }
+
     /// An upright cylinder that stands on the ground (z = 0) at `(x, y)`: a tree trunk, a pole.
     pub fn trunk(name: impl Into<String>, x: f64, y: f64, radius: f64, height: f64) -> Self {
-        Self {
-            name: name.into(),
-            shape: Shape::Cylinder { radius, half_height: height / 2.0 },
-            pose: Isometry3::translation(x, y, height / 2.0),
-        }
+        let shape = Shape::Cylinder { radius, half_height: height / 2.0 };
+        Self::new(name, shape, Isometry3::translation(x, y, height / 2.0))
     }
 
     /// A box with edges along the world axes, by its centre and whole size.
     pub fn block(name: impl Into<String>, centre: Vector3<f64>, size: Vector3<f64>) -> Self {
-        Self {
-            name: name.into(),
-            shape: Shape::Box { half_extents: size / 2.0 },
-            pose: Isometry3::translation(centre.x, centre.y, centre.z),
-        }
+        let shape = Shape::Box { half_extents: size / 2.0 };
+        Self::new(name, shape, Isometry3::translation(centre.x, centre.y, centre.z))
     }
 
     /// Distance from `point` (world) to the surface, negative inside.

@@ -111,14 +111,20 @@ pub struct BatteryModel {
     pub empty_v: f64,
 }
 
+/// Of the range to what is white, that to what is black.
+const DARK_SHARE: f64 = 0.25;
+
 /// A planar laser scanner in the body's xy plane, one full turn.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LidarModel {
     /// Rays in a turn.
     pub rays: u32,
-    /// Largest range, m.
+    /// Largest range, to what is white, m.
     pub range_m: f64,
+    /// Range to what is black, m; a quarter of the largest if left out.
+    #[serde(default)]
+    pub dark_range_m: Option<f64>,
     /// Standard deviation of a range, m.
     pub sigma_m: f64,
     /// Scans per second; must divide the simulation's 250 steps per second.
@@ -127,6 +133,15 @@ pub struct LidarModel {
     pub vertical_range_m: f64,
     /// Full opening of the cone of the finders that look up and down, rad.
     pub vertical_cone_rad: f64,
+}
+
+impl LidarModel {
+    /// How far it sees what sends back such a share of light, m: the light that comes back falls with the square of the
+    /// distance.
+    pub fn range_to(&self, reflectivity: f64) -> f64 {
+        let dark_m = self.dark_range_m.unwrap_or(DARK_SHARE * self.range_m);
+        (self.range_m * reflectivity.clamp(0.0, 1.0).sqrt()).max(dark_m).min(self.range_m)
+    }
 }
 
 /// A satellite receiver with white noise on position and velocity.
@@ -323,6 +338,7 @@ impl VehicleModel {
             |field, of: fn(&LidarModel) -> f64| self.lidar.iter().map(move |lidar| (field, of(lidar)));
         let positive = positive.into_iter().chain(of_lidar("lidar.range_m", |lidar| lidar.range_m));
         let positive = positive.chain(of_lidar("lidar.vertical_range_m", |lidar| lidar.vertical_range_m));
+        let positive = positive.chain(of_lidar("lidar.dark_range_m", |lidar| lidar.range_to(0.0)));
         let not_negative = not_negative.into_iter().chain(of_lidar("lidar.sigma_m", |lidar| lidar.sigma_m));
         let rates = rates.into_iter().chain(of_lidar("lidar.rate_hz", |lidar| lidar.rate_hz));
         for (field, found) in positive {

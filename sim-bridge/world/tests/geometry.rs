@@ -29,10 +29,9 @@ fn shape() -> impl Strategy<Value = Shape> {
 }
 
 fn obstacle() -> impl Strategy<Value = Obstacle> {
-    (shape(), vector(6.0), vector(3.0)).prop_map(|(shape, place, turn)| Obstacle {
-        name: "any".to_owned(),
-        shape,
-        pose: Isometry3::from_parts(place.into(), UnitQuaternion::from_scaled_axis(turn)),
+    (shape(), vector(6.0), vector(3.0)).prop_map(|(shape, place, turn)| {
+        let turn = UnitQuaternion::from_scaled_axis(turn);
+        Obstacle::new("any", shape, Isometry3::from_parts(place.into(), turn))
     })
 }
 

@@ -12,6 +12,7 @@ use skein_world::{Hull, Lidar, Obstacle, Scene, Shape, Surroundings};
 const MODEL: LidarModel = LidarModel {
     rays: 720,
     range_m: 40.0,
+    dark_range_m: Some(10.0),
     sigma_m: 0.0,
     rate_hz: 10.0,
     vertical_range_m: 15.0,
@@ -85,6 +86,21 @@ fn nothing_within_reach_is_no_return() {
     assert_eq!((scan.up_m, scan.down_m), (None, None));
 }
 
+/// The range that is told of a wall of this reflectivity, so far away, with a white one 2 m behind it.
+fn range_to(reflectivity: f64, distance_m: f64) -> f32 {
+    let wall = |x: f64| Obstacle::block("wall", Vector3::new(x + 0.5, 0.0, 2.0), Vector3::new(1.0, 9.0, 4.0));
+    let walls = vec![Obstacle { reflectivity, ..wall(distance_m) }, wall(distance_m + 2.0)];
+    scan(MODEL, &Scene::new("walls", walls), level(0.0, 0.0, 2.0, 0.0), &[]).ranges_m[360]
+}
+
+#[test]
+fn what_is_dark_is_seen_late_and_hides_what_is_behind_it() {
+    assert_eq!([range_to(0.0, 9.9), range_to(0.0, 10.1)], [9.9, f32::INFINITY]);
+    assert_eq!([range_to(0.25, 19.9), range_to(0.25, 20.1)], [19.9, f32::INFINITY]);
+    assert_eq!([range_to(1.0, 39.9), range_to(1.0, 40.1)], [39.9, f32::INFINITY]);
+    assert_eq!(range_to(0.01, 10.1), f32::INFINITY, "nothing is darker than black");
+}
+
 #[test]
 fn noise_has_the_deviation_of_the_model_and_repeats() {
     let wall = Obstacle::block("wall", Vector3::new(0.0, 0.0, 0.0), Vector3::repeat(200.0));
@@ -120,10 +136,9 @@ fn obstacle() -> impl Strategy<Value = Obstacle> {
         2 => [-2.0..2.0, -2.0..2.0, -2.0..2.0].prop_map(Vector3::from),
         1 => Just(Vector3::new(PI, 0.0, 0.0)),
     ];
-    (shape, [-15.0..15.0, -15.0..15.0, 0.0..6.0], turn).prop_map(|(shape, place, turn)| Obstacle {
-        name: "any".to_owned(),
-        shape,
-        pose: Isometry3::from_parts(place.into(), UnitQuaternion::from_scaled_axis(turn)),
+    (shape, [-15.0..15.0, -15.0..15.0, 0.0..6.0], turn).prop_map(|(shape, place, turn)| {
+        let turn = UnitQuaternion::from_scaled_axis(turn);
+        Obstacle::new("any", shape, Isometry3::from_parts(place.into(), turn))
     })
 }
 

@@ -3,12 +3,14 @@
 #![allow(clippy::unwrap_used, clippy::panic)] // A test fails by panicking.
 
 mod cross_node_behaviours;
+mod dark_obstacles;
 mod determinism;
 mod explain;
 mod faults;
 mod gazebo_worlds;
 mod landing;
 mod limits;
+mod narrow_alone;
 mod no_lidar;
 mod positions;
 mod preflight;

@@ -92,10 +92,15 @@ pub fn speed_cap(
     }
     let remaining = path.length_m() - station_m;
     lower(stopping_speed(remaining, decel_m_s2, latency_s), SpeedLimit::Goal);
-    let free = sensed_free_m - config.margin_m;
-    let sensed = stopping_speed(free, decel_m_s2, latency_s);
-    lower(if free > 0.0 { sensed.max(config.creep_m_s.min(free)) } else { 0.0 }, SpeedLimit::Sensed);
+    lower(sensed_cap(sensed_free_m, config), SpeedLimit::Sensed);
     cap
+}
+
+/// Fastest speed, m/s, from which a vehicle stops short of the end of what is known to be free.
+pub fn sensed_cap(sensed_free_m: f64, config: &BrakingConfig) -> f64 {
+    let free_m = sensed_free_m - config.margin_m;
+    let sensed = stopping_speed(free_m, config.decel_m_s2, config.latency_s);
+    if free_m > 0.0 { sensed.max(config.creep_m_s.min(free_m)) } else { 0.0 }
 }
 
 /// The next speed of a set-point that was `previous_m_s`: down to the cap at once, up to it by the

@@ -9,6 +9,9 @@ use super::path_finder::{Found, LEVEL_BUDGET, PathFinder, Task};
 
 /// Margins between hull and obstacles that are tried in turn when there is no path with the envelope's own, m.
 const TIGHT_MARGINS_M: [f64; 2] = [0.1, 0.03];
+/// The last of them, m. A voxel makes a wall thicker than it is, by up to its diagonal where the wall runs aslant: what
+/// is passable is told by the returns, of which the safety filter keeps clear.
+const SQUEEZED_MARGIN_M: f64 = -0.1;
 /// Most voxels that a search at all heights expands; each costs more.
 const CLIMBING_BUDGET: usize = 40_000;
 /// As the height band of a level search: search all heights.
@@ -43,16 +46,16 @@ impl PathFinder for AstarFinder {
                 Ok(()) => self.astar.advance(map, &request, &config, allowance),
                 Err(error) => Some(Err(error)),
             };
-            let clearance_m = config.clearance_m;
+            let (clearance_m, is_level) = (config.clearance_m, task.is_level(config.planar_band_m));
             match answer {
                 None => {
                     self.is_begun = true;
                     return None;
                 }
-                Some(Ok(plan)) => return Some(Ok(Found::of(&plan, map, clearance_m, discs))),
+                Some(Ok(plan)) => return Some(Ok(Found::of(&plan, map, clearance_m, discs, is_level))),
                 // Far away: begin with the part of the way that leads nearest to the goal.
                 Some(Err(PlanError::BudgetExhausted { partial, .. })) if config.planar_band_m > 0.0 => {
-                    return Some(Ok(Found { path: partial, clearance_m: Some(clearance_m) }));
+                    return Some(Ok(Found { path: partial, clearance_m: Some(clearance_m), is_level }));
                 }
                 Some(Err(error)) => {
                     self.first_error.get_or_insert(error);
@@ -71,8 +74,14 @@ fn attempt(number: usize, task: &Task) -> Option<(AstarConfig, &[Disc])> {
         AstarConfig { planar_band_m: ALL_HEIGHTS, budget: CLIMBING_BUDGET, ..AstarConfig::default() };
     let [tight_m, tightest_m] = TIGHT_MARGINS_M;
     let wide_m = task.margin_m;
-    let tries =
-        [(level, wide_m), (level, tight_m), (level, tightest_m), (climbing, wide_m), (climbing, tightest_m)];
+    let tries = [
+        (level, wide_m),
+        (level, tight_m),
+        (level, tightest_m),
+        (climbing, wide_m),
+        (climbing, tightest_m),
+        (level, SQUEEZED_MARGIN_M),
+    ];
     let rounds = if task.discs.is_empty() { 1 } else { 2 };
     let discs = if number < tries.len() { task.discs.as_slice() } else { &[] };
     let (config, margin_m) = *tries.get(number % tries.len())?;

@@ -41,7 +41,13 @@ impl PathFinder for DstarLiteFinder {
             let answer = self.dstar.advance(map, &task.request(&task.discs), &config, allowance)?;
             self.is_tried = true;
             if let Ok(plan) = answer {
-                return Some(Ok(Found::of(&plan, map, clearance_m, &task.discs)));
+                return Some(Ok(Found::of(
+                    &plan,
+                    map,
+                    clearance_m,
+                    &task.discs,
+                    task.is_level(planar_band_m),
+                )));
             }
         }
         self.astar.advance(task, map, allowance)

@@ -34,6 +34,11 @@ pub struct Task {
 }
 
 impl Task {
+    /// Whether a search that stays at one height, if heights differ by no more than `planar_band_m`, does so.
+    pub fn is_level(&self, planar_band_m: f64) -> bool {
+        (self.goal.z - self.start.z).abs() <= planar_band_m
+    }
+
     /// The request of one search, around these of its discs.
     pub fn request<'a>(&'a self, discs: &'a [Disc]) -> Request<'a> {
         Request { start: self.start, goal: self.goal, potential: &self.potential, discs, within: self.within }
@@ -48,13 +53,15 @@ pub struct Found {
     /// The clearance it keeps, m. A path without one was not looked for in the map, and is kept whatever the map
     /// learns.
     pub clearance_m: Option<f64>,
+    /// Whether it was searched for at the height of its start alone.
+    pub is_level: bool,
 }
 
 impl Found {
-    /// A plan that keeps this clearance, without the corners it can do without.
-    pub fn of(plan: &Plan, map: &ClearanceMap, clearance_m: f64, discs: &[Disc]) -> Self {
+    /// A plan that keeps this clearance, without the corners it can do without; `is_level` is as in the field.
+    pub fn of(plan: &Plan, map: &ClearanceMap, clearance_m: f64, discs: &[Disc], is_level: bool) -> Self {
         let path = simplify_around(map, &plan.path, clearance_m, discs);
-        Self { path, clearance_m: Some(clearance_m) }
+        Self { path, clearance_m: Some(clearance_m), is_level }
     }
 }
 

@@ -8,7 +8,7 @@ mod path_follower;
 mod vfh;
 
 pub use self::apf::Apf;
-pub use self::path_follower::{PathFollower, Place};
+pub use self::path_follower::{PathFollower, Place, TICK_S};
 pub use self::vfh::Vfh;
 pub use skein_planning::local::vfh::Step;
 

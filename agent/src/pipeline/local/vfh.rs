@@ -38,8 +38,13 @@ pub struct Vfh {
 impl Vfh {
     /// The planner of a vehicle of this envelope.
     pub fn new(envelope: &Envelope) -> Self {
+        Self::with_speed(envelope, Self::speed(envelope))
+    }
+
+    /// How fast a vehicle of this envelope flies.
+    pub fn speed(envelope: &Envelope) -> SpeedConfig {
         let filter_m = envelope.obstacle_clearance_m();
-        let speed = SpeedConfig {
+        SpeedConfig {
             hard_m_s2: envelope.brake_m_s2,
             latency_s: envelope.latency_s,
             gentle_m_s2: GENTLE_M_S2,
@@ -47,7 +52,11 @@ impl Vfh {
             clearance_m: filter_m + BESIDE_FILTER_M,
             corridor_m: filter_m + BESIDE_WAY_M,
             ..SpeedConfig::default().cruising_at(envelope.cruise_m_s)
-        };
+        }
+    }
+
+    /// The planner of a vehicle of this envelope at a speed of one's own.
+    pub fn with_speed(envelope: &Envelope, speed: SpeedConfig) -> Self {
         let safety_radius_m = envelope.hull_m + envelope.margin_m;
         let histogram = VfhConfig { safety_radius_m, comfort_radius_m: COMFORT_M, ..VfhConfig::default() };
         Self { braking: envelope.braking(GENTLE_BRAKE_M_S2), follower: Follower::new(histogram, speed) }

@@ -200,6 +200,7 @@ impl<'a> Flight<'a> {
         let looked = cpu_time::this_thread()?;
         let surroundings = Surroundings {
             sees: true,
+            rays: self.perception.rays(),
             map: self.perception.map(),
             obstacles: self.perception.obstacles(),
             neighbours: &neighbours,

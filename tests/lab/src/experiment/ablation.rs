@@ -88,7 +88,7 @@ impl PathFinder for Straight {
         allowance: &mut usize,
     ) -> Option<Result<global::Found, PlanError>> {
         match Path::new(vec![task.start, task.goal]) {
-            Some(path) => Some(Ok(global::Found { path, clearance_m: None })),
+            Some(path) => Some(Ok(global::Found { path, clearance_m: None, is_level: false })),
             None => self.0.advance(task, map, allowance),
         }
     }

@@ -42,13 +42,25 @@ pub struct Follower {
     obstacles: Vec<Vector3<f64>>,
     /// The last set-point, which the next one is near to (ENU, m/s).
     set_point: Vector3<f64>,
+    /// The way since the vehicle stood, on however many paths, metres.
+    flown_m: f64,
+    /// Where that was counted last.
+    counted_at: Option<Vector3<f64>>,
 }
 
 impl Follower {
     /// A follower at rest that has seen nothing.
     pub fn new(vfh: VfhConfig, speed: SpeedConfig) -> Follower {
         let aim = ApfConfig { look_ahead_m: 3.0, ..ApfConfig::default() };
-        Follower { vfh: Vfh::new(vfh), speed, aim, obstacles: Vec::new(), set_point: Vector3::zeros() }
+        Follower {
+            vfh: Vfh::new(vfh),
+            speed,
+            aim,
+            obstacles: Vec::new(),
+            set_point: Vector3::zeros(),
+            flown_m: 0.0,
+            counted_at: None,
+        }
     }
 
     /// Takes in the returns of a scan; see [`Histogram::of`](super::Histogram::of).
@@ -75,12 +87,19 @@ impl Follower {
         let station_m = path.project_within(position, station_m - reach_m, station_m + reach_m).station_m;
         let carrot = carrot(map, path, station_m, position, &self.aim);
         let offset = carrot - position;
-        let phase_m_s = trapezoid(station_m, path.length_m() - station_m, &self.speed);
+        self.count(position);
+        let phase_m_s = trapezoid(self.flown_m, path.length_m() - station_m, &self.speed);
         let speed_m_s = cap_m_s.min(phase_m_s.max(self.speed.start_share * cap_m_s));
         let speed_m_s = speed_m_s.min(self.speed_ahead(path, station_m));
         let share = offset.try_normalize(1e-6).unwrap_or_default();
         let level = self.level(&offset, speed_m_s * share.xy().norm(), position);
         Step { velocity: Vector3::new(level.x, level.y, speed_m_s * share.z), carrot, station_m }
+    }
+
+    /// Counts the way flown: a new path is no new start.
+    fn count(&mut self, position: &Vector3<f64>) {
+        let before = self.counted_at.replace(*position).unwrap_or(*position);
+        self.flown_m += (position - before).norm();
     }
 
     /// The speed from which every place of the path ahead is reached, gently, as slowly as it has to be flown through.
@@ -131,12 +150,20 @@ impl Follower {
     /// The set-point that was sent in the end.
     pub fn flew(&mut self, set_point: &Vector3<f64>) {
         self.set_point = *set_point;
+        if set_point.norm() < AT_REST_M_S {
+            self.stand();
+        }
+    }
+
+    fn stand(&mut self) {
+        (self.flown_m, self.counted_at) = (0.0, None);
     }
 
     /// Somebody else moves the vehicle, or nobody.
     pub fn rest(&mut self) {
         self.vfh.rest();
         self.set_point = Vector3::zeros();
+        self.stand();
     }
 }
 
