@@ -113,12 +113,25 @@ pub enum LocalPlanner {
     Vfh,
 }
 
+/// Whose potential makes paths near them dearer in A* (Wang 2023).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Repellers {
+    Nobody,
+    /// Vehicles that stand.
+    #[default]
+    Vehicles,
+    /// And what moves, and what the map knows.
+    Everything,
+}
+
 /// Which planners the pipeline is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planners {
     pub global: GlobalPlanner,
     pub local: LocalPlanner,
+    pub potential: Repellers,
 }
 
 /// See [`AgentConfig::sigma_limit_m`].

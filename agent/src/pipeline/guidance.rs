@@ -14,8 +14,8 @@ use super::{
     course::Course,
     headroom::Headroom,
     layers::Layers,
-    planning::Planning,
-    progress::Progress,
+    planning::{InTheWay, Planning},
+    progress::{Felt, Progress},
     steering::{Lead, Steering},
     surroundings::Surroundings,
 };
@@ -47,7 +47,7 @@ pub struct Guidance {
 impl Guidance {
     /// Guidance for a vehicle of this envelope.
     pub fn new(envelope: Envelope, layers: Layers) -> Self {
-        let Layers { finder, follower, repulsion, filter, escape, passages } = layers;
+        let Layers { finder, potential, follower, repulsion, filter, escape, passages } = layers;
         Self {
             envelope,
             leave_until: Duration::ZERO,
@@ -55,7 +55,7 @@ impl Guidance {
             allowed: Allowed::ANYTHING,
             headroom: Headroom::OPEN,
             course: Course::default(),
-            planning: Planning::new(envelope, finder),
+            planning: Planning::new(envelope, finder, potential),
             progress: Progress::new(envelope.separation_m, passages, escape),
             steering: Steering::new(envelope, follower, repulsion, filter),
         }
@@ -147,7 +147,9 @@ impl Guidance {
         neighbours: &[Neighbour],
     ) -> Option<Report> {
         let within = self.allowed().region;
-        let report = self.planning.begin(is_stuck, &mut self.course, within, motion, map, neighbours);
+        let (minimum, movers) = (self.progress.take_minimum(), self.steering.movers());
+        let in_the_way = InTheWay { is_stuck, minimum, neighbours, movers };
+        let report = self.planning.begin(in_the_way, &mut self.course, within, motion, map);
         self.note(report)
     }
 
@@ -176,7 +178,13 @@ impl Guidance {
         let (has_leave, allowed) = (self.has_leave(now), self.allowed());
         let moves_at = has_leave.then_some(now);
         let room = (&allowed, self.headroom);
-        self.progress.look_ahead(moves_at, &mut self.course, room, motion, map, neighbours)
+        let felt = Felt { forces: self.steering.forces(), movers: self.steering.movers() };
+        self.progress.look_ahead(moves_at, &mut self.course, room, motion, map, neighbours, felt)
+    }
+
+    /// For what the vehicle waits though it has leave to move.
+    pub fn waits_for(&self) -> Option<&'static str> {
+        self.progress.waits().then_some("something that moves to leave its way")
     }
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles

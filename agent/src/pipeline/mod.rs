@@ -15,6 +15,7 @@ pub mod guidance;
 pub mod headroom;
 pub mod layers;
 pub mod local;
+pub mod patience;
 pub mod perception;
 pub mod planning;
 pub mod progress;

@@ -2,13 +2,15 @@
 
 use std::time::Duration;
 
+use nalgebra::Vector3;
 use skein_planning::{
-    local::escape::{EscapeConfig, EscapeDetector, Verdict},
+    local::escape::{EscapeConfig, EscapeDetector, Forces, Verdict},
     map::ClearanceMap,
     passage::{Passage, PassageConfig, first_passage},
+    separation,
 };
 
-use super::{allowed::Allowed, course::Course, headroom::Headroom};
+use super::{allowed::Allowed, course::Course, headroom::Headroom, patience::Patience};
 use crate::{neighbours::Neighbour, positioning::Motion, report::Report};
 
 /// The last waypoint is reached within this distance, m.
@@ -22,6 +24,17 @@ const COVERED_M: f64 = 1.5;
 /// A passage lies behind once the vehicle is this far past it, m.
 const PASSAGE_BEHIND_M: f64 = 2.5;
 
+/// A local minimum is so far ahead of a vehicle that is held up by it, m.
+const MINIMUM_AHEAD_M: f64 = 1.0;
+
+/// What the vehicle feels on its way.
+#[derive(Clone, Copy, Debug)]
+pub struct Felt<'a> {
+    pub forces: Forces,
+    /// What moves and tells nobody.
+    pub movers: &'a [separation::Neighbour],
+}
+
 /// Watches the vehicle on its course.
 #[derive(Debug)]
 pub struct Progress {
@@ -31,12 +44,22 @@ pub struct Progress {
     /// The narrow passage that was announced last.
     passage: Option<Passage>,
     escape: EscapeDetector,
+    /// The local minimum that the last path led into.
+    minimum: Option<Vector3<f64>>,
+    patience: Patience,
 }
 
 impl Progress {
     /// Watches a vehicle that keeps so far from others, m. Passages and local minima are found as configured.
     pub fn new(separation_m: f64, passages: PassageConfig, escape: EscapeConfig) -> Self {
-        Self { separation_m, passages, passage: None, escape: EscapeDetector::new(escape) }
+        Self {
+            separation_m,
+            passages,
+            passage: None,
+            escape: EscapeDetector::new(escape),
+            minimum: None,
+            patience: Patience::new(separation_m),
+        }
     }
 
     pub fn begin_path(&mut self) {
@@ -46,6 +69,18 @@ impl Progress {
     /// The flight is over.
     pub fn forget(&mut self) {
         self.passage = None;
+        self.minimum = None;
+        self.patience.forget();
+    }
+
+    /// The local minimum that the last path led into, m ENU, told once.
+    pub fn take_minimum(&mut self) -> Option<Vector3<f64>> {
+        self.minimum.take()
+    }
+
+    /// Whether the vehicle waits for something that moves to leave its way.
+    pub fn waits(&self) -> bool {
+        self.patience.waits()
     }
 
     /// The share of the attraction that is left: 1, and less while a local minimum is escaped from.
@@ -62,12 +97,13 @@ impl Progress {
         motion: &Motion,
         map: &ClearanceMap,
         neighbours: &[Neighbour],
+        felt: Felt<'_>,
     ) -> Vec<Report> {
         let mut reports = Vec::new();
         reports.extend(self.check_arrival(course, (allowed, headroom), motion, neighbours));
         reports.extend(check_path(course, allowed, motion, map));
         reports.extend(self.check_passage(course, motion, map));
-        reports.extend(self.check_progress(moves_at, course, motion));
+        reports.extend(self.check_progress(moves_at, course, motion, felt));
         reports
     }
 
@@ -120,14 +156,23 @@ impl Progress {
         moves_at: Option<Duration>,
         course: &Course,
         motion: &Motion,
+        felt: Felt<'_>,
     ) -> Option<Report> {
         if course.waypoint.is_none() || course.has_arrived {
             self.escape.reset();
+            self.patience.forget();
             return None;
         }
         let (now, following) = moves_at.zip(course.following.as_ref())?;
-        let verdict = self.escape.update(now, following.station_m, &motion.position);
-        (verdict == Verdict::Stuck).then_some(Report::Stuck)
+        if let Some(is_over) = self.patience.wait(now, following, motion, felt.movers) {
+            return is_over.then_some(Report::Stuck);
+        }
+        let verdict = self.escape.update(now, following.station_m, &motion.position, felt.forces);
+        if verdict == Verdict::Trapped {
+            let ahead = felt.forces.pull.try_normalize(1e-6).unwrap_or_else(Vector3::zeros);
+            self.minimum = Some(motion.position + ahead * MINIMUM_AHEAD_M);
+        }
+        matches!(verdict, Verdict::Stuck | Verdict::Trapped).then_some(Report::Stuck)
     }
 }
 

@@ -19,6 +19,7 @@ pub fn steps(number: usize, mountain: &Mountain) -> impl Iterator<Item = Obstacl
             name: format!("mountain {number} step {}", k + 1),
             shape: Shape::Cylinder { radius, half_height: 0.5 * rise_m },
             pose: Isometry3::translation(mountain.centre.x, mountain.centre.y, middle_m),
+            way: None,
         }
     };
     // The last would be the peak, a point.

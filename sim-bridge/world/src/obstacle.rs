@@ -1,10 +1,12 @@
-//! Solid bodies that stand in a world.
+//! Solid bodies that stand in a world, or move through it.
 
 use std::f64::consts::TAU;
+use std::time::Duration;
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use crate::aabb::Aabb;
+use crate::way::Way;
 
 /// The form of an obstacle in its own frame, metres, centred on its origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,15 +147,17 @@ impl Interval {
     }
 }
 
-/// A solid body at a fixed place in the world.
+/// A solid body in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
     /// Its name in the world file; for messages, not unique.
     pub name: String,
     /// Its form in its own frame.
     pub shape: Shape,
-    /// Own frame to world ENU, metres.
+    /// Own frame to world ENU, metres; of one that moves, where it is now.
     pub pose: Isometry3<f64>,
+    /// The way of one that moves, without turning; `None` of one that stands.
+    pub way: Option<Way>,
 }
 
 impl Obstacle {
@@ -163,6 +167,7 @@ impl Obstacle {
             name: name.into(),
             shape: Shape::Cylinder { radius, half_height: height / 2.0 },
             pose: Isometry3::translation(x, y, height / 2.0),
+            way: None,
         }
     }
 
@@ -172,6 +177,21 @@ impl Obstacle {
             name: name.into(),
             shape: Shape::Box { half_extents: size / 2.0 },
             pose: Isometry3::translation(centre.x, centre.y, centre.z),
+            way: None,
+        }
+    }
+
+    /// The same on its way, as it is at the beginning of a run.
+    #[must_use]
+    pub fn on(mut self, way: Way) -> Self {
+        self.pose.translation.vector = way.at(Duration::ZERO);
+        Self { way: Some(way), ..self }
+    }
+
+    /// Moves it to where it is so long after the run began.
+    pub(crate) fn move_on(&mut self, now: Duration) {
+        if let Some(way) = &self.way {
+            self.pose.translation.vector = way.at(now);
         }
     }
 

@@ -295,7 +295,7 @@ impl<'a> Reader<'a> {
             let pose = pose * self.read_pose(collision, &name)?;
             let geometry = self.required(collision, "geometry", "a <geometry>")?;
             if let Some(shape) = self.read_geometry(geometry, &name)? {
-                self.add(Obstacle { name, shape, pose });
+                self.add(Obstacle { name, shape, pose, way: None });
             }
         }
         if !is_solid && children(link, "visual").next().is_some() {

@@ -124,6 +124,7 @@ fn obstacle() -> impl Strategy<Value = Obstacle> {
         name: "any".to_owned(),
         shape,
         pose: Isometry3::from_parts(place.into(), UnitQuaternion::from_scaled_axis(turn)),
+        way: None,
     })
 }
 

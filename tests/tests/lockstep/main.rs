@@ -9,6 +9,7 @@ mod faults;
 mod gazebo_worlds;
 mod landing;
 mod limits;
+mod moving;
 mod no_lidar;
 mod positions;
 mod preflight;

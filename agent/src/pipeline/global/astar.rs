@@ -49,7 +49,9 @@ impl PathFinder for AstarFinder {
                     self.is_begun = true;
                     return None;
                 }
-                Some(Ok(plan)) => return Some(Ok(Found::of(&plan, map, clearance_m, discs))),
+                Some(Ok(plan)) => {
+                    return Some(Ok(Found::of(&plan, map, clearance_m, discs, &task.potential)));
+                }
                 // Far away: begin with the part of the way that leads nearest to the goal.
                 Some(Err(PlanError::BudgetExhausted { partial, .. })) if config.planar_band_m > 0.0 => {
                     return Some(Ok(Found { path: partial, clearance_m: Some(clearance_m) }));

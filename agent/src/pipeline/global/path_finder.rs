@@ -52,8 +52,14 @@ pub struct Found {
 
 impl Found {
     /// A plan that keeps this clearance, without the corners it can do without.
-    pub fn of(plan: &Plan, map: &ClearanceMap, clearance_m: f64, discs: &[Disc]) -> Self {
-        let path = simplify_around(map, &plan.path, clearance_m, discs);
+    pub fn of(
+        plan: &Plan,
+        map: &ClearanceMap,
+        clearance_m: f64,
+        discs: &[Disc],
+        potential: &Potential,
+    ) -> Self {
+        let path = simplify_around(map, &plan.path, clearance_m, discs, potential);
         Self { path, clearance_m: Some(clearance_m) }
     }
 }
