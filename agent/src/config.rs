@@ -124,6 +124,18 @@ pub enum Nose {
     Along,
 }
 
+/// Whose potential makes paths near them dearer in A* (Wang 2023).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Repellers {
+    Nobody,
+    /// Vehicles that stand.
+    #[default]
+    Vehicles,
+    /// And what moves, and what the map knows.
+    Everything,
+}
+
 /// Which planners the pipeline is made of, and where they point the nose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -131,6 +143,7 @@ pub struct Planners {
     pub global: GlobalPlanner,
     pub local: LocalPlanner,
     pub nose: Nose,
+    pub potential: Repellers,
 }
 
 /// See [`AgentConfig::sigma_limit_m`].

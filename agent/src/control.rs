@@ -201,7 +201,8 @@ impl Control {
             off_m: excess_m(sigma_m.hypot(neighbour.track.sigma_m)),
         };
         let others: Vec<_> = self.neighbours.at(now).map(other).collect();
-        if !self.perception.take_in(scan, &Pose { position, attitude }, &others) {
+        let movers = self.guidance.steering.movers();
+        if !self.perception.take_in(scan, &Pose { position, attitude }, &others, movers) {
             return;
         }
         let (returns, rays) = (self.perception.returns(), scan.ranges_m.len());
@@ -628,10 +629,10 @@ impl Control {
         is_due.then(|| self.told_readiness.insert((now, readiness)).1.clone())
     }
 
-    /// Why a vehicle on the ground is not ready to take off.
+    /// Why a vehicle on the ground is not ready to take off, or for what one in the air waits.
     #[must_use]
     pub fn complaint(&self) -> Option<String> {
-        self.preflight.complaint()
+        self.preflight.complaint().or_else(|| self.guidance.waits_for().map(str::to_owned))
     }
 
     /// Flight mode as the autopilot tells it.

@@ -46,7 +46,7 @@ pub use self::{
     airspace_table::{AirspaceError, AirspaceTable},
     config::{
         AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, GlobalPlanner, LocalPlanner, Nose, Planners,
-        PositionSource,
+        PositionSource, Repellers,
     },
     control::SetPointRecord,
     core::{AgentCore, Status},

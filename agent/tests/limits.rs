@@ -71,7 +71,7 @@ impl Flight {
             down_m: None,
         };
         let pose = Pose { position: self.motion.position, attitude: UnitQuaternion::identity() };
-        self.perception.take_in(&scan, &pose, &[]);
+        self.perception.take_in(&scan, &pose, &[], &[]);
     }
 
     fn tick(&mut self) -> SetPoint {

@@ -1,7 +1,12 @@
 //! A world's obstacles as recordings and the console show them.
 
+use std::time::Duration;
+
 use skein_wire::{Form, Solid};
 use skein_world::{Obstacle, Scene, Shape};
+
+/// A scene of which something moves is shown this often.
+pub const MOVING_PERIOD: Duration = Duration::from_millis(200);
 
 /// The obstacles of `scene`; planes without end are left out.
 pub fn view(scene: &Scene) -> skein_wire::Scene {

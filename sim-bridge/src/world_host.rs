@@ -69,7 +69,6 @@ pub struct WorldHost {
     locators: Vec<String>,
     scan_keys: Vec<Key>,
     scene_key: Key,
-    scene: Vec<u8>,
     scene_due: Duration,
     /// Each vehicle's last word.
     heard: BTreeMap<NodeName, State>,
@@ -113,7 +112,6 @@ impl WorldHost {
             link: session.listen(vec![Key::pattern::<State>(&fleet), occurrences])?,
             locators: session.locators().to_vec(),
             scan_keys: (0..scenario.vehicles.len()).map(scan_key).collect(),
-            scene: Payload::Scene(scene_view::view(&scenario.scene)).encode(),
             scene_key: Key::to_all::<Scene>(&fleet, node),
             scene_due: Duration::ZERO,
             heard: BTreeMap::new(),
@@ -141,8 +139,10 @@ impl WorldHost {
             }
         }
         if self.simulation.now() >= self.scene_due {
-            self.scene_due = self.simulation.now() + SCENE_PERIOD;
-            self.link.put(&self.scene_key, self.scene.clone());
+            let scene = self.simulation.scene();
+            let period = scene.moving().next().map_or(SCENE_PERIOD, |_| scene_view::MOVING_PERIOD);
+            self.scene_due = self.simulation.now() + period;
+            self.link.put(&self.scene_key, Payload::Scene(scene_view::view(scene)).encode());
         }
         self.listen();
     }

@@ -3,13 +3,14 @@
 // Helpers fail like the tests that call them.
 
 use std::path::Path;
+use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{GlobalPlanner, LocalPlanner};
 use skein_sim::scenario::{Order, Overrides, Scenario, ScenarioError, Who};
 use skein_wire::event::What;
-use skein_world::{PositionErrors, PositionFaultKind};
+use skein_world::{Obstacle, PositionErrors, PositionFaultKind};
 
 const YARD: &str = r#"
 name = "yard"
@@ -403,4 +404,105 @@ fn a_position_fault_is_one_thing_of_a_vehicle_that_is_there() {
     assert_eq!(text, "yard.toml: position_fault[0].vehicle: there is no vehicle 3: expected 1 to 2");
     let text = fault("late_s = 11.0");
     assert!(text.contains("`position_fault[0].late_s`") && text.contains("0 to 10"), "{text}");
+}
+
+const CROWD: &str = r#"
+[bounds]
+min_m = [-20.0, -10.0, -1.0]
+max_m = [20.0, 10.0, 8.0]
+
+[[vehicle]]
+start_m = [-15.0, 0.0]
+waypoints_m = [[15.0, 0.0, 1.2]]
+
+[[obstacle]]
+name = "cart"
+centre_m = [0.0, 8.0, 1.0]
+box_m = [1.0, 1.0, 2.0]
+waypoints_m = [[0.0, -8.0, 1.0], [4.0, -8.0, 1.0]]
+speed_m_s = [2.0, 1.0]
+waits_s = 1.0
+loops = true
+
+[[obstacle]]
+name = "ball"
+centre_m = [5.0, 5.0, 1.0]
+sphere = { radius_m = 0.3 }
+velocity_m_s = [0.0, -0.5, 0.0]
+
+[[obstacle]]
+name = "pole"
+centre_m = [-5.0, 5.0, 3.0]
+cylinder = { radius_m = 0.3, height_m = 6.0 }
+
+[[walker]]
+number = 5
+"#;
+
+#[test]
+fn obstacles_of_a_file_move_as_it_says() -> Result<(), ScenarioError> {
+    let mut scene = Scenario::from_toml(CROWD, "crowd.toml", None, 3)?.scene;
+    let place = |scene: &Scene, name: &str| {
+        let found = scene.obstacles().iter().find(|obstacle| obstacle.name == name);
+        found.map(|obstacle| obstacle.pose.translation.vector)
+    };
+    scene.move_on(Duration::from_secs(4));
+    assert_eq!(place(&scene, "cart"), Some(Vector3::new(0.0, 0.0, 1.0)));
+    assert_eq!(place(&scene, "ball"), Some(Vector3::new(5.0, 3.0, 1.0)));
+    assert_eq!(place(&scene, "pole"), Some(Vector3::new(-5.0, 5.0, 3.0)));
+    scene.move_on(Duration::from_secs(11));
+    assert_eq!(place(&scene, "cart"), Some(Vector3::new(2.0, -8.0, 1.0)));
+    assert_eq!(scene.moving().count(), 7);
+    Ok(())
+}
+
+#[test]
+fn walkers_walk_around_what_stands_and_not_over_pads_and_the_seed_tells_where() -> Result<(), ScenarioError> {
+    let scene = |seed| Scenario::from_toml(CROWD, "crowd.toml", None, seed).map(|scenario| scenario.scene);
+    let mut crowd = scene(3)?;
+    let is_walker = |obstacle: &&Obstacle| obstacle.name.starts_with("walker");
+    let mut walked_m = 0.0;
+    for tenths in 0..600 {
+        let before: Vec<_> = crowd.obstacles().iter().filter(is_walker).cloned().collect();
+        crowd.move_on(Duration::from_millis(100 * tenths));
+        for (walker, before) in crowd.obstacles().iter().filter(is_walker).zip(before) {
+            let place = walker.pose.translation.vector;
+            walked_m += (place - before.pose.translation.vector).norm();
+            for pad in [-15.0, 15.0] {
+                assert!((place.xy() - Vector3::new(pad, 0.0, 0.0).xy()).norm() > 2.9, "{place:?}");
+            }
+            let to_pole_m = (place.xy() - Vector3::new(-5.0, 5.0, 0.0).xy()).norm();
+            assert!(to_pole_m > 0.3 + 0.25, "{place:?}");
+            assert!(crowd.bounds().contains(&place));
+        }
+    }
+    let mean_m_s = walked_m / 5.0 / 60.0;
+    assert!((0.5..1.5).contains(&mean_m_s), "{mean_m_s} m/s");
+    assert_eq!(crowd.obstacles().iter().filter(is_walker).count(), 5);
+    assert_eq!(scene(3)?, scene(3)?);
+    assert_ne!(scene(3)?, scene(4)?);
+    Ok(())
+}
+
+#[test]
+fn a_way_that_contradicts_itself_is_refused_with_its_field() {
+    let refused = |from: &str, to: &str| {
+        let text = CROWD.replacen(from, to, 1);
+        Scenario::from_toml(&text, "crowd.toml", None, 1).map(|_| ()).expect_err(to).to_string()
+    };
+    for (from, to, field, expected) in [
+        (
+            "speed_m_s = [2.0, 1.0]",
+            "speed_m_s = [2.0, 1.0, 3.0]",
+            "obstacle[0].speed_m_s",
+            "one for each of 2",
+        ),
+        ("speed_m_s = [2.0, 1.0]", "speed_m_s = 0.0", "obstacle[0].speed_m_s", "above 0"),
+        ("loops = true", "velocity_m_s = [1.0, 0.0, 0.0]", "obstacle[0].velocity_m_s", "either"),
+        ("velocity_m_s = [0.0, -0.5, 0.0]", "loops = true", "obstacle[1].waypoints_m", "waypoints_m"),
+        ("number = 5", "speed_m_s = [1.5, 0.5]", "walker[0].speed_m_s", "least"),
+    ] {
+        let text = refused(from, to);
+        assert!(text.contains(field) && text.contains(expected), "{text}");
+    }
 }

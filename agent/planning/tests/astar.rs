@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 use skein_planning::airspace::{Airspace, KeepOut, NoFlyZone};
 use skein_planning::global::astar::{Astar, AstarConfig, Disc, Plan, PlanError, Request, plan};
-use skein_planning::global::{Potential, PotentialObstacle, elide_collinear, simplify};
+use skein_planning::global::{Potential, PotentialConfig, PotentialObstacle, elide_collinear, simplify};
 use skein_planning::map::{ClearanceMap, VoxelMapConfig};
 use skein_planning::{Path, Region};
 
@@ -141,7 +141,8 @@ proptest! {
         blocked.retain(|cell| *cell != from && *cell != to);
         let config = AstarConfig { comfort_m: 2.0, comfort_weight: 1.5, ..shortest() };
         let obstacle = PotentialObstacle { centre: Vector3::new(x, y, 0.5), influence_m: 3.0 };
-        let potential = Potential::gated(&centre(from), &Vector3::new(1.0, 1.0, 0.0), &[obstacle], 4.0);
+        let potential = Potential::felt(&centre(from), &Vector3::new(1.0, 1.0, 0.0), &[obstacle], &grid(FLAT, &[]),
+            &PotentialConfig { gain: 4.0, ..PotentialConfig::default() });
         let (start, goal, within) = (centre(from), centre(to), Region::EVERYWHERE);
         let request = Request { start, goal, potential: &potential, discs: &[], within };
         let found = plan(&mut grid(FLAT, &blocked), &request, &config, &mut Astar::default());

@@ -95,6 +95,12 @@ impl Following {
         std::iter::once(self.path.point_at(self.station_m)).chain(ahead)
     }
 
+    /// Whether the path leads this near to a place within a distance ahead, m.
+    pub fn leads_near(&self, place: &Vector3<f64>, near_m: f64, ahead_m: f64) -> bool {
+        let until_m = (self.station_m + ahead_m).min(self.path.length_m());
+        self.path.project_within(place, self.station_m, until_m).distance_m < near_m
+    }
+
     /// Whether a vehicle at `position` that is to stay `within` a region can fly on along the path, as far as the map
     /// tells.
     pub fn can_be_flown(&self, position: &Vector3<f64>, within: &Region, map: &ClearanceMap) -> bool {

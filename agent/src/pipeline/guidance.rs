@@ -19,8 +19,8 @@ use super::{
     global::Found,
     headroom::Headroom,
     layers::Layers,
-    planning::Planning,
-    progress::Progress,
+    planning::{InTheWay, Planning},
+    progress::{Around, Felt, Progress},
     steering::{Lead, Steering},
     surroundings::Surroundings,
     way_of_others::{WayOfOthers, goes_first},
@@ -60,7 +60,7 @@ pub struct Guidance {
 impl Guidance {
     /// Guidance for a vehicle of this envelope.
     pub fn new(envelope: Envelope, layers: Layers) -> Self {
-        let Layers { fence, finder, follower, repulsion, filter, escape, passages } = layers;
+        let Layers { fence, finder, potential, follower, repulsion, filter, escape, passages } = layers;
         Self {
             envelope,
             leave_until: Duration::ZERO,
@@ -68,7 +68,7 @@ impl Guidance {
             allowed: Allowed::ANYTHING,
             headroom: Headroom::OPEN,
             course: Course::default(),
-            planning: Planning::new(envelope, fence, finder),
+            planning: Planning::new(envelope, fence, finder, potential),
             progress: Progress::new(envelope.separation_m, passages, escape),
             way_of_others: WayOfOthers::new(envelope.separation_m, &passages),
             aside: None,
@@ -163,7 +163,8 @@ impl Guidance {
         match self.refuge_from(other, motion, map, neighbours) {
             Some(path) => {
                 let clearance_m = Some(self.envelope.obstacle_clearance_m());
-                let following = Following::new(Found { path, clearance_m }, self.allowed().region);
+                let following =
+                    Following::new(Found { path, clearance_m, is_level: true }, self.allowed().region);
                 self.aside = Some((following, now));
                 None
             }
@@ -255,7 +256,9 @@ impl Guidance {
         neighbours: &[Neighbour],
     ) -> Option<Report> {
         let within = self.allowed().region;
-        let report = self.planning.begin(is_stuck, &mut self.course, within, motion, map, neighbours);
+        let (minimum, movers) = (self.progress.take_minimum(), self.steering.movers());
+        let in_the_way = InTheWay { is_stuck, minimum, neighbours, movers };
+        let report = self.planning.begin(in_the_way, &mut self.course, within, motion, map);
         self.note(report)
     }
 
@@ -285,12 +288,20 @@ impl Guidance {
         let (has_leave, allowed, makes_way) = (self.has_leave(now), self.allowed(), self.aside.is_some());
         let moves_at = (has_leave && !makes_way).then_some(now);
         let room = (&allowed, self.headroom);
-        let along =
-            self.progress.look_ahead(moves_at, makes_way, &mut self.course, room, motion, map, neighbours);
+        let felt = Felt { forces: self.steering.forces(), movers: self.steering.movers() };
+        let around = Around { map, neighbours, felt };
+        let along = self.progress.look_ahead(moves_at, makes_way, &mut self.course, room, motion, &around);
         if has_leave && !makes_way {
-            self.planning.extend(&mut self.course, allowed.region, motion, map, neighbours);
+            let movers = self.steering.movers();
+            let in_the_way = InTheWay { is_stuck: false, minimum: None, neighbours, movers };
+            self.planning.extend(in_the_way, &mut self.course, allowed.region, motion, map);
         }
         aside.into_iter().chain(along).collect()
+    }
+
+    /// For what the vehicle waits though it has leave to move.
+    pub fn waits_for(&self) -> Option<&'static str> {
+        self.progress.waits().then_some("something that moves to leave its way")
     }
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles

@@ -1,13 +1,15 @@
 //! The layers of the pipeline that can be exchanged.
 
-use skein_planning::{local::escape::EscapeConfig, passage::PassageConfig, separation::RepulsionConfig};
+use skein_planning::{
+    global::PotentialConfig, local::escape::EscapeConfig, passage::PassageConfig, separation::RepulsionConfig,
+};
 
 use super::{
     global::{PathFinder, path_finder},
     local::{PathFollower, path_follower},
     safety_filter::{SafetyFilter, VelocityFilter},
 };
-use crate::config::{Envelope, Fence, Planners};
+use crate::config::{Envelope, Fence, Planners, Repellers};
 
 /// A passage is announced this far ahead, m: far enough to stop well clear of it.
 const PASSAGE_AHEAD_M: f64 = 6.0;
@@ -19,6 +21,8 @@ pub struct Layers {
     pub fence: Fence,
     /// Finds a path through the map.
     pub finder: Box<dyn PathFinder>,
+    /// What makes paths near it dearer.
+    pub potential: PotentialConfig,
     /// Turns a path into a velocity.
     pub follower: Box<dyn PathFollower>,
     /// Bends the velocity around other vehicles.
@@ -37,11 +41,21 @@ impl Layers {
         Self {
             fence,
             finder: path_finder(planners.global),
+            potential: potential(planners.potential),
             follower: path_follower(planners.local, envelope),
             repulsion: RepulsionConfig::default(),
             filter: Box::new(SafetyFilter::new(envelope, fence)),
             escape: EscapeConfig::default(),
             passages: PassageConfig { look_m: PASSAGE_AHEAD_M, ..PassageConfig::default() },
         }
+    }
+}
+
+fn potential(repellers: Repellers) -> PotentialConfig {
+    let vehicles = PotentialConfig::default();
+    match repellers {
+        Repellers::Nobody => PotentialConfig { gain: 0.0, ..vehicles },
+        Repellers::Vehicles => vehicles,
+        Repellers::Everything => PotentialConfig { of_everything: true, ..vehicles },
     }
 }

@@ -17,6 +17,7 @@ pub mod heading;
 pub mod headroom;
 pub mod layers;
 pub mod local;
+pub mod patience;
 pub mod perception;
 pub mod planning;
 pub mod progress;

@@ -5,6 +5,7 @@ use std::time::Duration;
 use nalgebra::{UnitQuaternion, Vector3};
 use skein_planning::airspace::{Airspace, KeepOut};
 use skein_planning::map::{ClearanceMap, FreeRays, MapError, RayEnd, Sectors, VoxelMapConfig};
+use skein_planning::separation;
 use skein_wire::Scan;
 
 use crate::config::{AgentConfig, Envelope, Fence};
@@ -29,6 +30,8 @@ const GROUND_M: f64 = 0.4;
 const NEAR_M: f64 = 6.0;
 /// Returns this near a neighbour are the neighbour, m.
 const NEIGHBOUR_M: f64 = 0.8;
+/// Returns this near the skin of something that moves are of it, m: it is not where it was expected to the last.
+const MOVER_M: f64 = 0.4;
 /// Returns nearer than this are the vehicle's own frame, m.
 const OWN_FRAME_M: f64 = 0.15;
 
@@ -231,10 +234,16 @@ impl Perception {
         self.last_scan
     }
 
-    /// Takes in a scan that was taken at `pose`, while `neighbours` were at these positions. What none has seen
-    /// again for long is forgotten; without scans nothing is. A scan of which half is no measurement is none, and
-    /// returns `false`.
-    pub fn take_in(&mut self, scan: &Scan, pose: &Pose, neighbours: &[Other]) -> bool {
+    /// Takes in a scan that was taken at `pose`, while `neighbours` were at these positions, and `movers`, which tell
+    /// nobody: they are kept clear of, and not remembered. What no scan has seen again for long is forgotten; without
+    /// scans nothing is. A scan of which half is no measurement is none, and returns `false`.
+    pub fn take_in(
+        &mut self,
+        scan: &Scan,
+        pose: &Pose,
+        neighbours: &[Other],
+        movers: &[separation::Neighbour],
+    ) -> bool {
         let measured = scan.ranges_m.iter().filter(|range| is_measured(**range)).count();
         if 2 * measured <= scan.ranges_m.len() {
             return false;
@@ -272,6 +281,14 @@ impl Perception {
                 if range < self.near_m {
                     near.add(point);
                 }
+            }
+            let is_of = |mover: &separation::Neighbour| {
+                (point - mover.position).xy().norm() < mover.radius_m + MOVER_M
+            };
+            if hit && movers.iter().any(is_of) {
+                let point = pose.position + (point - pose.position) * (1.0 - (MOVER_M / range).min(1.0));
+                self.ends.push(RayEnd { point, hit: false });
+                continue;
             }
             // Where a neighbour may be, given both errors, is nothing to remember; but it is kept clear of.
             if hit && neighbours.iter().any(|other| off_m(other) < NEIGHBOUR_M + other.off_m) {
@@ -347,7 +364,7 @@ mod tests {
             position: Vector3::new(0.0, 0.0, height_m),
             attitude: UnitQuaternion::from_euler_angles(0.0, pitch_deg.to_radians(), 0.0),
         };
-        perception.take_in(&scan(&pose, wall_m), &pose, &[]);
+        perception.take_in(&scan(&pose, wall_m), &pose, &[], &[]);
         perception.returns().to_vec()
     }
 
@@ -373,7 +390,7 @@ mod tests {
             let mut scan = scan(&pose, 100.0);
             scan.ranges_m[rays].fill(invalid);
             // Of the far rays one in three is followed in each scan.
-            let taken = (0..3).all(|_| perception.take_in(&scan, &pose, &[]));
+            let taken = (0..3).all(|_| perception.take_in(&scan, &pose, &[], &[]));
             let voxels = perception.map().voxels();
             taken.then(|| {
                 [0.0, 1.0].map(|y| voxels.sensed_free_m(&pose.position, &Vector3::new(1.0 - y, y, 0.0), 9.0))
@@ -396,7 +413,7 @@ mod tests {
         let mut look = |from: Vector3<f64>, wall_m: f64, second: u64| {
             let pose = Pose { position: from, attitude: UnitQuaternion::identity() };
             let scan = Scan { stamp: Duration::from_secs(second), ..scan(&pose, wall_m) };
-            perception.take_in(&scan, &pose, &[]);
+            perception.take_in(&scan, &pose, &[], &[]);
             perception.map().clearance(&place)
         };
         let before = Vector3::new(0.0, 0.0, 3.0);
@@ -411,5 +428,26 @@ mod tests {
         }
         let later = (890..910).map(|second| look(above, 100.0, second)).last();
         assert!(later > Some(2.4), "free as far as clearance is told apart: {later:?}");
+    }
+
+    #[test]
+    fn what_moves_is_kept_clear_of_and_not_remembered() {
+        let fence = Fence { min: [-30.0, -30.0, -1.0], max: [30.0, 30.0, 10.0] };
+        let mut perception = Perception::new(&fence, Vector3::zeros(), [0.6, 5.0]).unwrap();
+        let position = Vector3::new(0.0, 0.0, 2.0);
+        let pose = Pose { position, attitude: UnitQuaternion::identity() };
+        let mover = separation::Neighbour {
+            id: 1,
+            position: Vector3::new(4.2, 0.0, 2.0),
+            velocity: Vector3::new(0.0, 1.0, 0.0),
+            sigma_m: 0.1,
+            age_s: 0.0,
+            radius_m: 0.25,
+            cooperative: false,
+        };
+        perception.take_in(&scan(&pose, 4.0), &pose, &[], &[mover]);
+        assert!(perception.obstacles().iter().any(|point| (point - mover.position).norm() < 0.5));
+        let clearance_m = |y: f64| perception.map().clearance(&Vector3::new(4.1, y, 2.0));
+        assert!(clearance_m(0.0) > 0.2 && clearance_m(2.0) < 0.2, "of the wall the rest is remembered");
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use skein_planning::{
     Region,
-    global::{Potential, PotentialObstacle, astar::Disc},
+    global::{Potential, PotentialConfig, PotentialObstacle, astar::Disc},
     map::ClearanceMap,
     separation::{self, FilterConfig},
 };
@@ -27,6 +27,10 @@ const AROUND_NEIGHBOURS_M: f64 = 8.0;
 const GHOST_SLACK_M: f64 = 0.3;
 /// Nearer than this is the same place, m.
 const SAME_PLACE_M: f64 = 1e-6;
+/// A path that must be another than the one that led into a local minimum keeps this far from there, m.
+const MINIMUM_M: f64 = 0.7;
+/// Something that moves is taken to go straight on for so long at most, s.
+const FORESEEN_S: f64 = 3.0;
 /// A vehicle slower than this stands, m/s.
 const STANDING_M_S: f64 = 0.5;
 
@@ -41,12 +45,25 @@ enum Beyond {
     Closed,
 }
 
+/// What a path is planned around beside the map.
+#[derive(Clone, Copy, Debug)]
+pub struct InTheWay<'a> {
+    /// The vehicle is stuck: neighbours that stand, and what moves, are gone around.
+    pub is_stuck: bool,
+    /// The local minimum that the last path led into, m ENU.
+    pub minimum: Option<Vector3<f64>>,
+    pub neighbours: &'a [Neighbour],
+    /// What moves and tells nobody.
+    pub movers: &'a [separation::Neighbour],
+}
+
 /// Plans paths, a little in each tick.
 #[derive(Debug)]
 pub struct Planning {
     envelope: Envelope,
     fence: Fence,
     filter: FilterConfig,
+    potential: PotentialConfig,
     routes: RouteSearch,
     /// The region that the plan under way is to stay in.
     within: Region,
@@ -61,13 +78,19 @@ pub struct Planning {
 }
 
 impl Planning {
-    /// Plans for a vehicle of this envelope inside this fence by this planner.
-    pub fn new(envelope: Envelope, fence: Fence, finder: Box<dyn PathFinder>) -> Self {
+    /// Plans for a vehicle of this envelope inside this fence by this planner, with paths dearer where something repels.
+    pub fn new(
+        envelope: Envelope,
+        fence: Fence,
+        finder: Box<dyn PathFinder>,
+        potential: PotentialConfig,
+    ) -> Self {
         let (filter, routes) = (envelope.filter(), RouteSearch::new(finder));
         Self {
             envelope,
             fence,
             filter,
+            potential,
             routes,
             within: Region::EVERYWHERE,
             goal: Vector3::zeros(),
@@ -88,22 +111,21 @@ impl Planning {
     }
 
     /// Begins to plan a path to the waypoint, `within` a region. Where the vehicle is stuck, neighbours that stand
-    /// around are obstacles too. One that has fallen silent always is, as large as its ghost will be. The answer
-    /// comes at once if this tick's allowance is enough for it, else from [`Planning::go_on`].
+    /// around, and what moves, are obstacles too. A neighbour that has fallen silent always is, as large as its ghost
+    /// will be. The answer comes at once if this tick's allowance is enough for it, else from [`Planning::go_on`].
     pub fn begin(
         &mut self,
-        is_stuck: bool,
+        in_the_way: InTheWay<'_>,
         course: &mut Course,
         within: Region,
         motion: &Motion,
         map: &mut ClearanceMap,
-        neighbours: &[Neighbour],
     ) -> Option<Report> {
         let Some(waypoint) = &mut course.waypoint else {
             return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() });
         };
         self.extends = false;
-        self.prepare(is_stuck, waypoint, within, motion, map, neighbours);
+        self.prepare(in_the_way, waypoint, within, motion, map);
         self.search(course, map)
     }
 
@@ -111,27 +133,26 @@ impl Planning {
     /// it lies behind: a leg longer than the map is flown without a stop. The answer comes from [`Planning::go_on`].
     pub fn extend(
         &mut self,
+        in_the_way: InTheWay<'_>,
         course: &mut Course,
         within: Region,
         motion: &Motion,
         map: &ClearanceMap,
-        neighbours: &[Neighbour],
     ) {
         let needs_more = course.following.as_ref().is_some_and(Following::needs_more);
         if let Some(waypoint) = course.waypoint.as_mut().filter(|_| needs_more && !self.is_under_way()) {
             self.extends = true;
-            self.prepare(false, waypoint, within, motion, map, neighbours);
+            self.prepare(in_the_way, waypoint, within, motion, map);
         }
     }
 
     fn prepare(
         &mut self,
-        is_stuck: bool,
+        InTheWay { is_stuck, minimum, neighbours, movers }: InTheWay<'_>,
         waypoint: &mut Waypoint,
         within: Region,
         motion: &Motion,
         map: &ClearanceMap,
-        neighbours: &[Neighbour],
     ) {
         self.within = within;
         // Outside the map, as beyond the fence, the way begins and ends where the map does.
@@ -157,8 +178,13 @@ impl Planning {
                 && (*disc - motion.position).xy().norm() > radius_m
         };
         let discs = standing.iter().filter(in_the_way).map(|&centre| Disc { centre, radius_m });
-        let discs = discs.chain(self.ghosts(neighbours, motion, [start, goal])).collect();
-        let potential = self.potential(&standing, motion, &goal);
+        let ends = [start, goal];
+        let in_its_way = movers.iter().filter(|_| is_stuck);
+        let in_its_way = in_its_way.filter_map(|mover| self.kept_clear_of(mover, motion, ends));
+        let minimum = minimum.and_then(|centre| beside(centre, MINIMUM_M, ends));
+        let discs =
+            discs.chain(self.ghosts(neighbours, motion, ends)).chain(in_its_way).chain(minimum).collect();
+        let potential = self.potential(&standing, movers, motion, &goal, map);
         let within = self.inside_fence(within, &goal);
         let Envelope { hull_m, margin_m, .. } = self.envelope;
         let task = Task { start, goal, potential, discs, within, hull_m, margin_m };
@@ -214,13 +240,30 @@ impl Planning {
         }
     }
 
-    /// What makes places near those who stand dearer, on the way ahead.
-    fn potential(&self, standing: &[Vector3<f64>], motion: &Motion, goal: &Vector3<f64>) -> Potential {
+    /// What makes places on the way ahead dearer: those who stand, and where everything repels also what moves, where
+    /// the vehicle would meet it, and the map.
+    fn potential(
+        &self,
+        standing: &[Vector3<f64>],
+        movers: &[separation::Neighbour],
+        motion: &Motion,
+        goal: &Vector3<f64>,
+        map: &ClearanceMap,
+    ) -> Potential {
         let heading = if motion.velocity.norm() > 0.3 { motion.velocity } else { goal - motion.position };
         let influence_m = 2.0 * self.envelope.separation_m;
-        let repellers: Vec<_> =
-            standing.iter().map(|&centre| PotentialObstacle { centre, influence_m }).collect();
-        Potential::gated(&motion.position, &heading, &repellers, 2.0)
+        let moving = movers.iter().filter(|_| self.potential.of_everything);
+        let met = moving.map(|mover| {
+            let meets_s = (mover.position - motion.position).norm() / self.envelope.cruise_m_s;
+            mover.position + mover.velocity * meets_s.min(FORESEEN_S)
+        });
+        let repellers: Vec<_> = standing
+            .iter()
+            .copied()
+            .chain(met)
+            .map(|centre| PotentialObstacle { centre, influence_m })
+            .collect();
+        Potential::felt(&motion.position, &heading, &repellers, map, &self.potential)
     }
 
     /// The places that silent neighbours may come to take. The ends of the path are outside in any case: the filter
@@ -234,14 +277,27 @@ impl Planning {
         let silent = neighbours.iter().filter(|neighbour| neighbour.armed && !neighbour.track.cooperative);
         silent.filter_map(move |neighbour| {
             let grown = separation::Neighbour { age_s: f64::INFINITY, ..neighbour.track };
-            let centre = neighbour.position();
-            let to_ends = ends.map(|end| (end - centre).xy().norm() - GHOST_SLACK_M);
-            let sigma_m = motion.position_sigma_m();
-            let kept_m = separation::distance_kept_m(sigma_m, &grown, &self.filter) + GHOST_SLACK_M;
-            let radius_m = to_ends.into_iter().fold(kept_m, f64::min);
-            (radius_m > 0.0).then_some(Disc { centre, radius_m })
+            self.kept_clear_of(&grown, motion, ends)
         })
     }
+
+    /// The distance that the filter keeps from somebody, as a place that no path leads through.
+    fn kept_clear_of(
+        &self,
+        other: &separation::Neighbour,
+        motion: &Motion,
+        ends: [Vector3<f64>; 2],
+    ) -> Option<Disc> {
+        let kept_m = separation::distance_kept_m(motion.position_sigma_m(), other, &self.filter);
+        beside(other.position, kept_m + GHOST_SLACK_M, ends)
+    }
+}
+
+/// A disc that is smaller where the ends of the path would lie in it.
+fn beside(centre: Vector3<f64>, radius_m: f64, ends: [Vector3<f64>; 2]) -> Option<Disc> {
+    let to_ends = ends.map(|end| (end - centre).xy().norm() - GHOST_SLACK_M);
+    let radius_m = to_ends.into_iter().fold(radius_m, f64::min);
+    (radius_m > 0.0).then_some(Disc { centre, radius_m })
 }
 
 /// What lies beyond the goal of a search for the way to a waypoint.

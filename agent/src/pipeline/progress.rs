@@ -2,17 +2,20 @@
 
 use std::time::Duration;
 
+use nalgebra::Vector3;
 use skein_planning::{
     Path,
-    local::escape::{EscapeConfig, EscapeDetector, Verdict},
+    local::escape::{EscapeConfig, EscapeDetector, Forces, Verdict},
     map::ClearanceMap,
     passage::{PIECE_M, PassageConfig, Piece, is_narrow_around, narrow_stretch},
+    separation,
 };
 
 use super::{
     allowed::Allowed,
     course::{Course, Following},
     headroom::Headroom,
+    patience::Patience,
 };
 use crate::{neighbours::Neighbour, positioning::Motion, report::Report, stretch::Stretch};
 
@@ -36,6 +39,25 @@ const WAY_OUT_M: f64 = 4.0;
 const QUEUES_M: f64 = 3.0;
 const QUEUES_FOR: Duration = Duration::from_secs(60);
 
+/// A local minimum is so far ahead of a vehicle that is held up by it, m.
+const MINIMUM_AHEAD_M: f64 = 1.0;
+
+/// What the vehicle feels on its way.
+#[derive(Clone, Copy, Debug)]
+pub struct Felt<'a> {
+    pub forces: Forces,
+    /// What moves and tells nobody.
+    pub movers: &'a [separation::Neighbour],
+}
+
+/// What is around the vehicle.
+#[derive(Clone, Copy, Debug)]
+pub struct Around<'a> {
+    pub map: &'a ClearanceMap,
+    pub neighbours: &'a [Neighbour],
+    pub felt: Felt<'a>,
+}
+
 /// Watches the vehicle on its course.
 #[derive(Debug)]
 pub struct Progress {
@@ -47,6 +69,9 @@ pub struct Progress {
     /// Since when another vehicle is in front of this one in a narrow place.
     queues_since: Option<Duration>,
     escape: EscapeDetector,
+    /// The local minimum that the last path led into.
+    minimum: Option<Vector3<f64>>,
+    patience: Patience,
 }
 
 impl Progress {
@@ -58,6 +83,8 @@ impl Progress {
             announced: Vec::new(),
             queues_since: None,
             escape: EscapeDetector::new(escape),
+            minimum: None,
+            patience: Patience::new(separation_m),
         }
     }
 
@@ -68,6 +95,18 @@ impl Progress {
     /// The flight is over.
     pub fn forget(&mut self) {
         self.announced.clear();
+        self.minimum = None;
+        self.patience.forget();
+    }
+
+    /// The local minimum that the last path led into, m ENU, told once.
+    pub fn take_minimum(&mut self) -> Option<Vector3<f64>> {
+        self.minimum.take()
+    }
+
+    /// Whether the vehicle waits for something that moves to leave its way.
+    pub fn waits(&self) -> bool {
+        self.patience.waits()
     }
 
     /// The share of the attraction that is left: 1, and less while a local minimum is escaped from.
@@ -84,8 +123,7 @@ impl Progress {
         course: &mut Course,
         (allowed, headroom): (&Allowed, Headroom),
         motion: &Motion,
-        map: &ClearanceMap,
-        neighbours: &[Neighbour],
+        &Around { map, neighbours, felt }: &Around<'_>,
     ) -> Vec<Report> {
         let mut reports = Vec::new();
         reports.extend(self.check_arrival(course, (allowed, headroom), motion, neighbours));
@@ -94,7 +132,7 @@ impl Progress {
         }
         reports.extend(self.check_passage(course.following.as_ref(), makes_way, motion, map));
         let moves_at = moves_at.filter(|now| !self.queues(*now, course, motion, map, neighbours));
-        reports.extend(self.check_progress(moves_at, course, motion));
+        reports.extend(self.check_progress(moves_at, course, motion, felt));
         reports
     }
 
@@ -197,14 +235,23 @@ impl Progress {
         moves_at: Option<Duration>,
         course: &Course,
         motion: &Motion,
+        felt: Felt<'_>,
     ) -> Option<Report> {
         if course.waypoint.is_none() || course.has_arrived {
             self.escape.reset();
+            self.patience.forget();
             return None;
         }
         let (now, following) = moves_at.zip(course.following.as_ref())?;
-        let verdict = self.escape.update(now, following.station_m, &motion.position);
-        (verdict == Verdict::Stuck).then_some(Report::Stuck)
+        if let Some(is_over) = self.patience.wait(now, following, motion, felt.movers) {
+            return is_over.then_some(Report::Stuck);
+        }
+        let verdict = self.escape.update(now, following.station_m, &motion.position, felt.forces);
+        if verdict == Verdict::Trapped {
+            let ahead = felt.forces.pull.try_normalize(1e-6).unwrap_or_else(Vector3::zeros);
+            self.minimum = Some(motion.position + ahead * MINIMUM_AHEAD_M);
+        }
+        matches!(verdict, Verdict::Stuck | Verdict::Trapped).then_some(Report::Stuck)
     }
 }
 

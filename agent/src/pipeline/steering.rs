@@ -8,6 +8,7 @@ use skein_mav::SetPoint;
 use skein_planning::{
     local::{
         apf, braking,
+        escape::Forces,
         moving::{MovingConfig, Tracker},
     },
     map::ClearanceMap,
@@ -49,6 +50,10 @@ pub struct Steering {
     follower: Box<dyn PathFollower>,
     /// Moving things that tell nobody where they are.
     moving: Tracker,
+    /// Those, as of the last set-point.
+    movers: Vec<separation::Neighbour>,
+    /// The forces on a vehicle that follows a path, as of the last set-point.
+    forces: Forces,
     repulsion: RepulsionConfig,
     filter: Box<dyn VelocityFilter>,
     pub hard_brakes: HardBrakes,
@@ -79,6 +84,8 @@ impl Steering {
             acceleration: Acceleration::default(),
             follower,
             moving,
+            movers: Vec::new(),
+            forces: Forces::default(),
             repulsion,
             filter,
             hard_brakes: HardBrakes::default(),
@@ -99,7 +106,19 @@ impl Steering {
         self.acceleration.forget();
         self.hover_at = None;
         self.settles_at = None;
+        self.movers.clear();
+        self.forces = Forces::default();
         self.follower.rest();
+    }
+
+    /// What moves and tells nobody where it is, as of the last set-point.
+    pub fn movers(&self) -> &[separation::Neighbour] {
+        &self.movers
+    }
+
+    /// The forces on a vehicle that follows a path, as of the last set-point; none on one that does not.
+    pub fn forces(&self) -> Forces {
+        self.forces
     }
 
     /// Every place that was placed by the vehicle's position moves with it, m.
@@ -108,6 +127,7 @@ impl Steering {
             *place += by;
         }
         self.moving = Tracker::new(MovingConfig::default());
+        self.movers.clear();
     }
 
     /// Takes in the obstacle points of a scan of `rays` rays that was taken at `stamp` and `origin`; metres ENU.
@@ -119,7 +139,7 @@ impl Steering {
         rays: usize,
         map: &ClearanceMap,
     ) {
-        self.moving.look(stamp, returns);
+        self.moving.look(stamp, returns, map);
         self.follower.look(origin, returns, rays, map.keep_out());
     }
 
@@ -140,14 +160,17 @@ impl Steering {
     ) -> SetPoint {
         let envelope = self.envelope;
         let part_of = |wish| allowed.part_of(wish, &motion.position, &envelope);
+        self.movers.clear();
+        self.movers.extend(self.moving.moving(now));
+        self.forces.pull = Vector3::zeros();
         let wish = match (self.settles_at, lead) {
             (Some(place), _) => self.aside(place, motion),
             (None, Some(lead)) => part_of(self.along_path(lead, motion, allowed, surroundings)),
             (None, None) => part_of(self.keep_station(motion, surroundings.map)),
         };
-        let unheard = self.moving.moving(now, surroundings.map);
-        let others: Vec<_> = surroundings.neighbours.iter().copied().chain(unheard).collect();
+        let others: Vec<_> = surroundings.neighbours.iter().chain(&self.movers).copied().collect();
         let push = repulsion(&motion.position, &wish.velocity, &others, &self.repulsion);
+        self.forces.net = wish.velocity + push;
         let is_level = (wish.height_m - motion.position.z).abs() < PLANAR_BAND_M;
         let Envelope { cruise_m_s, climb_m_s, .. } = self.envelope;
         let mut desired = apf::limited(wish.velocity + push, cruise_m_s);
@@ -198,6 +221,7 @@ impl Steering {
         let place = Place { path, station_m: *station_m, position: &motion.position };
         let step = self.follower.follow(&place, cap_m_s.min(allowed.speed_m_s), attraction, map);
         *station_m = step.station_m;
+        self.forces.pull = step.pull;
         Wish { velocity: step.velocity, height_m: step.carrot.z }
     }
 

@@ -86,7 +86,7 @@ pub fn fly(
         speed: args.speed,
         sessions: [vehicles, ground],
         console,
-        scene: Some(scene_view::view(&scenario.scene)),
+        scene_due: Some(Duration::ZERO),
         ports: ports.ok(),
     })
 }
@@ -108,8 +108,8 @@ struct RealTime {
     speed: f64,
     sessions: [ZenohSession; 2],
     console: Console,
-    /// Until it has been shown.
-    scene: Option<skein_wire::Scene>,
+    /// When the scene is shown; once if nothing of it moves.
+    scene_due: Option<Duration>,
     ports: Option<MavlinkPorts>,
 }
 
@@ -132,8 +132,10 @@ impl Host for RealTime {
                 ports.send(index, bytes);
             }
         }
-        if let Some(scene) = self.scene.take() {
-            self.console.show_scene(swarm.ground(), Some(&scene));
+        if self.scene_due.is_some_and(|due| swarm.now() >= due) {
+            let scene = swarm.simulation().scene();
+            self.console.show_scene(swarm.ground(), Some(&scene_view::view(scene)));
+            self.scene_due = scene.moving().next().map(|_| swarm.now() + scene_view::MOVING_PERIOD);
         }
         if happenings.ticked {
             self.console.publish(swarm.now(), swarm.ground(), &happenings.selections);

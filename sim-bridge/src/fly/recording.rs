@@ -22,6 +22,7 @@ pub struct Recording {
     recorder: Recorder,
     names: Vec<String>,
     paths_due: Duration,
+    scene_due: Duration,
 }
 
 impl Recording {
@@ -42,7 +43,7 @@ impl Recording {
         recorder.vehicles(Duration::ZERO, &hulls)?;
         let line = format!("{} with {} vehicles, seed {}", scenario.name, names.len(), scenario.seed);
         recorder.log(Duration::ZERO, Level::Info, "skein-sim", &line)?;
-        Ok(Self { recorder, names, paths_due: Duration::ZERO })
+        Ok(Self { recorder, names, paths_due: Duration::ZERO, scene_due: scene_view::MOVING_PERIOD })
     }
 
     /// Records one step of the swarm.
@@ -60,6 +61,11 @@ impl Recording {
             self.poses(swarm)?;
             self.events(now, happenings)?;
             self.told(now, swarm.ground())?;
+        }
+        let scene = swarm.simulation().scene();
+        if now >= self.scene_due && scene.moving().next().is_some() {
+            self.scene_due = now + scene_view::MOVING_PERIOD;
+            self.recorder.scene(now, &scene_view::view(scene).solids)?;
         }
         if now >= self.paths_due {
             self.paths_due = now + PATH_PERIOD;

@@ -37,6 +37,11 @@ pub fn point<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vector3<f64>,
     finite::<D::Error>(values).map(Vector3::from)
 }
 
+/// The same, where the field is given.
+pub fn optional_point<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vector3<f64>>, D::Error> {
+    point(deserializer).map(Some)
+}
+
 /// Two finite coordinates, east and north: a place on the ground.
 pub fn ground_point<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vector3<f64>, D::Error> {
     let [x, y] = <[f64; 2]>::deserialize(deserializer)?;

@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AirspaceTable, GlobalPlanner, LocalPlanner, Nose, Planners};
+use skein_agent::{AirspaceTable, GlobalPlanner, LocalPlanner, Nose, Planners, Repellers};
 use skein_bp::behaviour::{Behaviours, Settings};
 use skein_bp::configuration::{self, Malformed};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
@@ -23,9 +23,11 @@ use super::forest::Forest;
 use super::formation::Formation;
 use super::layout::Layout;
 use super::mountain;
+use super::moving::{self, Moves};
 use super::open::Open;
 use super::position_error::{PositionErrorTable, PositionFaultTable};
 use super::targets::{PacedRoute, Targets};
+use super::walker::Walker;
 use super::window::Window;
 use super::{
     DEFAULT_TIME_LIMIT_S, Network, Order, Scenario, ScenarioError, VehiclePlan, VehicleScript, Who,
@@ -65,6 +67,7 @@ struct FileTable {
     local: LocalPlanner,
     #[serde(default)]
     nose: Nose,
+    potential: Repellers,
     #[serde(default, deserialize_with = "field::optional_positive")]
     takeoff_height_m: Option<f64>,
     #[serde(default, deserialize_with = "field::optional_positive")]
@@ -101,6 +104,8 @@ struct FileTable {
     vehicle: Vec<VehicleTable>,
     #[serde(default)]
     obstacle: Vec<ObstacleTable>,
+    #[serde(default)]
+    walker: Vec<Walker>,
 }
 
 /// Makes world and routes from the seed.
@@ -191,6 +196,28 @@ struct ObstacleTable {
     sphere: Option<SphereTable>,
     #[serde(default = "white", deserialize_with = "field::reflectivity")]
     reflectivity: f64,
+    #[serde(default, deserialize_with = "field::optional_point")]
+    velocity_m_s: Option<Vector3<f64>>,
+    #[serde(default, deserialize_with = "field::points")]
+    waypoints_m: Vec<Vector3<f64>>,
+    #[serde(default, deserialize_with = "moving::speeds")]
+    speed_m_s: Option<Vec<f64>>,
+    #[serde(default, deserialize_with = "moving::waits")]
+    waits_s: Option<Vec<f64>>,
+    #[serde(default)]
+    loops: bool,
+}
+
+impl ObstacleTable {
+    fn moves(&self) -> Moves {
+        Moves {
+            velocity_m_s: self.velocity_m_s,
+            waypoints_m: self.waypoints_m.clone(),
+            speed_m_s: self.speed_m_s.clone(),
+            waits_s: self.waits_s.clone(),
+            loops: self.loops,
+        }
+    }
 }
 
 /// What sends back all light.
@@ -260,6 +287,7 @@ impl ScenarioFile {
         let time_limit_s = self.time_limit_s(count.saturating_sub(self.count(None, set.missions.len())));
         let (cruise_speed_m_s, takeoff_height_m) = (self.cruise_speed_m_s(), self.takeoff_height_m());
         let table = self.table;
+        let walkers = table.walker;
         let mut scenario = Scenario {
             name,
             about: table.about.unwrap_or_default(),
@@ -270,7 +298,12 @@ impl ScenarioFile {
             vehicles: plans,
             muster: table.formation.is_some() || table.targets.is_some(),
             cruise_speed_m_s,
-            planners: Planners { global: table.global, local: table.local, nose: table.nose },
+            planners: Planners {
+                global: table.global,
+                local: table.local,
+                nose: table.nose,
+                potential: table.potential,
+            },
             takeoff_height_m,
             without_ground: table.without_ground,
             time_limit_s,
@@ -288,6 +321,7 @@ impl ScenarioFile {
             }
         }
         scenario.fly(set)?;
+        scenario.walk(&walkers);
         Ok(scenario)
     }
 
@@ -578,7 +612,11 @@ impl ScenarioFile {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), table.yaw_rad);
         let name = table.name.clone().unwrap_or_else(|| format!("obstacle {}", index + 1));
         let pose = Isometry3::from_parts(table.centre_m.into(), turn);
-        Ok(Obstacle { reflectivity: table.reflectivity, ..Obstacle::new(name, shape, pose) })
+        let way = table
+            .moves()
+            .way(table.centre_m)
+            .map_err(|(field, message)| self.contradiction(format!("obstacle[{index}].{field}"), message))?;
+        Ok(Obstacle { reflectivity: table.reflectivity, way, ..Obstacle::new(name, shape, pose) })
     }
 
     fn orders(&self, vehicles: usize) -> Result<Vec<Order>, ScenarioError> {

@@ -14,10 +14,12 @@ mod formation;
 mod layout;
 mod missions;
 mod mountain;
+mod moving;
 mod open;
 mod placement;
 mod position_error;
 mod targets;
+mod walker;
 mod window;
 
 use std::path::{Path, PathBuf};
@@ -39,6 +41,7 @@ pub use error::ScenarioError;
 pub use layout::SPACING_M;
 pub use missions::apply_missions;
 
+use self::walker::Walker;
 use crate::autopilots::make::Make;
 use crate::mission::{self, MissionSet};
 
@@ -302,6 +305,20 @@ impl Scenario {
         }
         self.airspace.include(set.airspace);
         if set.missions.is_empty() { Ok(()) } else { apply_missions(self, set.missions) }
+    }
+
+    /// Lets people walk through the world.
+    fn walk(&mut self, walkers: &[Walker]) {
+        let pads: Vec<_> = self.vehicles.iter().flat_map(|vehicle| [vehicle.start, vehicle.goal()]).collect();
+        let mut people = Vec::new();
+        for walker in walkers {
+            people.extend(walker.people(people.len(), &self.scene, &pads, self.seed));
+        }
+        let wanted: usize = walkers.iter().map(|walker| walker.number).sum();
+        if people.len() < wanted {
+            self.notes.push(format!("{} of {wanted} walkers have room to walk", people.len()));
+        }
+        self.scene = self.scene.clone().with_more(people);
     }
 
     /// Moves each start and goal that stands too near an obstacle to the nearest clear place, and notes it.

@@ -1,6 +1,6 @@
 //! The simulated world: obstacles, vehicles, sensors, the built-in autopilot and collision truth.
 //!
-//! A [`Scene`] is the fixed part, built in code or read from a Gazebo world
+//! A [`Scene`] is what stands or moves there whatever the vehicles do, built in code or read from a Gazebo world
 //! ([`Scene::from_sdf`]) or a table of boxes ([`Scene::from_csv`]). A [`VehicleModel`] describes a
 //! kind of quadrotor. A [`Simulation`] puts vehicles into a scene and moves everything on in steps
 //! of 4 ms: dynamics with rotor lag, drag and wind; noisy instruments; a planar lidar; an autopilot
@@ -56,6 +56,7 @@ pub mod sensors;
 pub mod simulation;
 pub mod truth;
 pub mod vehicle;
+pub mod way;
 pub mod wind;
 
 pub use aabb::Aabb;
@@ -72,4 +73,5 @@ pub use simulation::{Simulation, SimulationConfig, VehicleSetup, VehicleState};
 pub use skein_mav::Battery;
 pub use truth::Truth;
 pub use vehicle::{ControlModel, PositionIntegral, VehicleError, VehicleModel};
+pub use way::{Stop, Way};
 pub use wind::{Wind, WindConfig};

@@ -1,10 +1,12 @@
-//! Solid bodies that stand in a world.
+//! Solid bodies that stand in a world, or move through it.
 
 use std::f64::consts::TAU;
+use std::time::Duration;
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use crate::aabb::Aabb;
+use crate::way::Way;
 
 /// The form of an obstacle in its own frame, metres, centred on its origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,23 +147,25 @@ impl Interval {
     }
 }
 
-/// A solid body at a fixed place in the world.
+/// A solid body in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
     /// Its name in the world file; for messages, not unique.
     pub name: String,
     /// Its form in its own frame.
     pub shape: Shape,
-    /// Own frame to world ENU, metres.
+    /// Own frame to world ENU, metres; of one that moves, where it is now.
     pub pose: Isometry3<f64>,
     /// Share of light that it sends back, 0 (black) to 1 (white): how far a lidar sees it.
     pub reflectivity: f64,
+    /// The way of one that moves, without turning; `None` of one that stands.
+    pub way: Option<Way>,
 }
 
 impl Obstacle {
-    /// A white obstacle.
+    /// A white obstacle that stands.
     pub fn new(name: impl Into<String>, shape: Shape, pose: Isometry3<f64>) -> Self {
-        Self { name: name.into(), shape, pose, reflectivity: 1.0 }
+        Self { name: name.into(), shape, pose, reflectivity: 1.0, way: None }
     }
 
     /// An upright cylinder that stands on the ground (z = 0) at `(x, y)`: a tree trunk, a pole.
@@ -174,6 +178,20 @@ impl Obstacle {
     pub fn block(name: impl Into<String>, centre: Vector3<f64>, size: Vector3<f64>) -> Self {
         let shape = Shape::Box { half_extents: size / 2.0 };
         Self::new(name, shape, Isometry3::translation(centre.x, centre.y, centre.z))
+    }
+
+    /// The same on its way, as it is at the beginning of a run.
+    #[must_use]
+    pub fn on(mut self, way: Way) -> Self {
+        self.pose.translation.vector = way.at(Duration::ZERO);
+        Self { way: Some(way), ..self }
+    }
+
+    /// Moves it to where it is so long after the run began.
+    pub(crate) fn move_on(&mut self, now: Duration) {
+        if let Some(way) = &self.way {
+            self.pose.translation.vector = way.at(now);
+        }
     }
 
     /// Distance from `point` (world) to the surface, negative inside.

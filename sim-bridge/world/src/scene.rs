@@ -1,4 +1,6 @@
-//! A world's fixed part: obstacles, ground, bounds, datum.
+//! A world without its vehicles: obstacles, ground, bounds, datum.
+
+use std::time::Duration;
 
 use nalgebra::{Point3, Vector3};
 use skein_mav::Datum;
@@ -54,6 +56,13 @@ impl Scene {
         self
     }
 
+    /// The same scene with more obstacles, in the same bounds.
+    pub fn with_more(mut self, obstacles: impl IntoIterator<Item = Obstacle>) -> Self {
+        self.obstacles.extend(obstacles);
+        self.reaches = self.obstacles.iter().map(|obstacle| obstacle.shape.bounding_radius()).collect();
+        self
+    }
+
     /// The same scene at another place on Earth.
     pub fn with_datum(mut self, datum: Datum) -> Self {
         self.datum = datum;
@@ -67,6 +76,16 @@ impl Scene {
     /// All obstacles, in the order of the file they came from.
     pub fn obstacles(&self) -> &[Obstacle] {
         &self.obstacles
+    }
+
+    /// Those that move.
+    pub fn moving(&self) -> impl Iterator<Item = &Obstacle> {
+        self.obstacles.iter().filter(|obstacle| obstacle.way.is_some())
+    }
+
+    /// Moves what moves to where it is so long after the run began.
+    pub fn move_on(&mut self, now: Duration) {
+        self.obstacles.iter_mut().for_each(|obstacle| obstacle.move_on(now));
     }
 
     /// The space for flights; leaving it counts as a collision.

@@ -130,6 +130,7 @@ impl Simulation {
                 self.referee.count_hard_landing();
             }
         }
+        self.scene.move_on(after);
         self.judge();
         self.hulls.clear();
         self.hulls.extend(self.vehicles.iter().map(|vehicle| hull_of(&vehicle.quadrotor)));
@@ -145,7 +146,7 @@ impl Simulation {
         Duration::from_millis(self.tick * STEP.as_millis() as u64)
     }
 
-    /// The world's fixed part.
+    /// The world without its vehicles, as it is now.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -211,7 +212,7 @@ impl Simulation {
     fn judge(&mut self) {
         let players: Vec<Player> =
             self.vehicles.iter().map(|vehicle| player_of(&vehicle.quadrotor)).collect();
-        for index in self.referee.judge(&players) {
+        for index in self.referee.judge(&players, &self.scene) {
             if let Some(vehicle) = self.vehicles.get_mut(index) {
                 vehicle.quadrotor.wreck();
             }

@@ -39,6 +39,7 @@ pub(crate) struct Player {
 #[derive(Clone)]
 pub(crate) struct Referee {
     truth: Truth,
+    /// Those that stand.
     solids: Solids,
     bounds: Aabb,
     watches: Vec<Watch>,
@@ -67,7 +68,7 @@ impl Referee {
             .collect();
         Self {
             truth: Truth::default(),
-            solids: Solids::new(scene.obstacles()),
+            solids: Solids::new(scene.obstacles().iter().filter(|obstacle| obstacle.way.is_none())),
             bounds: *scene.bounds(),
             watches,
             touching: vec![false; players.len() * players.len().saturating_sub(1) / 2],
@@ -84,10 +85,12 @@ impl Referee {
     }
 
     /// Judges one moment and names the vehicles that crashed in it.
-    pub(crate) fn judge(&mut self, players: &[Player]) -> Vec<usize> {
+    pub(crate) fn judge(&mut self, players: &[Player], scene: &Scene) -> Vec<usize> {
         let mut crashed = Vec::new();
+        let moving = Solids::new(scene.moving());
         for (index, player) in players.iter().enumerate() {
-            if self.judge_obstacles(index, player) {
+            let hits_moving = self.judge_moving(&moving, player);
+            if self.judge_obstacles(index, player) || hits_moving {
                 crashed.push(index);
             }
         }
@@ -103,7 +106,26 @@ impl Referee {
         crashed
     }
 
-    /// Whether the vehicle has just run into an obstacle.
+    /// Whether the vehicle and something that moves have just met.
+    fn judge_moving(&mut self, moving: &Solids, player: &Player) -> bool {
+        if !player.airborne || player.wrecked {
+            return false;
+        }
+        let distance_m = moving.distance(&player.hull.centre);
+        distance_m.is_some_and(|distance_m| self.note_clearance(distance_m - player.hull.radius_m))
+    }
+
+    /// Takes in the clearance of a hull, m; tells whether that is a collision.
+    fn note_clearance(&mut self, clearance_m: f64) -> bool {
+        let clearance_m = clearance_m.max(0.0);
+        let known_m = self.truth.min_clearance_m.unwrap_or(f64::INFINITY);
+        self.truth.min_clearance_m = Some(known_m.min(clearance_m));
+        let hit = clearance_m == 0.0;
+        self.truth.collisions_obstacle += u32::from(hit);
+        hit
+    }
+
+    /// Whether the vehicle has just run into an obstacle that stands.
     fn judge_obstacles(&mut self, index: usize, player: &Player) -> bool {
         let Some(watch) = self.watches.get_mut(index) else {
             return false;
@@ -131,11 +153,7 @@ impl Referee {
             return false;
         };
         watch.clearance_at_least_m = clearance_m;
-        let hull_clearance_m = (clearance_m - radius_m).max(0.0);
-        self.truth.min_clearance_m = Some(known_m.min(hull_clearance_m));
-        let hit = hull_clearance_m == 0.0;
-        self.truth.collisions_obstacle += u32::from(hit);
-        hit
+        self.note_clearance(clearance_m - radius_m)
     }
 
     /// Whether the two vehicles have just run into each other.
@@ -167,9 +185,9 @@ struct Solids {
 }
 
 impl Solids {
-    fn new(obstacles: &[Obstacle]) -> Self {
+    fn new<'a>(obstacles: impl Iterator<Item = &'a Obstacle>) -> Self {
         let (planes, bodies): (Vec<_>, Vec<_>) =
-            obstacles.iter().partition(|obstacle| matches!(obstacle.shape, Shape::Plane { .. }));
+            obstacles.partition(|obstacle| matches!(obstacle.shape, Shape::Plane { .. }));
         let parts = |obstacles: Vec<&Obstacle>| obstacles.into_iter().map(parry_shape).collect();
         let bodies: Vec<_> = parts(bodies);
         Self { bodies: (!bodies.is_empty()).then(|| Compound::new(bodies)), planes: parts(planes) }

@@ -6,7 +6,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use skein_wire::Scan;
 use skein_world::{
     MotorCommands, Obstacle, PositionErrors, RigidState, Scene, SensorReadings, Simulation, SimulationConfig,
-    VehicleModel, VehicleSetup, WindConfig,
+    VehicleModel, VehicleSetup, Way, WindConfig,
 };
 
 fn simulation(obstacles: Vec<Obstacle>, places: &[[f64; 3]], seed: u64) -> Simulation {
@@ -273,4 +273,25 @@ fn an_index_without_a_vehicle_is_no_vehicle() {
     run(&mut simulation, 0.1);
     assert!(simulation.vehicle(3).is_none() && simulation.readings(3).is_none());
     assert_eq!(simulation.truth(), Default::default());
+}
+
+#[test]
+fn what_moves_is_seen_and_met_where_it_is() {
+    let cart = |speed_m_s: f64| {
+        let cart = Obstacle::trunk("cart", 10.0, 0.0, 0.5, 4.0);
+        let from = cart.pose.translation.vector;
+        cart.on(Way::straight(from, Vector3::new(-speed_m_s, 0.0, 0.0)))
+    };
+    let mut simulation = simulation(vec![cart(2.0)], &[[0.0, 0.0, 0.0]], 1);
+    simulation.drive(0, hover());
+    simulation.place(0, flying([0.0, 0.0, 2.0], [0.0; 3]));
+    run(&mut simulation, 2.0);
+    let seen =
+        simulation.take_scans().into_iter().last().and_then(|(_, scan)| scan.ranges_m.get(360).copied());
+    assert!(seen.is_some_and(|ahead| (ahead - 5.5).abs() < 0.4), "{seen:?}");
+    let clearance_m = simulation.truth().min_clearance_m.unwrap_or(f64::INFINITY);
+    assert!((clearance_m - 5.25).abs() < 0.2, "{clearance_m}");
+    run(&mut simulation, 3.0);
+    assert_eq!(simulation.truth().collisions_obstacle, 1, "it has driven into the vehicle");
+    assert!(simulation.vehicle(0).is_some_and(|vehicle| vehicle.crashed));
 }

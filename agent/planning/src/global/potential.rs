@@ -2,7 +2,10 @@
 
 use nalgebra::Vector3;
 
-/// An obstacle that repels: a standing vehicle, or a part of the map.
+use super::map_field::MapField;
+use crate::map::ClearanceMap;
+
+/// A round obstacle that repels: a vehicle that stands, or something that moves, where they will meet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PotentialObstacle {
     /// Centre (ENU, metres).
@@ -15,39 +18,84 @@ pub struct PotentialObstacle {
 ///
 /// `U(n) = sum 1/2 eta (1/rho - 1/r)^2` over the obstacles within whose radius of influence `r` the place `n`
 /// lies, `rho` being its distance from the obstacle (Wang 2023, A* combined with APF; the form of `U` is the
-/// usual one). The value is a cost per metre of path.
+/// usual one). Of what the map knows, `rho` counts from the skin, and an obstacle is what hangs together. The value is
+/// a cost per metre of path.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Potential {
     obstacles: Vec<PotentialObstacle>,
+    map: MapField,
     gain: f64,
+}
+
+/// What repels a vehicle, and how much.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PotentialConfig {
+    /// `eta`, metres squared; 0 for no potential.
+    pub gain: f64,
+    /// Whether what moves and what the map knows repel too, not only vehicles that stand.
+    pub of_everything: bool,
+    /// `r` of what the map knows, from its skin, metres.
+    pub map_influence_m: f64,
+    /// The map repels within this distance of the vehicle, metres.
+    pub map_reach_m: f64,
+    /// Whether only that repels which the vehicle is heading for.
+    pub is_gated: bool,
+}
+
+impl Default for PotentialConfig {
+    fn default() -> Self {
+        PotentialConfig {
+            gain: 2.0,
+            of_everything: false,
+            map_influence_m: 2.0,
+            map_reach_m: 12.0,
+            is_gated: true,
+        }
+    }
 }
 
 /// Distance below which the potential grows no more, metres: it would be infinite at the centre.
 const CORE_M: f64 = 0.1;
+/// Between two places of a straight way at which the potential is looked up, metres.
+const STEP_M: f64 = 0.1;
 
 impl Potential {
-    /// The potential, with gain `eta` (metres squared), of those `obstacles` in whose field a vehicle at
-    /// `position` is that heads along `heading`.
-    pub fn gated(
+    /// The potential of those `obstacles` in whose field a vehicle at `position` is that heads along `heading`, and of
+    /// the parts of the `map` that are so, where everything repels.
+    pub fn felt(
         position: &Vector3<f64>,
         heading: &Vector3<f64>,
         obstacles: &[PotentialObstacle],
-        gain: f64,
+        map: &ClearanceMap,
+        config: &PotentialConfig,
     ) -> Potential {
-        let in_field = |obstacle: &&PotentialObstacle| {
-            is_in_field(heading, &(obstacle.centre - position), obstacle.influence_m)
+        let PotentialConfig { gain, of_everything, map_influence_m, map_reach_m, is_gated } = *config;
+        if gain <= 0.0 {
+            return Potential::default();
+        }
+        let repels =
+            |offset: &Vector3<f64>, influence_m: f64| !is_gated || is_in_field(heading, offset, influence_m);
+        let is_felt =
+            |obstacle: &&PotentialObstacle| repels(&(obstacle.centre - position), obstacle.influence_m);
+        let obstacles = obstacles.iter().filter(is_felt).copied().collect();
+        let map = if of_everything {
+            MapField::of(map, position, [map_reach_m, map_influence_m], |offset| {
+                repels(offset, map_influence_m)
+            })
+        } else {
+            MapField::default()
         };
-        Potential { obstacles: obstacles.iter().filter(in_field).copied().collect(), gain }
+        Potential { obstacles, map, gain }
     }
 
     /// Whether it is zero everywhere.
     pub fn is_zero(&self) -> bool {
-        self.obstacles.is_empty() || self.gain <= 0.0
+        (self.obstacles.is_empty() && self.map == MapField::default()) || self.gain <= 0.0
     }
 
     /// `U` at a place.
     pub fn at(&self, place: &Vector3<f64>) -> f64 {
-        let mut sum = 0.0;
+        let mut sum = 0.5 * self.gain * self.map.at(place);
         for obstacle in &self.obstacles {
             let rho = (place - obstacle.centre).norm().max(CORE_M);
             if rho < obstacle.influence_m {
@@ -56,6 +104,19 @@ impl Potential {
             }
         }
         sum
+    }
+}
+
+impl Potential {
+    /// What a straight way costs: its length, and `U` along it, metres.
+    pub fn along(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
+        let length_m = (to - from).norm();
+        if self.is_zero() {
+            return length_m;
+        }
+        let steps = (length_m / STEP_M).ceil().max(1.0);
+        let middles = (0..steps as usize).map(|step| from.lerp(to, (step as f64 + 0.5) / steps));
+        length_m + middles.map(|place| self.at(&place)).sum::<f64>() * length_m / steps
     }
 }
 
@@ -91,6 +152,7 @@ pub fn is_in_field(heading: &Vector3<f64>, offset: &Vector3<f64>, influence_m: f
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::VoxelMapConfig;
 
     #[test]
     fn the_gate_opens_at_the_critical_angle() {
@@ -108,12 +170,58 @@ mod tests {
         );
     }
 
+    /// A pole at (0.1, 0.1) in an open field.
+    fn pole() -> ClearanceMap {
+        let mut map = open();
+        map.insert(&Vector3::new(0.1, 0.1, 3.1));
+        map
+    }
+
+    fn open() -> ClearanceMap {
+        ClearanceMap::new(VoxelMapConfig::default(), Vector3::new(0.0, 0.0, 5.0), 2.5).unwrap()
+    }
+
+    fn felt(heading: Vector3<f64>, map: &ClearanceMap, config: PotentialConfig) -> Potential {
+        let obstacle = PotentialObstacle { centre: Vector3::new(0.0, 20.0, 3.1), influence_m: 2.0 };
+        Potential::felt(&Vector3::new(-5.1, 0.1, 3.1), &heading, &[obstacle], map, &config)
+    }
+
     #[test]
     fn the_potential_is_the_papers() {
         let obstacle = PotentialObstacle { centre: Vector3::zeros(), influence_m: 2.0 };
-        let potential = Potential::gated(&Vector3::new(-5.0, 0.0, 0.0), &Vector3::x(), &[obstacle], 3.0);
+        let config = PotentialConfig { gain: 3.0, ..PotentialConfig::default() };
+        let heading_for = |heading: Vector3<f64>| {
+            Potential::felt(&Vector3::new(-5.0, 0.0, 0.0), &heading, &[obstacle], &open(), &config)
+        };
+        let potential = heading_for(Vector3::x());
         assert!((potential.at(&Vector3::new(1.0, 0.0, 0.0)) - 0.5 * 3.0 * 0.25).abs() < 1e-12);
         assert_eq!(potential.at(&Vector3::new(2.0, 0.0, 0.0)), 0.0);
-        assert!(Potential::gated(&Vector3::new(-5.0, 0.0, 0.0), &-Vector3::x(), &[obstacle], 3.0).is_zero());
+        assert!(heading_for(-Vector3::x()).is_zero());
+    }
+
+    #[test]
+    fn what_the_map_knows_repels_from_its_skin_where_it_is_headed_for() {
+        let everything = PotentialConfig { of_everything: true, ..PotentialConfig::default() };
+        let ahead = felt(Vector3::x(), &pole(), everything);
+        // A metre from the middle of the pole's voxel, nine tenths from its skin.
+        let there = Vector3::new(0.1, 1.1, 3.1);
+        assert!((ahead.at(&there) - (1.0 / 0.9 - 0.5_f64).powi(2)).abs() < 1e-9, "{}", ahead.at(&there));
+        assert_eq!(ahead.at(&Vector3::new(0.1, 2.5, 3.1)), 0.0);
+        assert_eq!(felt(Vector3::y(), &pole(), everything).at(&there), 0.0, "it passes by");
+        let ungated = PotentialConfig { is_gated: false, ..everything };
+        assert!(felt(Vector3::y(), &pole(), ungated).at(&there) > 0.0);
+        assert_eq!(felt(Vector3::x(), &pole(), PotentialConfig::default()).at(&there), 0.0);
+    }
+
+    #[test]
+    fn of_two_poles_the_sum_is_felt_and_of_one_obstacle_only_its_nearest_part() {
+        let everything = PotentialConfig { of_everything: true, ..PotentialConfig::default() };
+        let at_middle = |places: &[f64]| {
+            let mut map = open();
+            places.iter().for_each(|y| map.insert(&Vector3::new(0.1, *y, 3.1)));
+            felt(Vector3::x(), &map, everything).at(&Vector3::new(0.1, 1.1, 3.1))
+        };
+        assert!((at_middle(&[0.1, 2.1]) - 2.0 * at_middle(&[0.1])).abs() < 1e-9);
+        assert!((at_middle(&[0.1, -0.1, -0.3]) - at_middle(&[0.1])).abs() < 1e-9);
     }
 }

@@ -44,6 +44,8 @@ pub struct Guidance {
     pub station_m: f64,
     /// Its distance from the path, metres.
     pub off_path_m: f64,
+    /// The attractive part of the velocity.
+    pub attraction: Vector3<f64>,
     /// The repulsive part of the velocity, before the speed was limited.
     pub repulsion: Vector3<f64>,
 }
@@ -83,6 +85,7 @@ pub fn follow(
         carrot,
         station_m: here.station_m,
         off_path_m: here.distance_m,
+        attraction: attract,
         repulsion,
     }
 }

@@ -183,6 +183,9 @@ struct Limit {
 /// >= 0` against what stands or cooperates: there is a feasible velocity as long as distances have been kept. What is
 /// flown beyond `t` of lag, below `a` of braking and outside the position errors is not covered.
 ///
+/// Something that comes nearer and does not keep its distance may leave no velocity that can be had in time, nor be kept
+/// by braking: then the vehicle gives way as fast as it can.
+///
 /// When no velocity is feasible, limits are relaxed in this order, each by as little as possible and equally:
 /// those of neighbours (obstacles do not give way), then all. The caller should climb or land by rank. If the
 /// input is not finite, the velocity is zero.
@@ -420,9 +423,22 @@ fn choose<const D: usize>(
         .collect();
     let (velocity, outcome) = relax(wanted, &ahead, config, nearest);
     let reached = now + shortened(velocity - now, change_m_s);
+    let braked = now - shortened(now, change_m_s);
+    let excess = |velocity: &Vector<D>| worst(limits, velocity).map_or(0.0, |(excess, _)| excess);
+    let into_obstacles = |velocity: &Vector<D>| {
+        let obstacles = limits.iter().filter(|(_, cause)| !matches!(cause, Cause::Neighbour(_)));
+        obstacles.map(|(space, _)| space.excess(velocity)).fold(0.0, f64::max)
+    };
+    // Whoever must give way to something that comes nearer does not do so by standing still; but it does so into
+    // nothing that stands.
+    let serves = |by: f64| {
+        excess(&Vector::zeros()) <= TOLERANCE_M_S
+            || excess(&braked) < by
+            || into_obstacles(&braked) + TOLERANCE_M_S < into_obstacles(&reached)
+    };
     match worst(limits, &reached) {
-        Some((excess, cause)) if excess > TOLERANCE_M_S && matches!(outcome, Outcome::Limited(_)) => {
-            (now - shortened(now, change_m_s), Outcome::Limited(cause))
+        Some((by, cause)) if by > TOLERANCE_M_S && matches!(outcome, Outcome::Limited(_)) && serves(by) => {
+            (braked, Outcome::Limited(cause))
         }
         _ => (velocity, outcome),
     }
@@ -462,7 +478,7 @@ fn relax<const D: usize>(
     let Some((most, by)) = worst(limits, &Vector::zeros()) else { return (Vector::zeros(), Outcome::Clear) };
     // Standing still violates no limit by more than `most`, so relaxing by a little more must succeed.
     let most = most.max(0.0) + 1e-6;
-    let least = |solve: &dyn Fn(f64) -> Option<Vector<D>>| -> Option<(Vector<D>, f64)> {
+    let least = |most: f64, solve: &dyn Fn(f64) -> Option<Vector<D>>| -> Option<(Vector<D>, f64)> {
         let mut found = (solve(most)?, most);
         let mut infeasible = 0.0;
         for _ in 0..24 {
@@ -474,7 +490,12 @@ fn relax<const D: usize>(
         }
         Some(found)
     };
-    let found = least(&|by| relaxed(by, 0.0)).or_else(|| least(&|by| relaxed(by, by)));
+    let neighbours_give = |by: f64| relaxed(by, 0.0);
+    // Where standing still is too near to an obstacle, it is left, though into neighbours: relaxed by this they count
+    // for nothing.
+    let found = least(most, &neighbours_give)
+        .or_else(|| least(most + 2.0 * radius, &neighbours_give))
+        .or_else(|| least(most, &|by| relaxed(by, by)));
     let (velocity, excess_m_s) = found.unwrap_or((Vector::zeros(), most));
     (velocity, Outcome::Infeasible { by, excess_m_s })
 }

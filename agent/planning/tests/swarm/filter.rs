@@ -198,3 +198,33 @@ fn a_vehicle_that_cannot_cease_to_accelerate_at_once_begins_to_brake_sooner() {
         assert!(room_m != 3.4 || left_m(None) < -0.05, "it makes no difference");
     }
 }
+
+#[test]
+fn who_is_walked_up_to_gives_way_however_late_it_is_seen() {
+    let config = FilterConfig::default();
+    for distance_m in [2.0, 1.5, 1.0, 0.7] {
+        let comes = Neighbour {
+            velocity: Vector3::new(-1.5, 0.0, 0.0),
+            cooperative: false,
+            ..neighbour([distance_m, 0.0, 3.0], 0.0)
+        };
+        let filtered = filter(&hovering(Vector3::x()), &[comes], &[], &config);
+        assert!(filtered.velocity.x < -0.3, "at {distance_m} m: {filtered:?}");
+    }
+}
+
+#[test]
+fn who_is_squeezed_against_a_pillar_is_not_pushed_into_it() {
+    let config = FilterConfig::default();
+    let pillar = [Vector3::new(-0.3, 0.0, 3.0)];
+    for distance_m in [1.0, 0.8, 0.6] {
+        let comes = Neighbour {
+            velocity: Vector3::new(-1.5, 0.0, 0.0),
+            cooperative: false,
+            ..neighbour([distance_m, 0.0, 3.0], 0.0)
+        };
+        let filtered = filter(&hovering(Vector3::zeros()), &[comes], &pillar, &config);
+        assert!(matches!(filtered.outcome, Outcome::Infeasible { .. }), "{filtered:?}");
+        assert!(filtered.velocity.x > -0.05, "at {distance_m} m: {filtered:?}");
+    }
+}

@@ -52,7 +52,10 @@ impl PathFinder for AstarFinder {
                     self.is_begun = true;
                     return None;
                 }
-                Some(Ok(plan)) => return Some(Ok(Found::of(&plan, map, clearance_m, discs, is_level))),
+                Some(Ok(plan)) => {
+                    let found = Found::of(&plan, map, clearance_m, discs, &task.potential);
+                    return Some(Ok(Found { is_level, ..found }));
+                }
                 // Far away: begin with the part of the way that leads nearest to the goal.
                 Some(Err(PlanError::BudgetExhausted { partial, .. })) if config.planar_band_m > 0.0 => {
                     return Some(Ok(Found { path: partial, clearance_m: Some(clearance_m), is_level }));

@@ -3,6 +3,7 @@
 
 use skein_planning::{
     global::{
+        Potential,
         astar::{AstarConfig, PlanError},
         dstar::{Dstar, DstarConfig},
     },
@@ -41,13 +42,8 @@ impl PathFinder for DstarLiteFinder {
             let answer = self.dstar.advance(map, &task.request(&task.discs), &config, allowance)?;
             self.is_tried = true;
             if let Ok(plan) = answer {
-                return Some(Ok(Found::of(
-                    &plan,
-                    map,
-                    clearance_m,
-                    &task.discs,
-                    task.is_level(planar_band_m),
-                )));
+                let found = Found::of(&plan, map, clearance_m, &task.discs, &Potential::default());
+                return Some(Ok(Found { is_level: task.is_level(planar_band_m), ..found }));
             }
         }
         self.astar.advance(task, map, allowance)

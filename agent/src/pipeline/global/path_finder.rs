@@ -58,10 +58,16 @@ pub struct Found {
 }
 
 impl Found {
-    /// A plan that keeps this clearance, without the corners it can do without; `is_level` is as in the field.
-    pub fn of(plan: &Plan, map: &ClearanceMap, clearance_m: f64, discs: &[Disc], is_level: bool) -> Self {
-        let path = simplify_around(map, &plan.path, clearance_m, discs);
-        Self { path, clearance_m: Some(clearance_m), is_level }
+    /// A plan in one layer that keeps this clearance, without the corners it can do without.
+    pub fn of(
+        plan: &Plan,
+        map: &ClearanceMap,
+        clearance_m: f64,
+        discs: &[Disc],
+        potential: &Potential,
+    ) -> Self {
+        let path = simplify_around(map, &plan.path, clearance_m, discs, potential);
+        Self { path, clearance_m: Some(clearance_m), is_level: true }
     }
 }
 

@@ -45,7 +45,12 @@ impl PathFollower for Apf {
         self.speed_m_s = braking::ramp(self.speed_m_s, cap_m_s, TICK_S, &self.braking);
         let Place { path, station_m, position } = *place;
         let pulled = apf::follow(map, path, station_m, position, self.speed_m_s, attraction, &self.field);
-        Step { velocity: pulled.velocity, carrot: pulled.carrot, station_m: pulled.station_m }
+        Step {
+            velocity: pulled.velocity,
+            carrot: pulled.carrot,
+            station_m: pulled.station_m,
+            pull: pulled.attraction,
+        }
     }
 
     fn pause(&mut self) {

@@ -193,7 +193,7 @@ impl<'a> Flight<'a> {
 
         let began = cpu_time::this_thread()?;
         let pose = Pose { position: self.motion.position, attitude: UnitQuaternion::identity() };
-        self.perception.take_in(&scan, &pose, &others);
+        self.perception.take_in(&scan, &pose, &others, &[]);
         let mapped = cpu_time::this_thread()?;
         self.guidance.grant_leave(now);
         let reports = self.guidance.look_ahead(now, &self.motion, self.perception.map(), &[]);

@@ -9,10 +9,12 @@ mod lsc;
 mod naive_right_of_way;
 mod narrow;
 mod performance;
+mod potential;
 mod right_of_way;
 mod sphere;
 pub mod swarm_planning;
 mod vfh;
+mod walkers;
 
 use crate::reported::Reported;
 use crate::task::Entry;
@@ -23,6 +25,8 @@ pub const TASKS: &[Entry] = &[
     Entry::of::<Reported<vfh::Vfh>>(),
     Entry::of::<Reported<circle::Circle>>(),
     Entry::of::<Reported<ablation::Ablation>>(),
+    Entry::of::<Reported<walkers::Walkers>>(),
+    Entry::of::<Reported<potential::PotentialFields>>(),
     Entry::of::<Reported<autopilots::Autopilots>>(),
     Entry::of::<Reported<right_of_way::RightOfWay>>(),
     Entry::of::<Reported<narrow::Narrow>>(),

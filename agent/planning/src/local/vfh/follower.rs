@@ -30,6 +30,8 @@ pub struct Step {
     pub carrot: Vector3<f64>,
     /// The vehicle's place along the path, metres.
     pub station_m: f64,
+    /// The part of the velocity that pulls along the path, without what repels (ENU, m/s).
+    pub pull: Vector3<f64>,
 }
 
 /// The histogram, the speed planner, and the set-point that they last made.
@@ -93,7 +95,8 @@ impl Follower {
         let speed_m_s = speed_m_s.min(self.speed_ahead(path, station_m));
         let share = offset.try_normalize(1e-6).unwrap_or_default();
         let level = self.level(&offset, speed_m_s * share.xy().norm(), position);
-        Step { velocity: Vector3::new(level.x, level.y, speed_m_s * share.z), carrot, station_m }
+        let velocity = Vector3::new(level.x, level.y, speed_m_s * share.z);
+        Step { velocity, carrot, station_m, pull: velocity }
     }
 
     /// Counts the way flown: a new path is no new start.
