@@ -67,6 +67,7 @@ struct FileTable {
     local: LocalPlanner,
     #[serde(default)]
     nose: Nose,
+    #[serde(default)]
     potential: Repellers,
     #[serde(default, deserialize_with = "field::optional_positive")]
     takeoff_height_m: Option<f64>,
