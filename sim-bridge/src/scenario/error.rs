@@ -60,9 +60,13 @@ pub enum ScenarioError {
     #[error("vehicle {vehicle}: {what} {} is in a no-fly zone, in a threat or in terrain: no path leads there", place(.position))]
     Closed { vehicle: usize, what: String, position: Vector3<f64> },
     #[error(
-        "{what}s of vehicles {first} and {second} are {distance_m:.2} m apart: expected at least {least_m:.2} m"
+        "{what}s of vehicles {first} and {second} are {distance_m:.2} m apart: expected at least {least_m:.2} m; move one of them"
     )]
     TooClose { what: &'static str, first: usize, second: usize, distance_m: f64, least_m: f64 },
+    #[error(
+        "goal of vehicle {vehicle} is {distance_m:.2} m beside the start of vehicle {other}: expected at least {least_m:.2} m, or that very place; move one of them"
+    )]
+    GoalBesideStart { vehicle: usize, other: usize, distance_m: f64, least_m: f64 },
     #[error("vehicle {vehicle} has nowhere to go: give it waypoints or a mission")]
     NoWaypoints { vehicle: usize },
     #[error("vehicle {vehicle}: no place for its {what} near {}: everything within {reach_m} m is too close to an obstacle, to another vehicle or to the bounds", place(.near))]

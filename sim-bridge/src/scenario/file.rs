@@ -28,8 +28,8 @@ use super::position_error::{PositionErrorTable, PositionFaultTable};
 use super::targets::{PacedRoute, Targets};
 use super::window::Window;
 use super::{
-    DEFAULT_TIME_LIMIT_S, Network, Order, Scenario, ScenarioError, VehiclePlan, VehicleScript, Who,
-    check_count, read, read_world, stated_datum,
+    DEFAULT_TIME_LIMIT_S, Network, Order, SEPARATION_HULLS, Scenario, ScenarioError, VehiclePlan,
+    VehicleScript, Who, check_count, read, read_world, stated_datum,
 };
 use crate::autopilots::make::Make;
 use crate::mission;
@@ -262,6 +262,7 @@ impl ScenarioFile {
             muster: table.formation.is_some() || table.targets.is_some(),
             cruise_speed_m_s,
             planners: Planners { global: table.global, local: table.local },
+            separation_hulls: SEPARATION_HULLS,
             takeoff_height_m,
             without_ground: table.without_ground,
             time_limit_s,
@@ -429,7 +430,9 @@ impl ScenarioFile {
         let at_cruise = |route| PacedRoute { route, pace: 1.0 };
         let table = &self.table;
         if let Some(coverage) = &table.coverage {
-            let routes = coverage.routes(vehicles);
+            let model = self.model(table.model.as_deref().unwrap_or(DEFAULT_MODEL))?;
+            let cruise_m_s = self.cruise_speed_m_s().min(model.max_speed_m_s);
+            let routes = coverage.routes(vehicles, &self.airspace()?, cruise_m_s, model.max_accel_m_s2);
             let routes = routes.map_err(|error| self.contradiction("coverage", error.to_string()))?;
             return Ok(Some(routes.into_iter().map(at_cruise).collect()));
         }
