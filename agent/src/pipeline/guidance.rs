@@ -56,7 +56,7 @@ impl Guidance {
             headroom: Headroom::OPEN,
             course: Course::default(),
             planning: Planning::new(envelope, finder),
-            progress: Progress::new(envelope.separation_m, passages, escape),
+            progress: Progress::new(envelope, passages, escape),
             steering: Steering::new(envelope, follower, repulsion, filter),
         }
     }
@@ -174,9 +174,8 @@ impl Guidance {
         neighbours: &[Neighbour],
     ) -> Vec<Report> {
         let (has_leave, allowed) = (self.has_leave(now), self.allowed());
-        let moves_at = has_leave.then_some(now);
         let room = (&allowed, self.headroom);
-        self.progress.look_ahead(moves_at, &mut self.course, room, motion, map, neighbours)
+        self.progress.look_ahead((now, has_leave), &mut self.course, room, motion, map, neighbours)
     }
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles

@@ -14,7 +14,11 @@ use super::{
     route_search::{ALLOWANCE, RouteSearch},
 };
 use crate::{
-    config::Envelope, instruction::Waypoint, neighbours::Neighbour, positioning::Motion, report::Report,
+    config::Envelope,
+    instruction::Waypoint,
+    neighbours::{Neighbour, STANDING_M_S},
+    positioning::Motion,
+    report::Report,
 };
 
 /// Neighbours within this distance are gone around when the vehicle is stuck, m.
@@ -23,8 +27,6 @@ const AROUND_NEIGHBOURS_M: f64 = 8.0;
 const GHOST_SLACK_M: f64 = 0.3;
 /// Nearer than this is the same place, m.
 const SAME_PLACE_M: f64 = 1e-6;
-/// A vehicle slower than this stands, m/s.
-const STANDING_M_S: f64 = 0.5;
 
 /// Plans paths, a little in each tick.
 #[derive(Debug)]

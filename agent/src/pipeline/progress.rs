@@ -2,14 +2,17 @@
 
 use std::time::Duration;
 
+use skein_dbp::NodeName;
 use skein_planning::{
     local::escape::{EscapeConfig, EscapeDetector, Verdict},
     map::ClearanceMap,
     passage::{Passage, PassageConfig, first_passage},
 };
 
-use super::{allowed::Allowed, course::Course, headroom::Headroom};
-use crate::{neighbours::Neighbour, positioning::Motion, report::Report};
+use super::{allowed::Allowed, berth::Berth, course::Course, headroom::Headroom};
+use crate::{
+    bthreads::OPERATOR_LEG, config::Envelope, neighbours::Neighbour, positioning::Motion, report::Report,
+};
 
 /// The last waypoint is reached within this distance, m.
 const ARRIVAL_M: f64 = 0.35;
@@ -25,8 +28,8 @@ const PASSAGE_BEHIND_M: f64 = 2.5;
 /// Watches the vehicle on its course.
 #[derive(Debug)]
 pub struct Progress {
-    /// Centre-to-centre distance that is kept between vehicles, m.
-    separation_m: f64,
+    envelope: Envelope,
+    berth: Berth,
     passages: PassageConfig,
     /// The narrow passage that was announced last.
     passage: Option<Passage>,
@@ -34,9 +37,10 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Watches a vehicle that keeps so far from others, m. Passages and local minima are found as configured.
-    pub fn new(separation_m: f64, passages: PassageConfig, escape: EscapeConfig) -> Self {
-        Self { separation_m, passages, passage: None, escape: EscapeDetector::new(escape) }
+    /// Watches a vehicle of this envelope. Passages and local minima are found as configured.
+    pub fn new(envelope: Envelope, passages: PassageConfig, escape: EscapeConfig) -> Self {
+        let (berth, escape) = (Berth::default(), EscapeDetector::new(escape));
+        Self { envelope, berth, passages, passage: None, escape }
     }
 
     pub fn begin_path(&mut self) {
@@ -46,6 +50,7 @@ impl Progress {
     /// The flight is over.
     pub fn forget(&mut self) {
         self.passage = None;
+        self.berth.forget();
     }
 
     /// The share of the attraction that is left: 1, and less while a local minimum is escaped from.
@@ -53,10 +58,10 @@ impl Progress {
         self.escape.attraction()
     }
 
-    /// Looks along the path, once in each navigation cycle; `moves_at` is the time, if there is leave to move now.
+    /// Looks along the path, once in each navigation cycle; `has_leave` tells whether there is leave to move now.
     pub fn look_ahead(
         &mut self,
-        moves_at: Option<Duration>,
+        (now, has_leave): (Duration, bool),
         course: &mut Course,
         (allowed, headroom): (&Allowed, Headroom),
         motion: &Motion,
@@ -64,10 +69,11 @@ impl Progress {
         neighbours: &[Neighbour],
     ) -> Vec<Report> {
         let mut reports = Vec::new();
+        reports.extend(self.berth.look(now, course, &motion.position, &self.envelope, neighbours));
         reports.extend(self.check_arrival(course, (allowed, headroom), motion, neighbours));
         reports.extend(check_path(course, allowed, motion, map));
         reports.extend(self.check_passage(course, motion, map));
-        reports.extend(self.check_progress(moves_at, course, motion));
+        reports.extend(self.check_progress(has_leave.then_some(now), course, motion));
         reports
     }
 
@@ -77,25 +83,37 @@ impl Progress {
         (allowed, headroom): (&Allowed, Headroom),
         motion: &Motion,
         neighbours: &[Neighbour],
-    ) -> Option<Report> {
-        let waypoint = course.waypoint?;
+    ) -> Vec<Report> {
+        let Some(waypoint) = course.waypoint.filter(|_| !course.has_arrived) else { return Vec::new() };
         // A place that is too high or too low to be flown to is reached over or under it.
         let offset = allowed.region.clamp_height(&waypoint.target) - motion.position;
-        let is_taken = neighbours.iter().any(|neighbour| {
-            neighbour.armed && (neighbour.position() - waypoint.target).norm() < self.separation_m
+        let separation_m = self.envelope.separation_m;
+        let holder = neighbours.iter().find(|neighbour| {
+            neighbour.armed && (neighbour.position() - waypoint.target).norm() < separation_m
         });
-        let within_m = match (waypoint.lands, is_taken) {
+        // Who has landed where this one is to, or stays where it comes home, is not waited for.
+        let is_down = |node: &NodeName| neighbours.iter().any(|other| other.node == *node && !other.armed);
+        let lands_beside = course.taken_by.as_ref().is_some_and(|by| waypoint.is_home || is_down(by));
+        let within_m = match (waypoint.lands, holder) {
+            (true, _) if lands_beside => f64::INFINITY,
             (true, _) => ARRIVAL_M,
-            (false, false) => PASSING_M,
+            (false, None) => PASSING_M,
             // A place in the air that another vehicle has is passed at a distance, not fought over.
-            (false, true) => 2.0 * self.separation_m,
+            (false, Some(_)) => 2.0 * separation_m,
         };
         // Above or under what covers its home it is as near to it as it can come: where it lands, is seen then.
         let is_covered = waypoint.is_home && headroom.ends_before(offset.z);
-        let arrives = offset.xy().norm() < within_m && offset.z.abs() < ARRIVAL_HEIGHT_M
+        let arrives = offset.xy().norm() < within_m && (offset.z.abs() < ARRIVAL_HEIGHT_M || lands_beside)
             || is_covered && offset.xy().norm() < COVERED_M;
-        (arrives && !std::mem::replace(&mut course.has_arrived, true))
-            .then_some(Report::Arrived { leg: waypoint.leg })
+        if !arrives {
+            return Vec::new();
+        }
+        course.has_arrived = true;
+        let leg = waypoint.leg;
+        let is_beside = leg == OPERATOR_LEG && offset.xy().norm() > PASSING_M;
+        let beside =
+            holder.filter(|_| is_beside).map(|other| Report::PlaceTaken { leg, by: other.node.clone() });
+        beside.into_iter().chain([Report::Arrived { leg }]).collect()
     }
 
     fn check_passage(&mut self, course: &Course, motion: &Motion, map: &ClearanceMap) -> Option<Report> {

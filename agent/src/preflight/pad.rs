@@ -221,7 +221,12 @@ mod tests {
                 radius_m: 0.25,
                 cooperative: true,
             };
-            self.neighbours.push(Neighbour { node: NodeName::new("uav/2").unwrap(), armed: false, track });
+            self.neighbours.push(Neighbour {
+                node: NodeName::new("uav/2").unwrap(),
+                armed: false,
+                goal: None,
+                track,
+            });
             self
         }
 

@@ -10,9 +10,9 @@ use skein_dbp::facts::{BlockLapsed, Confirmed, DuplicateName, InStep, PeerJoined
 use skein_wire::event::{
     Abort, Advance, Ahead, Airborne, Arrived, At, BatteryCritical, BatteryLevel, BatteryLow, Clear,
     CommandFailed, Declared as _, Enter, FenceBreached, FoundAirborne, Goto, HandBack, Handover, Land,
-    Landed, Launch, Leave, Load, NeighbourAt, OrderTaken, Passage, PathBlocked, PilotTook, Plan, Planned,
-    PositionDoubted, PositionTrusted, Ready, SWARM, Slept, Stuck, Takeoff, TooClose, Unload, Unplannable,
-    Unready, What,
+    Landed, Launch, Leave, Load, NeighbourAt, OrderTaken, Passage, PathBlocked, PilotTook, PlaceFree,
+    PlaceTaken, Plan, Planned, PositionDoubted, PositionTrusted, Ready, SWARM, Slept, Stuck, Takeoff,
+    TooClose, Unload, Unplannable, Unready, What,
 };
 
 use super::part::{Part, Place};
@@ -30,16 +30,19 @@ type OnTheWay = (Arrived, PathBlocked, Stuck, Passage, At, Ahead, NeighbourAt, B
 type InTheAir =
     (BatteryLow, BatteryCritical, FenceBreached, TooClose, Clear, PositionDoubted, PositionTrusted);
 
+fn on_the_way(me: &Me) -> EventSet {
+    me.any::<OnTheWay>().or(me.any::<(PlaceTaken, PlaceFree)>())
+}
+
 /// The flight as `flight.rs` conducts it with the autopilot; `disturbed`: commands may fail, and a pilot may take over.
 pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
     let grounded = |name: &str| {
         Place::new(name)
             .hears(me.any::<Takeoff>(), "taking off")
             .rules_out(me.any::<InTheAir>())
-            .rules_out(me.any::<OnTheWay>())
+            .rules_out(on_the_way(me))
     };
-    let not_flying =
-        |name: &str| Place::new(name).rules_out(me.any::<OnTheWay>()).rules_out(me.any::<Ready>());
+    let not_flying = |name: &str| Place::new(name).rules_out(on_the_way(me)).rules_out(me.any::<Ready>());
     let taken = |place: Place| match disturbed.pilot {
         true => place.offers(me.event(PilotTook { mode: "manual".into(), by: "pilot".into() }), "taken"),
         false => place,
@@ -54,7 +57,7 @@ pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
         false => grounded(UNHEARD_OF),
     };
     let taking_off =
-        lands(Place::new("taking off").rules_out(me.any::<OnTheWay>()).offers(me.event(Airborne), "flying"));
+        lands(Place::new("taking off").rules_out(on_the_way(me)).offers(me.event(Airborne), "flying"));
     let taking_off = match disturbed.refusals {
         true => taking_off.offers(me.event(CommandFailed { why: "Arm: denied".into() }), ON_THE_GROUND),
         false => taking_off,
@@ -115,9 +118,12 @@ pub(super) fn guidance(me: &Me, legs: &[i64], hard: bool) -> Part {
         places.push(place(&arrived));
         if hard {
             places.push(new_leg(plans.offers(no_path, to(*leg))));
-            places.push(
-                follows.offers(me.event(PathBlocked), blocked.as_str()).keeps_offering(me.event(Stuck)),
-            );
+            let follows =
+                follows.offers(me.event(PathBlocked), blocked.as_str()).keeps_offering(me.event(Stuck));
+            let taken = format!("beside who has {leg}");
+            let by = || me.event(PlaceTaken { leg: *leg, by: "uav/2".into() });
+            places.push(follows.offers(by(), taken.as_str()));
+            places.push(arrives(place(&taken)).offers(me.event(PlaceFree), following.as_str()));
             places.push(arrives(place(&blocked)).keeps_offering(me.event(Stuck)));
         } else {
             places.push(new_leg(plans));

@@ -19,6 +19,8 @@ use self::tour::tours;
 const MARGINS_M: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.0];
 /// Lines are drawn closer until this share of an area is seen.
 const SEEN: f64 = 0.98;
+/// Drafts that are worked out to whole ways.
+const MOST_TOURS: usize = 6;
 /// An area that is narrower than this encloses nothing, metres.
 const NARROWEST_M: f64 = 1e-6;
 
@@ -120,7 +122,23 @@ struct Draft {
     along: Vector2<f64>,
     rows: Vec<Vec<Line>>,
     seen: f64,
+    /// Time for the lines and from each to the next, if that is beside it.
+    lines_s: f64,
+}
+
+/// A way over each part of the field.
+struct Tours {
+    ways: Vec<Vec<Vector2<f64>>>,
+    seen: f64,
     time_s: f64,
+}
+
+impl Tours {
+    /// More is better: enough is seen, in one part, soon; or else much.
+    fn merit(&self) -> (bool, bool, f64) {
+        let is_enough = self.seen >= SEEN;
+        (is_enough, self.ways.len() == 1, if is_enough { -self.time_s } else { self.seen })
+    }
 }
 
 /// A way over each part of the field, of which there are as few as can be; `None` if no line has room.
@@ -130,48 +148,53 @@ fn best_tours(
     leg_s: &dyn Fn(f64) -> f64,
 ) -> Option<Vec<Vec<Vector2<f64>>>> {
     let places = field.places();
-    let mut best: Option<((bool, bool, f64), Vec<Vec<Vector2<f64>>>)> = None;
+    let mut best: Option<Tours> = None;
     for margin_m in MARGINS_M {
         field.set_margin(margin_m.min(0.5 * swath_m));
-        let Some(Draft { along, rows, seen, .. }) = best_draft(field, swath_m, &places, leg_s) else {
-            continue;
-        };
-        let cells: Vec<Cell> = cells(field, &along, &rows);
-        let tours = tours(field, &cells);
-        let merit = (seen >= SEEN, tours.len() == 1, seen);
-        if best.as_ref().is_none_or(|(known, _)| merit > *known) {
-            best = Some((merit, tours));
+        for Draft { along, rows, seen, .. } in drafts(field, swath_m, &places, leg_s) {
+            let cells: Vec<Cell> = cells(field, &along, &rows);
+            let ways = tours(field, &cells);
+            let time_s = ways.iter().map(|way| time_s(way, leg_s)).sum();
+            let tours = Tours { ways, seen, time_s };
+            if best.as_ref().is_none_or(|known| tours.merit() > known.merit()) {
+                best = Some(tours);
+            }
         }
-        if merit.0 && merit.1 {
+        if best.as_ref().is_some_and(|best| best.merit() >= (true, true, f64::NEG_INFINITY)) {
             break;
         }
     }
-    best.map(|(_, tours)| tours)
+    best.map(|best| best.ways)
 }
 
-/// Of the directions in which enough is seen the one that takes the least time; else the one in which most is seen.
-fn best_draft(
+/// The drafts that may be best: those in which enough is seen and that take the least time; else those in which most is
+/// seen.
+fn drafts(
     field: &Field<'_>,
     swath_m: f64,
     places: &[Vector2<f64>],
     leg_s: &dyn Fn(f64) -> f64,
-) -> Option<Draft> {
-    let drafts =
-        directions(field.corners()).into_iter().map(|along| draft(field, along, swath_m, places, leg_s));
-    let drafts: Vec<Draft> = drafts.filter(|draft| draft.time_s > 0.0).collect();
-    let (enough, less): (Vec<_>, Vec<_>) = drafts.into_iter().partition(|draft| draft.seen >= SEEN);
-    let soonest = enough.into_iter().min_by(|one, other| one.time_s.total_cmp(&other.time_s));
-    soonest.or_else(|| less.into_iter().max_by(|one, other| one.seen.total_cmp(&other.seen)))
+) -> Vec<Draft> {
+    let along = directions(field.corners()).into_iter();
+    let drafts = along.flat_map(|along| drafts_along(field, along, swath_m, places, leg_s));
+    let mut drafts: Vec<Draft> = drafts.filter(|draft| draft.lines_s > 0.0).collect();
+    drafts.sort_by(|one, other| {
+        let missing = |draft: &Draft| (SEEN - draft.seen).max(0.0);
+        missing(one).total_cmp(&missing(other)).then(one.lines_s.total_cmp(&other.lines_s))
+    });
+    drafts.truncate(MOST_TOURS);
+    drafts
 }
 
-/// The lines in a direction, as few as let enough be seen.
-fn draft(
+/// The lines in a direction: as few as let enough be seen, and one more, since an odd number of them ends elsewhere than
+/// an even one.
+fn drafts_along(
     field: &Field<'_>,
     along: Vector2<f64>,
     swath_m: f64,
     places: &[Vector2<f64>],
     leg_s: &dyn Fn(f64) -> f64,
-) -> Draft {
+) -> Vec<Draft> {
     let [low, high] = extent(field.corners(), &across(&along));
     let fewest = ((high - low) / swath_m - 1e-9).ceil().max(1.0) as usize;
     let with = |count: usize| {
@@ -179,19 +202,18 @@ fn draft(
         let seen = share_seen(places, &rows, 0.5 * swath_m);
         let turn_s = leg_s((high - low) / count as f64);
         let times_s = rows.iter().flatten().map(|[rear, front]| leg_s((front - rear).norm()) + turn_s);
-        Draft { along, seen, time_s: times_s.sum(), rows }
+        Draft { along, seen, lines_s: times_s.sum(), rows }
     };
     let mut best = with(fewest);
-    for count in fewest + 1..=2 * fewest + 3 {
-        if best.seen >= SEEN {
-            break;
-        }
+    let mut count = fewest;
+    while best.seen < SEEN && count < 2 * fewest + 3 {
+        count += 1;
         let closer = with(count);
         if closer.seen > best.seen {
             best = closer;
         }
     }
-    best
+    vec![with(count + 1), best]
 }
 
 fn time_s(way: &[Vector2<f64>], leg_s: &dyn Fn(f64) -> f64) -> f64 {

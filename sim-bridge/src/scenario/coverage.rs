@@ -7,8 +7,8 @@ use skein_swarm::coverage::{Area, CoverageError, cover};
 
 use super::field::{ground_points, positive};
 
-/// At the end of a leg the next path is planned, and the vehicle follows it with a lag, in seconds.
-const TURN_S: f64 = 0.5;
+/// A turn from leg to leg takes this share of the time for a stop and a start, as flown: corners are cut.
+const TURN_SHARE: f64 = 0.65;
 
 /// The `[coverage]` table.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -40,7 +40,7 @@ impl Coverage {
         let lift = |route: Vec<nalgebra::Vector2<f64>>| {
             route.iter().map(|point| Vector3::new(point.x, point.y, self.height_m)).collect()
         };
-        let leg_s = |leg_m: f64| TURN_S + leg_m / cruise_m_s + cruise_m_s / accel_m_s2;
+        let leg_s = |leg_m: f64| leg_m / cruise_m_s + TURN_SHARE * cruise_m_s / accel_m_s2;
         Ok(cover(&area, self.swath_m, vehicles, &leg_s)?.into_iter().map(lift).collect())
     }
 }

@@ -18,6 +18,7 @@ mod open;
 mod placement;
 mod position_error;
 mod targets;
+mod thin_solids;
 mod window;
 
 use std::path::{Path, PathBuf};
@@ -209,6 +210,9 @@ pub struct Overrides {
     /// A QGroundControl plan or LSC mission; one that all fly in trail, or one for each vehicle.
     #[arg(long = "mission", value_name = "FILE")]
     pub missions: Vec<PathBuf>,
+    /// Fly though there are solids on the way that are thinner than 0.2 m in height, which a planar lidar does not see.
+    #[arg(long)]
+    pub thin_solids: bool,
     /// What a vehicle does once the ground station has been silent for 5 s: continue, return or land; the scenario's own
     /// if not given.
     #[arg(long, value_name = "POLICY", value_parser = policy)]
@@ -293,6 +297,9 @@ impl Scenario {
         scenario.without_ground = overrides.without_ground.unwrap_or(scenario.without_ground);
         scenario.fly(set)?;
         scenario.validate()?;
+        if !overrides.thin_solids {
+            scenario.check_thin_solids_on_the_way()?;
+        }
         Ok(scenario)
     }
 

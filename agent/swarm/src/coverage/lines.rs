@@ -9,6 +9,9 @@ const SAME_DIRECTION: f64 = 0.03;
 /// Directions that are tried, those of the longest edges.
 const MOST_DIRECTIONS: usize = 12;
 
+/// Vehicles turn so far before the ends of lines, metres.
+const CUT_M: f64 = 0.7;
+
 /// The ends of a line, the rear one first.
 pub type Line = [Vector2<f64>; 2];
 
@@ -127,12 +130,13 @@ pub fn cells(field: &Field<'_>, along: &Vector2<f64>, rows: &[Vec<Line>]) -> Vec
     cells
 }
 
-/// The share of places that lie within `half_m` of a line, metres.
+/// The share of places that lie within `half_m` of a line, metres, as far as that is flown.
 pub fn share_seen(places: &[Vector2<f64>], rows: &[Vec<Line>], half_m: f64) -> f64 {
     let is_seen = |place: &&Vector2<f64>| {
         rows.iter().flatten().any(|[rear, front]| {
             let way = front - rear;
-            let share = ((*place - rear).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
+            let cut = (CUT_M / way.norm()).min(0.5);
+            let share = ((*place - rear).dot(&way) / way.norm_squared()).clamp(cut, 1.0 - cut);
             (rear + way * share - *place).norm_squared() <= half_m * half_m
         })
     };
