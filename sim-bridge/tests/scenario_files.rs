@@ -251,6 +251,19 @@ fn goals_nearer_than_the_vehicles_keep_are_refused_to_one_another_and_beside_ano
 }
 
 #[test]
+fn vehicles_that_are_in_the_air_together_start_as_far_apart_as_they_keep() {
+    let near = YARD.replacen("start_m = [5.0, 0.0]", "start_m = [-5.0, 1.0]", 1);
+    let near = near.replacen("[[-5.0, 0.0, 3.0]]", "[[9.0, 9.0, 3.0]]", 1);
+    assert!(read(&near).is_ok(), "one takes off when the other is gone");
+    let together = near.replacen("order = \"hold\"", "order = \"launch_together\"", 1);
+    let error = read(&together).expect_err("too near").to_string();
+    assert!(
+        error.starts_with("starts of vehicles 1 and 2 are 1.00 m apart: expected at least 1.40 m"),
+        "{error}"
+    );
+}
+
+#[test]
 fn a_task_whose_routes_end_too_near_to_one_another_is_refused() {
     let formation = |spacing_m: f64| {
         format!(

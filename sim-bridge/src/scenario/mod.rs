@@ -496,7 +496,7 @@ impl Scenario {
 
     /// Checks that where vehicles stand, before and after the flight, they are as far apart as they keep in it.
     fn check_ends(&self) -> Result<(), ScenarioError> {
-        let together = self.musters();
+        let together = self.musters() || self.orders.iter().any(|given| given.order == What::LaunchTogether);
         let starts_m = |a: &VehiclePlan, b: &VehiclePlan| match together {
             // All are in the air above their starts at once.
             true => self.kept_m(a, b),

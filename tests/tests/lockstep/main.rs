@@ -15,4 +15,5 @@ mod preflight;
 mod scenarios;
 mod scripts;
 mod tasks;
+mod thin_solids;
 mod wind;
