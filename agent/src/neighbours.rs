@@ -93,8 +93,8 @@ impl Neighbour {
         !self.track.cooperative || self.track.velocity.norm() < STANDING_M_S
     }
 
-    /// The distance that a vehicle of this envelope keeps from it where both stand, centre to centre, m: more from one
-    /// that flies and has fallen silent.
+    /// The distance that a vehicle of this envelope keeps from it where both stand, centre to centre, m: more
+    /// from one that flies and has fallen silent.
     pub fn kept_m(&self, envelope: &Envelope) -> f64 {
         let is_lost = self.armed && !self.track.cooperative;
         let track = match is_lost {

@@ -1,4 +1,5 @@
-//! Await place: a vehicle that is to land where another stays waits for that one, and lands beside it if that lasts.
+//! Await place: a vehicle that is to land where another stays waits for that one, and lands beside it if that
+//! lasts.
 
 use std::time::Duration;
 
@@ -11,8 +12,9 @@ use crate::{me::Me, precedence};
 /// How long a vehicle waits in all on the way to one waypoint.
 pub const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Blocks `advance` while another vehicle has the place of the mission's leg; requests `land` once it has waited for
-/// [`PATIENCE`]. The way home is not waited on, nor is an operator's point: those end near the place.
+/// Blocks `advance` while another vehicle has the place of the mission's leg; requests `land` once it has
+/// waited for [`PATIENCE`]. The way home is not waited on, nor is an operator's point: those end near the
+/// place.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct AwaitPlace {
     me: Me,

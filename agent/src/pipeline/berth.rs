@@ -59,8 +59,8 @@ impl Berth {
     }
 }
 
-/// Who stands so near to `place` that a vehicle at `position`, which is not far from it, may not come there; not one that
-/// is further from it than that vehicle itself.
+/// Who stands so near to `place` that a vehicle at `position`, which is not far from it, may not come there;
+/// not one that is further from it than that vehicle itself.
 fn standing_at<'a>(
     place: &Vector3<f64>,
     position: &Vector3<f64>,
@@ -107,7 +107,8 @@ mod tests {
         Neighbour { node: NodeName::new("uav/4").unwrap(), armed: true, goal, track }
     }
 
-    /// When a vehicle at `position` is told that its goal is taken while `other` is there, s; `None` within 20 s.
+    /// When a vehicle at `position` is told that its goal is taken while `other` is there, s; `None` within
+    /// 20 s.
     fn told_s(position: Vector3<f64>, other: &Neighbour) -> Option<f64> {
         let (mut berth, mut course) = (Berth::default(), course());
         let envelope = Envelope::default();

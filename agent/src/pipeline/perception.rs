@@ -301,8 +301,9 @@ impl Perception {
         true
     }
 
-    /// What the upright lidar sees and the level one does not: cables, bars, edges of roofs. It sees a slice of them, so
-    /// each point stands for a row across its plane, as a point of the level one stands for a column.
+    /// What the upright lidar sees and the level one does not: cables, bars, edges of roofs. It sees a slice
+    /// of them, so each point stands for a row across its plane, as a point of the level one stands for a
+    /// column.
     fn rows(&self, scan: &Scan, pose: &Pose, neighbours: &[Other]) -> Vec<Vector3<f64>> {
         let to_world = pose.attitude.to_rotation_matrix();
         let Some(side) = (to_world * Vector3::y()).xy().try_normalize(1e-6) else { return Vec::new() };

@@ -58,7 +58,8 @@ impl Progress {
         self.escape.attraction()
     }
 
-    /// Looks along the path, once in each navigation cycle; `has_leave` tells whether there is leave to move now.
+    /// Looks along the path, once in each navigation cycle; `has_leave` tells whether there is leave to move
+    /// now.
     pub fn look_ahead(
         &mut self,
         (now, has_leave): (Duration, bool),

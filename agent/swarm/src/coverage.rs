@@ -14,8 +14,8 @@ use self::lines::{Cell, Line, across, cells, directions, extent, rows, share_see
 use self::share::{cut_evenly, vehicles_for};
 use self::tour::tours;
 
-/// Lines end this far inside the area, metres: a vehicle that turns there stays inside. No further than half a swath;
-/// less where an area is too narrow for it, and where more than one part would come of it.
+/// Lines end this far inside the area, metres: a vehicle that turns there stays inside. No further than half
+/// a swath; less where an area is too narrow for it, and where more than one part would come of it.
 const MARGINS_M: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.0];
 /// Lines are drawn closer until this share of an area is seen.
 const SEEN: f64 = 0.98;
@@ -54,13 +54,14 @@ pub struct Area<'a> {
     pub airspace: &'a Airspace,
 }
 
-/// Routes over an area, one for each vehicle, that together bring nearly every point of it within half a swath of one,
-/// and lead nowhere but over the area, outside of what is closed (Choset and Pignon 1998).
+/// Routes over an area, one for each vehicle, that together bring nearly every point of it within half a
+/// swath of one, and lead nowhere but over the area, outside of what is closed (Choset and Pignon 1998).
 ///
-/// The lines are parallel, at equal distances of at most `swath_m`, along the edge of the area for which they are flown
-/// soonest. Where the area has notches and holes, they are cut into cells; each is flown alternately one way and the
-/// other, and then the nearest next, by the shortest way inside the area. The whole is cut into pieces that take equally
-/// long, `leg_s` being the time for a leg of some length in metres, so that all vehicles are done at the same time.
+/// The lines are parallel, at equal distances of at most `swath_m`, along the edge of the area for which they
+/// are flown soonest. Where the area has notches and holes, they are cut into cells; each is flown
+/// alternately one way and the other, and then the nearest next, by the shortest way inside the area. The
+/// whole is cut into pieces that take equally long, `leg_s` being the time for a leg of some length in
+/// metres, so that all vehicles are done at the same time.
 ///
 /// `O(lines corners + places^2 corners)`, with some places for each cell, each reflex corner and each zone.
 ///
@@ -78,8 +79,8 @@ pub struct Area<'a> {
 /// ```
 ///
 /// # Errors
-/// The area, the swath or the number of vehicles is none; nothing of the area is open; it is in more parts than there are
-/// vehicles.
+/// The area, the swath or the number of vehicles is none; nothing of the area is open; it is in more parts
+/// than there are vehicles.
 pub fn cover(
     area: &Area<'_>,
     swath_m: f64,
@@ -167,8 +168,8 @@ fn best_tours(
     best.map(|best| best.ways)
 }
 
-/// The drafts that may be best: those in which enough is seen and that take the least time; else those in which most is
-/// seen.
+/// The drafts that may be best: those in which enough is seen and that take the least time; else those in
+/// which most is seen.
 fn drafts(
     field: &Field<'_>,
     swath_m: f64,
@@ -186,8 +187,8 @@ fn drafts(
     drafts
 }
 
-/// The lines in a direction: as few as let enough be seen, and one more, since an odd number of them ends elsewhere than
-/// an even one.
+/// The lines in a direction: as few as let enough be seen, and one more, since an odd number of them ends
+/// elsewhere than an even one.
 fn drafts_along(
     field: &Field<'_>,
     along: Vector2<f64>,
@@ -275,7 +276,8 @@ mod tests {
         routes.iter().flat_map(|route| route.windows(2)).map(to_leg).fold(f64::INFINITY, f64::min)
     }
 
-    /// The share of the area, less its zones, that is seen from the routes; on another grid than they are made by.
+    /// The share of the area, less its zones, that is seen from the routes; on another grid than they are
+    /// made by.
     fn seen(
         corners: &[Vector2<f64>],
         airspace: &Airspace,

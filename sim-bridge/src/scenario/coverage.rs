@@ -26,8 +26,8 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// A route for each vehicle (ENU, metres), over the area and outside of the zones of `airspace`. All end at the same
-    /// time if they fly at `cruise_m_s` and accelerate by no more than `accel_m_s2`.
+    /// A route for each vehicle (ENU, metres), over the area and outside of the zones of `airspace`. All end
+    /// at the same time if they fly at `cruise_m_s` and accelerate by no more than `accel_m_s2`.
     pub fn routes(
         &self,
         vehicles: usize,

@@ -68,10 +68,9 @@ pub enum ScenarioError {
         "goal of vehicle {vehicle} is {distance_m:.2} m beside the start of vehicle {other}: expected at least {least_m:.2} m, or that very place; move one of them"
     )]
     GoalBesideStart { vehicle: usize, other: usize, distance_m: f64, least_m: f64 },
-    #[error(
-        "a planar lidar does not see what is thinner than 0.2 m in height: {0}; fly vehicles of the model \"x500-vertical-scanner\", move the flight away, or fly all the same with --thin-solids"
-    )]
-    ThinSolids(ThinSolids),
+    /// Something on the way that a lidar does not see.
+    #[error(transparent)]
+    ThinSolids(#[from] ThinSolids),
     #[error("vehicle {vehicle} has nowhere to go: give it waypoints or a mission")]
     NoWaypoints { vehicle: usize },
     #[error("vehicle {vehicle}: no place for its {what} near {}: everything within {reach_m} m is too close to an obstacle, to another vehicle or to the bounds", place(.near))]

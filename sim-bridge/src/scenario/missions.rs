@@ -56,8 +56,8 @@ pub fn apply_missions(scenario: &mut Scenario, missions: Vec<Mission>) -> Result
     Ok(())
 }
 
-/// Where starts and goals are exactly where a mission puts them, vehicles keep no more than those are apart; but some
-/// room between hulls.
+/// Where starts and goals are exactly where a mission puts them, vehicles keep no more than those are apart;
+/// but some room between hulls.
 fn keep_less(scenario: &mut Scenario) {
     let vehicles = &scenario.vehicles;
     let pairs =
@@ -138,7 +138,8 @@ fn place_goals(scenario: &mut Scenario, missions: &[&Mission]) -> Result<(), Sce
     Ok(())
 }
 
-/// A clear place near `wanted` that `accepts` likes, from which `anchor` is in plain sight if there is such a one.
+/// A clear place near `wanted` that `accepts` likes, from which `anchor` is in plain sight if there is such a
+/// one.
 fn find(
     scene: &Scene,
     wanted: &Vector3<f64>,

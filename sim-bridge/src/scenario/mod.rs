@@ -210,7 +210,8 @@ pub struct Overrides {
     /// A QGroundControl plan or LSC mission; one that all fly in trail, or one for each vehicle.
     #[arg(long = "mission", value_name = "FILE")]
     pub missions: Vec<PathBuf>,
-    /// Fly though there are solids on the way that are thinner than 0.2 m in height, which a planar lidar does not see.
+    /// Fly though there are solids on the way that are thinner than 0.2 m in height, which a planar lidar
+    /// does not see.
     #[arg(long)]
     pub thin_solids: bool,
     /// What a vehicle does once the ground station has been silent for 5 s: continue, return or land; the scenario's own
@@ -403,7 +404,8 @@ impl Scenario {
         distance_kept_m(0.0, &there, &config)
     }
 
-    /// Whether a place is beside the start of `other`, nearer than `vehicle` keeps, and not that start itself.
+    /// Whether a place is beside the start of `other`, nearer than `vehicle` keeps, and not that start
+    /// itself.
     fn is_beside_start(&self, vehicle: &VehiclePlan, place: &Vector3<f64>, other: &VehiclePlan) -> bool {
         let distance_m = (place - other.start).xy().norm();
         distance_m > SAME_PLACE_M && distance_m < self.kept_m(vehicle, other) - ROUNDING_M
@@ -414,9 +416,10 @@ impl Scenario {
     /// Whether a goal can be reached is not looked at: the vehicles find that out and land.
     ///
     /// # Errors
-    /// No vehicles or too many; a start inside an obstacle; a start or waypoint outside of the bounds or under the
-    /// ground; a waypoint in a no-fly zone, in a threat or in known terrain; starts where vehicles would nearly touch;
-    /// two goals, or a goal and another's start, nearer to one another than the vehicles keep.
+    /// No vehicles or too many; a start inside an obstacle; a start or waypoint outside of the bounds or
+    /// under the ground; a waypoint in a no-fly zone, in a threat or in known terrain; starts where vehicles
+    /// would nearly touch; two goals, or a goal and another's start, nearer to one another than the vehicles
+    /// keep.
     pub fn validate(&self) -> Result<(), ScenarioError> {
         check_count(&self.name, self.vehicles.len())?;
         let zones = KeepOut::new(self.airspace.clone(), 0.0, 0.0);
@@ -494,7 +497,8 @@ impl Scenario {
         Err(ScenarioError::OutsideBounds { vehicle: number, what: what.to_owned(), position, min, max })
     }
 
-    /// Checks that where vehicles stand, before and after the flight, they are as far apart as they keep in it.
+    /// Checks that where vehicles stand, before and after the flight, they are as far apart as they keep in
+    /// it.
     fn check_ends(&self) -> Result<(), ScenarioError> {
         let together = self.musters() || self.orders.iter().any(|given| given.order == What::LaunchTogether);
         let starts_m = |a: &VehiclePlan, b: &VehiclePlan| match together {
@@ -542,8 +546,8 @@ impl Scenario {
         Ok(())
     }
 
-    /// Whether nobody sets out before everybody is in the air: the scenario says so, or the goal of one is where another
-    /// stands.
+    /// Whether nobody sets out before everybody is in the air: the scenario says so, or the goal of one is
+    /// where another stands.
     pub fn musters(&self) -> bool {
         let mut pairs = self.vehicles.iter().enumerate().flat_map(|(index, one)| {
             let others = self.vehicles.iter().enumerate().filter(move |(other, _)| *other != index);

@@ -5,10 +5,10 @@ use std::fmt;
 use nalgebra::Vector3;
 use skein_world::{Obstacle, VehicleModel};
 
-use super::{Scenario, ScenarioError};
+use super::Scenario;
 
-/// What is less high than this is seen by a planar lidar in its own plane alone, in metres; it pitches by more at ten
-/// metres already.
+/// What is less high than this is seen by a planar lidar in its own plane alone, in metres; it pitches by
+/// more at ten metres already.
 const THIN_M: f64 = 0.2;
 /// From the heights of flight to what is near them, in metres.
 const NEAR_M: f64 = 1.0;
@@ -21,9 +21,16 @@ const GROUND_M: f64 = 0.1;
 /// So many solids are named.
 const NAMED: usize = 8;
 
-/// Solids that are thin, as an error names them.
-#[derive(Debug, Clone, PartialEq)]
+/// Solids that a planar lidar does not see, near where it flies.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "a planar lidar does not see what is thinner than 0.2 m in height: {}; fly vehicles of the model \"x500-vertical-scanner\", move the flight away, or fly all the same with --thin-solids",
+    Named(.0)
+)]
 pub struct ThinSolids(Vec<ThinSolid>);
+
+/// The first of them, by name.
+struct Named<'a>(&'a [ThinSolid]);
 
 #[derive(Debug, Clone, PartialEq)]
 struct ThinSolid {
@@ -33,7 +40,7 @@ struct ThinSolid {
     heights_m: [f64; 2],
 }
 
-impl fmt::Display for ThinSolids {
+impl fmt::Display for Named<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (number, solid) in self.0.iter().take(NAMED).enumerate() {
             let ThinSolid { name, thickness_m, heights_m: [low_m, high_m] } = solid;
@@ -54,9 +61,9 @@ impl Scenario {
     /// Checks that there is nothing near the heights of flight that the vehicles' lidars do not see.
     ///
     /// # Errors
-    /// [`ScenarioError::ThinSolids`] names what is thinner than 0.2 m in height, within a metre of the heights at which
+    /// What is thinner than 0.2 m in height, within a metre of the heights at which
     /// vehicles with a planar lidar alone fly.
-    pub fn check_thin_solids(&self) -> Result<(), ScenarioError> {
+    pub fn check_thin_solids(&self) -> Result<(), ThinSolids> {
         let heights: Vec<f64> = self.blind_ways().flatten().map(|place| place.z).collect();
         let low_m = heights.iter().copied().fold(f64::INFINITY, f64::min) - NEAR_M;
         let high_m = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max) + NEAR_M;
@@ -67,7 +74,7 @@ impl Scenario {
     ///
     /// # Errors
     /// As for [`Scenario::check_thin_solids`].
-    pub fn check_thin_solids_on_the_way(&self) -> Result<(), ScenarioError> {
+    pub fn check_thin_solids_on_the_way(&self) -> Result<(), ThinSolids> {
         let ways: Vec<Vec<Vector3<f64>>> = self.blind_ways().collect();
         let places: Vec<Vector3<f64>> = ways.iter().flat_map(|way| way.windows(2)).flat_map(along).collect();
         self.refuse_thin(|solid, _| {
@@ -85,13 +92,13 @@ impl Scenario {
         })
     }
 
-    fn refuse_thin(&self, is_near: impl Fn(&Obstacle, [f64; 2]) -> bool) -> Result<(), ScenarioError> {
+    fn refuse_thin(&self, is_near: impl Fn(&Obstacle, [f64; 2]) -> bool) -> Result<(), ThinSolids> {
         let thin = self.scene.obstacles().iter().filter_map(|solid| {
             let found = thin_solid(solid)?;
             (found.heights_m[0] > GROUND_M && is_near(solid, found.heights_m)).then_some(found)
         });
         let thin: Vec<_> = thin.collect();
-        if thin.is_empty() { Ok(()) } else { Err(ScenarioError::ThinSolids(ThinSolids(thin))) }
+        if thin.is_empty() { Ok(()) } else { Err(ThinSolids(thin)) }
     }
 }
 

@@ -41,8 +41,8 @@ impl Shape {
         }
     }
 
-    /// Length of the longest straight line inside along the unit vector `direction` (own frame), metres: that through
-    /// the middle, for every shape is the same on both sides of it. Infinite for a plane.
+    /// Length of the longest straight line inside along the unit vector `direction` (own frame), metres: that
+    /// through the middle, for every shape is the same on both sides of it. Infinite for a plane.
     pub fn thickness_m(&self, direction: &Vector3<f64>) -> f64 {
         let half = match *self {
             Self::Box { half_extents } => half_extents.component_div(&direction.abs()).min(),
@@ -203,7 +203,8 @@ impl Obstacle {
         )
     }
 
-    /// Height of the solid over the place of the ground above which it is highest, metres; infinite for a plane.
+    /// Height of the solid over the place of the ground above which it is highest, metres; infinite for a
+    /// plane.
     pub fn thickness_m(&self) -> f64 {
         self.shape.thickness_m(&self.pose.inverse_transform_vector(&Vector3::z()))
     }

@@ -222,8 +222,8 @@ impl VehicleModel {
         Ok(model)
     }
 
-    /// The built-in vehicle of that name: `x500` (2 kg), `x500-vertical-scanner`, which sees cables too, or `crazyflie`
-    /// (27 g).
+    /// The built-in vehicle of that name: `x500` (2 kg), `x500-vertical-scanner`, which sees cables too, or
+    /// `crazyflie` (27 g).
     pub fn built_in(name: &str) -> Result<Self, VehicleError> {
         match BUILT_IN.iter().find(|(known, _)| *known == name) {
             Some((known, text)) => Self::from_toml(text, &format!("vehicles/{known}.toml")),

@@ -49,8 +49,8 @@ fn every_place_of_a_surveyed_field_is_seen() {
     }
 }
 
-/// Four vehicles see a field in the form of a comb with two teeth missing; one gap is closed, and so is a round place in
-/// the field.
+/// Four vehicles see a field in the form of a comb with two teeth missing; one gap is closed, and so is a
+/// round place in the field.
 const COMB: &str = r#"
 name = "comb"
 vehicles = 4

@@ -30,7 +30,8 @@ pub struct Field<'a> {
 }
 
 impl<'a> Field<'a> {
-    /// The area with these corners (ENU, metres), flown at `height_m`, with nothing taken off at its border yet.
+    /// The area with these corners (ENU, metres), flown at `height_m`, with nothing taken off at its border
+    /// yet.
     pub fn new(corners: &[Vector2<f64>], height_m: f64, airspace: &'a Airspace) -> Self {
         let (floor_m, ceiling_m) = (f64::NEG_INFINITY, f64::INFINITY);
         Self {
@@ -57,7 +58,8 @@ impl<'a> Field<'a> {
         inside_m.min(self.closed.room_m(&place.push(self.height_m)))
     }
 
-    /// The parts of the straight way between two places that are open, as distances from its beginning, metres.
+    /// The parts of the straight way between two places that are open, as distances from its beginning,
+    /// metres.
     pub fn open_parts(&self, from: &Vector2<f64>, to: &Vector2<f64>) -> Vec<[f64; 2]> {
         let length_m = (to - from).norm();
         let (mut parts, mut open, mut at_m) = (Vec::new(), None, 0.0);

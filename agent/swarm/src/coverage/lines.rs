@@ -15,7 +15,8 @@ const CUT_M: f64 = 0.7;
 /// The ends of a line, the rear one first.
 pub type Line = [Vector2<f64>; 2];
 
-/// Lines that follow one another, side by side, so that it is open to turn from each to the next at both ends.
+/// Lines that follow one another, side by side, so that it is open to turn from each to the next at both
+/// ends.
 pub type Cell = Vec<Line>;
 
 /// A corner of a cell: of its last line, not its first; at its front end, not its rear.
@@ -85,8 +86,8 @@ pub fn across(along: &Vector2<f64>) -> Vector2<f64> {
     Vector2::new(-along.y, along.x)
 }
 
-/// Lines along a direction in so many rows, at equal distances from edge to edge: those of each row, as far as the field
-/// is open there.
+/// Lines along a direction in so many rows, at equal distances from edge to edge: those of each row, as far
+/// as the field is open there.
 pub fn rows(field: &Field<'_>, along: &Vector2<f64>, count: usize) -> Vec<Vec<Line>> {
     let (across, [rear, front]) = (across(along), extent(field.corners(), along));
     let [low, high] = extent(field.corners(), &across);

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector2;
 
-/// A way that takes all vehicles equally long is cut into pieces of equal time, `leg_s` being that of a leg of some
-/// length in metres.
+/// A way that takes all vehicles equally long is cut into pieces of equal time, `leg_s` being that of a leg
+/// of some length in metres.
 pub fn cut_evenly(way: &[Vector2<f64>], pieces: usize, leg_s: &dyn Fn(f64) -> f64) -> Vec<Vec<Vector2<f64>>> {
     let takes_s = |leg: &[Vector2<f64>]| leg_s((leg[1] - leg[0]).norm());
     let piece_s = way.windows(2).map(takes_s).sum::<f64>() / pieces as f64;
@@ -29,8 +29,8 @@ pub fn cut_evenly(way: &[Vector2<f64>], pieces: usize, leg_s: &dyn Fn(f64) -> f6
     routes
 }
 
-/// How many vehicles each of some ways gets that take so long, one at least: so that the one that takes longest for each
-/// of its vehicles gets the next.
+/// How many vehicles each of some ways gets that take so long, one at least: so that the one that takes
+/// longest for each of its vehicles gets the next.
 pub fn vehicles_for(ways_s: &[f64], vehicles: usize) -> Vec<usize> {
     let mut counts = vec![1; ways_s.len()];
     for _ in ways_s.len()..vehicles {

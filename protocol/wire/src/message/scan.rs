@@ -10,8 +10,8 @@ use super::record::{Addressee, Kind, Record};
 use crate::decode_error::DecodeError;
 use crate::proto;
 
-/// One turn of a planar lidar in the vehicle's xy plane, with range finders up and down; and of an upright one, in its xz
-/// plane, if it has one.
+/// One turn of a planar lidar in the vehicle's xy plane, with range finders up and down; and of an upright
+/// one, in its xz plane, if it has one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
     /// When it was measured, on the clock of the program that holds it: time since its run began. Between programs it
