@@ -446,11 +446,15 @@ impl Control {
         let FlightPhase::Settling { until } = self.flight.phase() else { return };
         let sees = self.keep_alive(now) == KeepAlive::Command && self.doubt.is_none();
         let place = self.motion().filter(|_| sees && now < until).and_then(|motion| {
+            let stop = self.guidance.stop(&motion);
+            let spot = self.guidance.course.landing_place();
+            let spot = spot.map(|place| place.xy().push(motion.position.z));
             let descent = Descent {
                 name: &self.name,
                 position: motion.position,
                 speed_m_s: motion.velocity.xy().norm(),
-                stop: self.guidance.stop(&motion),
+                stop,
+                wanted: spot.unwrap_or(stop),
                 ground_m: self.config.home[2],
                 envelope: &self.config.envelope,
                 fence: &self.config.fence,
@@ -458,8 +462,6 @@ impl Control {
                 neighbours: self.neighbours.around(),
                 ground_seen: &self.ground_seen,
             };
-            let spot = self.guidance.course.landing_place();
-            let spot = spot.map(|place| place.xy().push(motion.position.z));
             descent.detour(self.guidance.steering.settles_at.or(spot))
         });
         self.guidance.steering.settles_at = place;

@@ -9,8 +9,8 @@ use skein_bp::script::Assignment;
 use skein_bp::{Event, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_wire::event::{
-    self, Advance, Complete, Declared as _, Enter, Failed, Goto, Hold, Land, Load, OrderTaken, Return, Right,
-    ScriptNews, Takeoff, Unload, What,
+    self, Advance, Complete, Declared as _, Enter, Failed, Goto, Hold, Land, Load, OrderTaken, PlaceFree,
+    PlaceTaken, Return, Right, ScriptNews, Takeoff, Unload, What,
 };
 use skein_wire::{
     Fleet, KeptScript, Limits, Link, MissionState, NodeLink, Readiness, State, Store, joint_roster,
@@ -34,6 +34,9 @@ use crate::{
 /// How many states of a script and the vehicle's program are looked at before it runs: no more than there is
 /// time for. `skein-agent verify --script` looks at all.
 const STATES_TRIED: usize = 500;
+
+/// What a task is told with while another vehicle has the place where it ends, and who that is.
+const BESIDE: &str = ", waiting beside it: ";
 
 /// Why a script is not taken in that nobody sends.
 const UNNAMED: &str = "the request names nobody: set `by` to the name of the person or program that makes it";
@@ -316,6 +319,13 @@ impl Mission {
                 leg => format!("leg {} of {}", leg + 1, self.config.waypoints.len()),
             },
             Some(Hold::NAME) => "holding".to_owned(),
+            Some(PlaceTaken::NAME) => {
+                PlaceTaken::read(event).map_or_else(String::new, |taken| self.beside(&taken))
+            }
+            Some(PlaceFree::NAME) => match self.task.split_once(BESIDE) {
+                Some((before, _)) => before.to_owned(),
+                None => return,
+            },
             Some(Return::NAME) if !is_landing => format!("returning: {why}"),
             Some(Land::NAME) => format!("landing: {why}"),
             Some(Complete::NAME) => {
@@ -328,6 +338,12 @@ impl Mission {
             }
             _ => return,
         };
+    }
+
+    /// The task of a vehicle whose place another one has.
+    fn beside(&self, taken: &PlaceTaken) -> String {
+        let before = self.task.split_once(BESIDE).map_or(self.task.as_str(), |(before, _)| before);
+        format!("{before}{BESIDE}{} is there", taken.by)
     }
 
     /// Has the scripts tried out that are sent, and answers what cannot be done.

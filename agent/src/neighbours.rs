@@ -75,6 +75,8 @@ pub struct Neighbour {
     pub node: NodeName,
     /// Whether its motors are armed: from before take-off until after landing.
     pub armed: bool,
+    /// The end of its path, as far as it told it; none if it has none. World ENU, m.
+    pub goal: Option<Vector3<f64>>,
     /// Its last word with age and uncertainty, as the separation takes it.
     pub track: separation::Neighbour,
     /// The way that it means to fly, if it has one.
@@ -83,10 +85,29 @@ pub struct Neighbour {
     pub right: Right,
 }
 
+/// A vehicle slower than this stands, m/s.
+pub const STANDING_M_S: f64 = 0.5;
+
 impl Neighbour {
     /// Where it should be now, metres ENU.
     pub fn position(&self) -> Vector3<f64> {
         self.track.predicted()
+    }
+
+    /// Whether it stands, as far as is known, or has fallen silent.
+    pub fn stands(&self) -> bool {
+        !self.track.cooperative || self.track.velocity.norm() < STANDING_M_S
+    }
+
+    /// The distance that a vehicle of this envelope keeps from it where both stand, centre to centre, m: more
+    /// from one that flies and has fallen silent.
+    pub fn kept_m(&self, envelope: &Envelope) -> f64 {
+        let is_lost = self.armed && !self.track.cooperative;
+        let track = match is_lost {
+            true => self.track,
+            false => separation::Neighbour { sigma_m: 0.0, age_s: 0.0, ..self.track },
+        };
+        separation::distance_kept_m(0.0, &track, &envelope.filter())
     }
 
     /// Whether it may fly where a vehicle of this envelope would climb from `place`, as far as can be known: one that
@@ -180,6 +201,7 @@ impl Neighbours {
             Neighbour {
                 node: state.node.clone(),
                 armed: state.armed,
+                goal: state.path.last().copied(),
                 way: heard.way.clone(),
                 right: state.right,
                 track: separation::Neighbour {

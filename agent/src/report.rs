@@ -8,8 +8,8 @@ use skein_mav::FlightMode;
 use skein_wire::event::{
     Airborne, Arrived, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed, Cornered,
     FenceBreached, FoundAirborne, InTheWay, Landed, Leave, OrderTaken, OutOfTheWay, PathBlocked, PilotTook,
-    Planned, PositionDoubted, PositionTrusted, Ready, Right, Slept, Stuck, TooClose, Unplannable, Unready,
-    What,
+    PlaceFree, PlaceTaken, Planned, PositionDoubted, PositionTrusted, Ready, Right, Slept, Stuck, TooClose,
+    Unplannable, Unready, What,
 };
 
 use crate::energy::Changed;
@@ -73,6 +73,13 @@ pub enum Report {
     Arrived {
         leg: i64,
     },
+    /// Another vehicle stays where the way of this leg ends.
+    PlaceTaken {
+        leg: i64,
+        by: NodeName,
+    },
+    /// Nobody does any more.
+    PlaceFree,
     /// The path runs into something.
     PathBlocked,
     /// The vehicle makes no progress in spite of leave to move.
@@ -118,6 +125,8 @@ impl Report {
             Self::Planned { leg, length_m } => me.event(Planned { leg, length_m }),
             Self::Unplannable { leg, why } => me.event(Unplannable { leg, why: why.into() }),
             Self::Arrived { leg } => me.event(Arrived { leg }),
+            Self::PlaceTaken { leg, by } => me.event(PlaceTaken { leg, by: by.as_str().into() }),
+            Self::PlaceFree => me.event(PlaceFree),
             Self::PathBlocked => me.event(PathBlocked),
             Self::Stuck => me.event(Stuck),
             Self::Passage(stretch) => match stretch.passage() {

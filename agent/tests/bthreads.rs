@@ -369,6 +369,51 @@ mod path {
     }
 }
 
+mod await_place {
+    use super::*;
+
+    fn taken(leg: i64) -> Event {
+        PlaceTaken { leg, by: "uav/4".into() }.at(ME)
+    }
+
+    #[test]
+    fn a_vehicle_waits_for_who_has_its_place_and_goes_on_when_that_is_gone() {
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.hears(taken(0));
+        assert_eq!(vehicle.after(19 * SECOND), NOTHING, "it has no leave to move");
+        assert_eq!(vehicle.reports(PlaceFree::NAME), ["place_free", "advance"]);
+    }
+
+    #[test]
+    fn it_waits_for_twenty_seconds_in_all_and_then_lands_and_says_for_whom_it_waited() {
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.hears(taken(0));
+        vehicle.after(15 * SECOND);
+        vehicle.reports(PlaceFree::NAME);
+        vehicle.hears(taken(0));
+        assert_eq!(vehicle.after(4 * SECOND), NOTHING);
+        let why = "uav/4 stays where it was to land";
+        assert_eq!(vehicle.after(SECOND), [format!("land: {why}")]);
+        assert_eq!(vehicle.reports(Landed::NAME), ["landed".to_owned(), format!("failed: {why}")]);
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.hears(taken(0));
+        vehicle.after(15 * SECOND);
+        vehicle.arrives(0);
+        vehicle.reports(Planned::NAME);
+        vehicle.hears(taken(1));
+        assert_eq!(vehicle.after(19 * SECOND), NOTHING, "for each waypoint anew");
+    }
+
+    #[test]
+    fn the_way_home_and_to_an_operators_point_is_not_waited_on() {
+        for leg in [-1, -2] {
+            let mut vehicle = Vehicle::on_its_way();
+            vehicle.hears(taken(leg));
+            assert!(vehicle.after(SECOND).contains(&"advance".to_owned()), "leg {leg}");
+        }
+    }
+}
+
 mod operator {
     use super::*;
 

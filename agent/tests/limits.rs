@@ -69,6 +69,7 @@ impl Flight {
             ranges_m: vec![f32::INFINITY; 720],
             up_m: None,
             down_m: None,
+            upright_m: Vec::new(),
         };
         let pose = Pose { position: self.motion.position, attitude: UnitQuaternion::identity() };
         self.perception.take_in(&scan, &pose, &[], &[]);

@@ -82,6 +82,7 @@ fn what_a_b_thread_is_for_fails_without_it() {
         ("separation", Scene::Energy, "with a neighbour inside the emergency distance"),
         ("obstacle_avoidance", Scene::Flight, "along a path that is known to be blocked"),
         ("right_of_way", Scene::Passage, "before a narrow passage"),
+        ("await_place", Scene::Flight, "while another vehicle has the place"),
         ("preflight", Scene::Launch, "no take-off unless the checks pass"),
         ("found_airborne", Scene::Pilot, "found in the air"),
         ("positioning", Scene::Position, "while its position is doubted"),

@@ -58,6 +58,7 @@ fn record(path: &Path, millis: u64) -> Result<Recorder, RecorderError> {
         ranges_m: (0..720_u16).map(|i| 3.0 + f32::from(i).sin()).collect(),
         up_m: None,
         down_m: None,
+        upright_m: Vec::new(),
     };
     for now in (0..millis).step_by(20) {
         let t = now as f64 / 1000.0;

@@ -31,8 +31,8 @@ impl fmt::Display for Findings {
 }
 
 /// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`), a mission (`.plan`, `.json`), or
-/// else a scenario.
-pub fn check(file: &Path, known: &Behaviours) -> Result<Findings, ScenarioError> {
+/// else a scenario; `thin_solids` may be in its way.
+pub fn check(file: &Path, thin_solids: bool, known: &Behaviours) -> Result<Findings, ScenarioError> {
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase());
     let (kind, holds, warnings) = match extension.as_deref() {
         Some("sdf" | "world" | "csv") => {
@@ -44,7 +44,11 @@ pub fn check(file: &Path, known: &Behaviours) -> Result<Findings, ScenarioError>
             ("mission", missions(&set), set.warnings.iter().map(ToString::to_string).collect())
         }
         _ => {
-            let scenario = Scenario::open_with(&file.to_string_lossy(), &Overrides::default(), 1, known)?;
+            let overrides = Overrides { thin_solids, ..Overrides::default() };
+            let scenario = Scenario::open_with(&file.to_string_lossy(), &overrides, 1, known)?;
+            if !thin_solids {
+                scenario.check_thin_solids()?;
+            }
             let holds = format!("{} vehicles, {}", scenario.vehicles.len(), world(&scenario.scene));
             ("scenario", holds, scenario.notes)
         }
@@ -70,7 +74,7 @@ mod tests {
     use super::*;
 
     fn check(file: &Path) -> Result<Findings, ScenarioError> {
-        super::check(file, &Behaviours::default())
+        super::check(file, false, &Behaviours::default())
     }
 
     #[test]
@@ -90,6 +94,34 @@ mod tests {
         assert_eq!(check(&mission)?.holds, "1 routes with 1 waypoints in all");
         assert_eq!(check(&scenario)?.holds, "4 vehicles, 1 obstacles in 100 x 100 x 21 m");
         assert_eq!(check(Path::new("forest"))?.kind, "scenario");
+        Ok(())
+    }
+
+    #[test]
+    fn what_a_planar_lidar_does_not_see_is_named_unless_that_is_taken_on()
+    -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("s.toml");
+        let bar = |height_m: f64, thickness_m: f64, model: &str| {
+            let text = format!(
+                "model = \"{model}\"\n[[vehicle]]\nstart_m = [0, 0]\nwaypoints_m = [[20, 0, 3.5]]\n\
+                 [[obstacle]]\nname = \"bar\"\ncentre_m = [9, 0, {height_m}]\nbox_m = [0.1, 8, {thickness_m}]\n"
+            );
+            std::fs::write(&path, text)
+        };
+        bar(4.2, 0.1, "x500")?;
+        let error = check(&path).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(
+            error.contains("`bar` (0.100 m, from 4.15 to 4.25 m") && error.contains("--thin-solids"),
+            "{error}"
+        );
+        assert!(super::check(&path, true, &Behaviours::default()).is_ok());
+        for (height_m, thickness_m, model) in
+            [(4.2, 0.1, "x500-vertical-scanner"), (4.2, 0.2, "x500"), (4.7, 0.1, "x500"), (0.05, 0.1, "x500")]
+        {
+            bar(height_m, thickness_m, model)?;
+            assert!(check(&path).is_ok(), "{height_m} m, {thickness_m} m, {model}");
+        }
         Ok(())
     }
 

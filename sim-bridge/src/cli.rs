@@ -70,6 +70,10 @@ pub enum Command {
     Check {
         /// A scenario (.toml), world (.sdf, .world, .csv) or mission (.plan, .json), or a built-in scenario's name.
         file: PathBuf,
+        /// Find nothing wrong with solids near the heights of flight that are thinner than 0.2 m in height,
+        /// which a planar lidar does not see.
+        #[arg(long)]
+        thin_solids: bool,
     },
 }
 

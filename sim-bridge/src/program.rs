@@ -56,7 +56,7 @@ fn run(cli: &Cli, known: &Behaviours) -> anyhow::Result<Exit> {
             list(cli.json);
             Ok(Exit::Done)
         }
-        Command::Check { file } => check(file, known, cli.json),
+        Command::Check { file, thin_solids } => check(file, *thin_solids, known, cli.json),
     }
 }
 
@@ -70,8 +70,8 @@ fn show(summary: &Summary, as_json: bool) -> anyhow::Result<()> {
 }
 
 /// An unsound file is an answer, and the check has failed; a file that cannot be read is wrong input.
-fn check(file: &Path, known: &Behaviours, as_json: bool) -> anyhow::Result<Exit> {
-    match check::check(file, known) {
+fn check(file: &Path, thin_solids: bool, known: &Behaviours, as_json: bool) -> anyhow::Result<Exit> {
+    match check::check(file, thin_solids, known) {
         Ok(findings) => {
             if as_json {
                 println!("{}", serde_json::to_string(&findings)?);

@@ -47,8 +47,8 @@ start_m = [-5.0, 0.0]
 waypoints_m = [[-5.0, 5.0, 2.5], [5.0, 0.0, 2.5]]
 
 [[vehicle]]
-start_m = [5.0, 0.5]
-waypoints_m = [[-5.0, 0.5, 3.0]]
+start_m = [5.0, 0.0]
+waypoints_m = [[-5.0, 0.0, 3.0]]
 yaw_rad = 1.0
 model = "crazyflie"
 
@@ -155,7 +155,7 @@ fn a_value_out_of_range_is_refused_with_its_field_and_what_was_expected() {
         ("radius_m = 0.3", "radius_m = nan", "25: field `obstacle[0].cylinder.radius_m`", "a number above 0"),
         ("[5.0, 0.0, 2.5]]", "[5.0, inf, 2.5]]", "15: field `vehicle[0].waypoints_m`", "finite"),
         ("order = \"hold\"", "order = \"stop\"", "9: field `order[1].order`", "`hold`"),
-        ("start_m = [5.0, 0.5]", "start_m = [5.0]", "11: field `vehicle[1].start_m`", "2"),
+        ("start_m = [5.0, 0.0]", "start_m = [5.0]", "11: field `vehicle[1].start_m`", "2"),
         ("box_m = [1.0, 2.0, 2.0]", "box_m = [1.0, 0.0, 2.0]", "9: field `obstacle[1].box_m`", "above 0"),
     ];
     for (from, to, place, expected) in cases {
@@ -181,19 +181,19 @@ fn fields_that_contradict_one_another_are_refused() {
 
 #[test]
 fn a_start_inside_an_obstacle_names_vehicle_obstacle_and_position() {
-    let text = message("start_m = [5.0, 0.5]", "start_m = [0.1, 0.0]");
+    let text = message("start_m = [5.0, 0.0]", "start_m = [0.1, 0.0]");
     assert!(text.starts_with("vehicle 2: start (0.10, 0.00, 0.00) is inside obstacle `pole`"), "{text}");
 }
 
 #[test]
 fn a_start_under_something_that_the_climb_would_meet_names_it_and_how_high_it_is() {
     let roof = |z: f64, x: f64| {
-        format!("[[obstacle]]\nname = \"roof\"\ncentre_m = [{x}, 0.5, {z}]\nbox_m = [2.0, 2.0, 0.2]\n[gps]")
+        format!("[[obstacle]]\nname = \"roof\"\ncentre_m = [{x}, 0.0, {z}]\nbox_m = [2.0, 2.0, 0.2]\n[gps]")
     };
     let fault = |z, x| read(&YARD.replacen("[gps]", &roof(z, x), 1)).err().map(|error| error.to_string());
     let text = fault(1.7, 5.0).unwrap_or_default();
     assert!(
-        text.starts_with("vehicle 2: obstacle `roof` is 1.6 m above the start (5.00, 0.50, 0.00)"),
+        text.starts_with("vehicle 2: obstacle `roof` is 1.6 m above the start (5.00, 0.00, 0.00)"),
         "{text}"
     );
     // Its hull would touch the roof's edge.
@@ -222,17 +222,65 @@ fn bounds_that_nobody_stated_grow_with_the_routes() -> Result<(), ScenarioError>
 
 #[test]
 fn vehicles_that_would_stand_in_one_another_are_refused() {
-    let text = message("start_m = [5.0, 0.5]", "start_m = [-5.0, 0.3]");
+    let text = message("start_m = [5.0, 0.0]", "start_m = [-5.0, 0.3]");
     assert!(text.starts_with("starts of vehicles 1 and 2 are 0.30 m apart: expected at least"), "{text}");
-    let text = message("[[-5.0, 0.5, 3.0]]", "[[5.0, 0.1, 6.0]]");
+    let text = message("[[-5.0, 0.0, 3.0]]", "[[5.0, 0.1, 6.0]]");
     assert!(text.starts_with("goals of vehicles 1 and 2 are 0.10 m apart"), "{text}");
 }
 
 #[test]
+fn goals_nearer_than_the_vehicles_keep_are_refused_to_one_another_and_beside_anothers_start() {
+    // A crazyflie keeps 5.6 hulls of 0.15 m from its like, and an X500 1.4 m from both.
+    let goal = |x: f64| YARD.replacen("[[-5.0, 0.0, 3.0]]", &format!("[[{x}, -6.0, 3.0]]"), 1);
+    let text = |x: f64| goal(x).replacen("[5.0, 0.0, 2.5]]", "[0.0, -6.0, 2.5]]", 1);
+    let error = read(&text(1.39)).expect_err("too near").to_string();
+    assert_eq!(
+        error,
+        "goals of vehicles 1 and 2 are 1.39 m apart: expected at least 1.40 m; move one of them"
+    );
+    assert!(read(&text(1.4)).is_ok());
+    let beside = |x: f64| YARD.replacen("[5.0, 0.0, 2.5]]", &format!("[{x}, 0.0, 2.5]]"), 1);
+    let error = read(&beside(5.8)).expect_err("too near").to_string();
+    assert!(
+        error.starts_with(
+            "goal of vehicle 1 is 0.80 m beside the start of vehicle 2: expected at least 1.40 m"
+        ),
+        "{error}"
+    );
+    assert!(read(&beside(6.4)).is_ok());
+    assert!(read(&beside(5.0)).is_ok_and(|yard| yard.musters()), "that very place is left first");
+}
+
+#[test]
+fn vehicles_that_are_in_the_air_together_start_as_far_apart_as_they_keep() {
+    let near = YARD.replacen("start_m = [5.0, 0.0]", "start_m = [-5.0, 1.0]", 1);
+    let near = near.replacen("[[-5.0, 0.0, 3.0]]", "[[9.0, 9.0, 3.0]]", 1);
+    assert!(read(&near).is_ok(), "one takes off when the other is gone");
+    let together = near.replacen("order = \"hold\"", "order = \"launch_together\"", 1);
+    let error = read(&together).expect_err("too near").to_string();
+    assert!(
+        error.starts_with("starts of vehicles 1 and 2 are 1.00 m apart: expected at least 1.40 m"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_task_whose_routes_end_too_near_to_one_another_is_refused() {
+    let formation = |spacing_m: f64| {
+        format!(
+            "vehicles = 3\n[formation]\nshape = \"line\"\nspacing_m = {spacing_m}\nleader_m = [[0, 0, 3], [9, 0, 3]]\n"
+        )
+    };
+    assert!(read(&formation(1.4)).is_ok());
+    let error = read(&formation(1.2)).expect_err("too near").to_string();
+    assert!(error.contains("of vehicles 1 and 2 are 1.20 m apart"), "{error}");
+}
+
+#[test]
 fn a_vehicle_without_a_way_or_below_the_ground_is_refused() {
-    let text = message("waypoints_m = [[-5.0, 0.5, 3.0]]", "");
+    let text = message("waypoints_m = [[-5.0, 0.0, 3.0]]", "");
     assert_eq!(text, "vehicle 2 has nowhere to go: give it waypoints or a mission");
-    let text = message("[[-5.0, 0.5, 3.0]]", "[[-5.0, 0.5, 0.0]]");
+    let text = message("[[-5.0, 0.0, 3.0]]", "[[-5.0, 0.5, 0.0]]");
     assert!(text.starts_with("vehicle 2: goal (-5.00, 0.50, 0.00) is not above the ground"), "{text}");
 }
 

@@ -3,6 +3,7 @@
 //! Adding a b-thread: write its file, name it in [`load`]. No other b-thread changes. One in a crate of one's own is a
 //! [`Behaviour`](skein_bp::behaviour::Behaviour).
 
+mod await_place;
 mod battery;
 pub mod escape;
 mod found_airborne;
@@ -27,6 +28,7 @@ mod together;
 
 use skein_bp::{BThread, Program};
 
+pub use await_place::{AwaitPlace, PATIENCE as PATIENCE_FOR_A_PLACE};
 pub use battery::Battery;
 pub use escape::Escape;
 pub use found_airborne::FoundAirborne;
@@ -81,6 +83,7 @@ pub fn load_with(program: &mut Program, config: &AgentConfig, right_of_way: impl
     program.add("reposition", Reposition::new(me.clone()));
     program.add("return_home", ReturnHome::new(me.clone(), [x, y, config.return_altitude_m]));
     program.add("escape", Escape::new(me.clone()));
+    program.add("await_place", AwaitPlace::new(me.clone()));
     program.add("mission", Mission::new(me.clone(), &config.waypoints));
     program.add("path_planning", PathPlanning::new(me.clone()));
     program.add("navigation", Navigation::new(me));

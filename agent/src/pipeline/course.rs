@@ -1,6 +1,7 @@
 //! The course: the waypoint that a vehicle flies to, and the path that leads there.
 
 use nalgebra::Vector3;
+use skein_dbp::NodeName;
 use skein_planning::{Path, Region, map::ClearanceMap};
 
 use super::global::Found;
@@ -20,6 +21,8 @@ const LEAST_FLOWN_M: f64 = 2.0;
 pub struct Course {
     pub waypoint: Option<Waypoint>,
     pub has_arrived: bool,
+    /// Who stays where the waypoint is, nearer than this vehicle may come.
+    pub taken_by: Option<NodeName>,
     pub following: Option<Following>,
 }
 
@@ -46,9 +49,10 @@ impl Course {
         Self { waypoint: Some(waypoint), ..Self::default() }
     }
 
-    /// The waypoint, if the vehicle has arrived there to land.
+    /// The waypoint, if the vehicle has arrived there to land, or as near as it could.
     pub fn landing_place(&self) -> Option<Vector3<f64>> {
-        self.waypoint.filter(|waypoint| waypoint.lands && self.has_arrived).map(|waypoint| waypoint.target)
+        let is_there = self.has_arrived || self.taken_by.is_some();
+        self.waypoint.filter(|waypoint| waypoint.lands && is_there).map(|waypoint| waypoint.target)
     }
 }
 

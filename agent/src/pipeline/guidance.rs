@@ -20,7 +20,7 @@ use super::{
     headroom::Headroom,
     layers::Layers,
     planning::{InTheWay, Planning},
-    progress::{Around, Felt, Progress},
+    progress::{Around, Felt, Leave, Progress},
     steering::{Lead, Steering},
     surroundings::Surroundings,
     way_of_others::{WayOfOthers, goes_first},
@@ -69,7 +69,7 @@ impl Guidance {
             headroom: Headroom::OPEN,
             course: Course::default(),
             planning: Planning::new(envelope, fence, finder, potential),
-            progress: Progress::new(envelope.separation_m, passages, escape),
+            progress: Progress::new(envelope, passages, escape),
             way_of_others: WayOfOthers::new(envelope.separation_m, &passages),
             aside: None,
             steering: Steering::new(envelope, follower, repulsion, filter),
@@ -286,11 +286,15 @@ impl Guidance {
     ) -> Vec<Report> {
         let aside = self.keep_aside(now, motion, map, neighbours);
         let (has_leave, allowed, makes_way) = (self.has_leave(now), self.allowed(), self.aside.is_some());
-        let moves_at = (has_leave && !makes_way).then_some(now);
+        let leave = match (has_leave, makes_way) {
+            (_, true) => Leave::ToMakeWay,
+            (true, false) => Leave::ToMove,
+            (false, false) => Leave::None,
+        };
         let room = (&allowed, self.headroom);
         let felt = Felt { forces: self.steering.forces(), movers: self.steering.movers() };
         let around = Around { map, neighbours, felt };
-        let along = self.progress.look_ahead(moves_at, makes_way, &mut self.course, room, motion, &around);
+        let along = self.progress.look_ahead(now, leave, &mut self.course, room, motion, &around);
         if has_leave && !makes_way {
             let movers = self.steering.movers();
             let in_the_way = InTheWay { is_stuck: false, minimum: None, neighbours, movers };

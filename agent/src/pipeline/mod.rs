@@ -6,6 +6,7 @@
 
 pub mod acceleration;
 pub mod allowed;
+mod berth;
 pub mod course;
 mod envelope;
 pub mod evasion;

@@ -35,6 +35,11 @@ const MOVER_M: f64 = 0.4;
 /// Returns nearer than this are the vehicle's own frame, m.
 const OWN_FRAME_M: f64 = 0.15;
 
+/// What only the upright lidar sees is level: it reaches so far to both sides of its plane, m.
+const ROW_HALF_M: f64 = 3.0;
+/// What the level lidar has seen nearer than this, over ground, is upright, m.
+const UPRIGHT_M: f64 = 0.5;
+
 /// The map reaches this far above the highest waypoint, m: as far as a path may climb over something, and more.
 const ABOVE_WAYPOINTS_M: f64 = 4.0;
 /// A path may pass under something, this far below the lowest waypoint, m.
@@ -306,13 +311,51 @@ impl Perception {
                 self.ends.push(RayEnd { point, hit: true });
             }
         }
+        let rows = self.rows(scan, pose, neighbours);
+        let is_near = |point: &&Vector3<f64>| (*point - pose.position).norm() < self.near_m;
+        rows.iter().filter(is_near).for_each(|point| near.add(*point));
         self.near = near.points().collect();
         if self.rolls {
             self.map.recentre(&pose.position);
         }
         self.map.fade(scan.stamp);
         self.map.integrate(pose.position, &self.ends);
+        for point in rows {
+            // The way there was not looked along.
+            self.map.integrate(point, &[RayEnd { point, hit: true }]);
+        }
         true
+    }
+
+    /// What the upright lidar sees and the level one does not: cables, bars, edges of roofs. It sees a slice
+    /// of them, so each point stands for a row across its plane, as a point of the level one stands for a
+    /// column.
+    fn rows(&self, scan: &Scan, pose: &Pose, neighbours: &[Other]) -> Vec<Vector3<f64>> {
+        let to_world = pose.attitude.to_rotation_matrix();
+        let Some(side) = (to_world * Vector3::y()).xy().try_normalize(1e-6) else { return Vec::new() };
+        let step = std::f64::consts::TAU / scan.upright_m.len().max(1) as f64;
+        let mut seen: Vec<Vector3<f64>> = Vec::new();
+        for (ray, &range) in (0_u32..).zip(&scan.upright_m) {
+            let range = f64::from(range);
+            if !(OWN_FRAME_M..MAP_RANGE_M.min(scan.max_range_m)).contains(&range) {
+                continue;
+            }
+            let (sin, cos) = (f64::from(ray) * step).sin_cos();
+            let point = pose.position + to_world * Vector3::new(range * cos, 0.0, range * sin);
+            let is_one = seen.last().is_some_and(|last| (last - point).norm() < 0.5 * RESOLUTION_M);
+            let is_other = |other: &Other| (point - other.position).norm() < NEIGHBOUR_M + other.off_m;
+            if point.z > self.ground_m && !is_one && !neighbours.iter().any(is_other) {
+                seen.push(point);
+            }
+        }
+        let is_upright =
+            |point: &Vector3<f64>| self.returns.iter().any(|other| (other - point).xy().norm() < UPRIGHT_M);
+        let half = (ROW_HALF_M / RESOLUTION_M) as i32;
+        let thin = seen.into_iter().filter(|point| !is_upright(point));
+        let row = |point: Vector3<f64>| {
+            (-half..=half).map(move |k| point + (side * (f64::from(k) * RESOLUTION_M)).push(0.0))
+        };
+        thin.flat_map(row).collect()
     }
 }
 
@@ -354,6 +397,7 @@ mod tests {
             ranges_m: (0..720).map(range).collect(),
             up_m: None,
             down_m: None,
+            upright_m: Vec::new(),
         }
     }
 
@@ -373,6 +417,31 @@ mod tests {
         // Nose down by 12 degrees at 0.9 m, beams meet the ground 4.3 m ahead.
         assert!(seen(0.9, 12.0, 100.0).is_empty());
         assert!(!seen(0.9, 12.0, 2.0).is_empty(), "but a wall is");
+    }
+
+    #[test]
+    fn what_only_the_upright_lidar_sees_stands_for_a_row_across() {
+        let fence = Fence { min: [-30.0, -30.0, -1.0], max: [30.0, 30.0, 10.0] };
+        let mut perception = Perception::new(&fence, Vector3::zeros(), [0.6, 8.0]).unwrap();
+        let pose = Pose { position: Vector3::new(0.0, 0.0, 3.0), attitude: UnitQuaternion::identity() };
+        // A cable 5 m ahead and 0.5 m higher, and a wall 8 m behind, which the level lidar sees too.
+        let ray = |ray: usize| match ray {
+            57 => (5.0_f64.hypot(0.5)) as f32,
+            1800 => 8.0,
+            1805 => (8.0 / (1805.0_f64 * std::f64::consts::TAU / 3600.0).cos().abs()) as f32,
+            _ => f32::INFINITY,
+        };
+        let mut seen = Scan { upright_m: (0..3600).map(ray).collect(), ..scan(&pose, 100.0) };
+        seen.ranges_m[360] = 8.0;
+        perception.take_in(&seen, &pose, &[]);
+        let clearance_m = |x, y, z| perception.map().clearance(&Vector3::new(x, y, z));
+        for y in [-2.5, 0.0, 2.5] {
+            assert!(clearance_m(5.0, y, 3.5) < 0.3, "the cable at {y}");
+        }
+        assert!(clearance_m(5.0, 4.5, 3.5) > 1.0 && clearance_m(5.0, 0.0, 5.5) > 1.0, "it ends somewhere");
+        assert!(clearance_m(-8.0, 1.5, 3.0) > 1.0, "what is upright is no row");
+        let ahead = perception.obstacles().iter().filter(|point| point.x > 4.5).count();
+        assert!(ahead >= 8, "the filter keeps off {ahead} points of it");
     }
 
     #[test]

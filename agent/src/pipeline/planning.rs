@@ -16,7 +16,7 @@ use super::{
 use crate::{
     config::{Envelope, Fence},
     instruction::Waypoint,
-    neighbours::Neighbour,
+    neighbours::{Neighbour, STANDING_M_S},
     positioning::Motion,
     report::Report,
 };
@@ -31,8 +31,6 @@ const SAME_PLACE_M: f64 = 1e-6;
 const MINIMUM_M: f64 = 0.7;
 /// Something that moves is taken to go straight on for so long at most, s.
 const FORESEEN_S: f64 = 3.0;
-/// A vehicle slower than this stands, m/s.
-const STANDING_M_S: f64 = 0.5;
 
 /// What lies beyond the goal of a search.
 #[derive(Clone, Copy, Debug)]

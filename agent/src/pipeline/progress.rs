@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
+use skein_dbp::NodeName;
 use skein_planning::{
     Path,
     local::escape::{EscapeConfig, EscapeDetector, Forces, Verdict},
@@ -13,11 +14,15 @@ use skein_planning::{
 
 use super::{
     allowed::Allowed,
+    berth::Berth,
     course::{Course, Following},
     headroom::Headroom,
     patience::Patience,
 };
-use crate::{neighbours::Neighbour, positioning::Motion, report::Report, stretch::Stretch};
+use crate::{
+    bthreads::OPERATOR_LEG, config::Envelope, neighbours::Neighbour, positioning::Motion, report::Report,
+    stretch::Stretch,
+};
 
 /// The last waypoint is reached within this distance, m.
 const ARRIVAL_M: f64 = 0.35;
@@ -50,6 +55,16 @@ pub struct Felt<'a> {
     pub movers: &'a [separation::Neighbour],
 }
 
+/// Whether the vehicle has leave to move, and where to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Leave {
+    None,
+    /// Along its path.
+    ToMove,
+    /// Out of the way of another.
+    ToMakeWay,
+}
+
 /// What is around the vehicle.
 #[derive(Clone, Copy, Debug)]
 pub struct Around<'a> {
@@ -61,8 +76,8 @@ pub struct Around<'a> {
 /// Watches the vehicle on its course.
 #[derive(Debug)]
 pub struct Progress {
-    /// Centre-to-centre distance that is kept between vehicles, m.
-    separation_m: f64,
+    envelope: Envelope,
+    berth: Berth,
     passages: PassageConfig,
     /// The narrow stretch that was announced last.
     announced: Vec<Piece>,
@@ -75,16 +90,17 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Watches a vehicle that keeps so far from others, m. Passages and local minima are found as configured.
-    pub fn new(separation_m: f64, passages: PassageConfig, escape: EscapeConfig) -> Self {
+    /// Watches a vehicle of this envelope. Passages and local minima are found as configured.
+    pub fn new(envelope: Envelope, passages: PassageConfig, escape: EscapeConfig) -> Self {
         Self {
-            separation_m,
+            envelope,
+            berth: Berth::default(),
             passages,
             announced: Vec::new(),
             queues_since: None,
             escape: EscapeDetector::new(escape),
             minimum: None,
-            patience: Patience::new(separation_m),
+            patience: Patience::new(envelope.separation_m),
         }
     }
 
@@ -95,6 +111,7 @@ impl Progress {
     /// The flight is over.
     pub fn forget(&mut self) {
         self.announced.clear();
+        self.berth.forget();
         self.minimum = None;
         self.patience.forget();
     }
@@ -114,23 +131,25 @@ impl Progress {
         self.escape.attraction()
     }
 
-    /// Looks along the path, once in each navigation cycle; `moves_at` is the time, if there is leave to move along it
-    /// now. A vehicle that makes way does not follow it.
+    /// Looks along the path, once in each navigation cycle. A vehicle that makes way does not follow it.
     pub fn look_ahead(
         &mut self,
-        moves_at: Option<Duration>,
-        makes_way: bool,
+        now: Duration,
+        leave: Leave,
         course: &mut Course,
         (allowed, headroom): (&Allowed, Headroom),
         motion: &Motion,
         &Around { map, neighbours, felt }: &Around<'_>,
     ) -> Vec<Report> {
         let mut reports = Vec::new();
+        reports.extend(self.berth.look(now, course, &motion.position, &self.envelope, neighbours));
         reports.extend(self.check_arrival(course, (allowed, headroom), motion, neighbours));
-        if !makes_way {
+        if leave != Leave::ToMakeWay {
             reports.extend(check_path(course, allowed, motion, map));
         }
-        reports.extend(self.check_passage(course.following.as_ref(), makes_way, motion, map));
+        let following = course.following.as_ref();
+        reports.extend(self.check_passage(following, leave == Leave::ToMakeWay, motion, map));
+        let moves_at = Some(now).filter(|_| leave == Leave::ToMove);
         let moves_at = moves_at.filter(|now| !self.queues(*now, course, motion, map, neighbours));
         reports.extend(self.check_progress(moves_at, course, motion, felt));
         reports
@@ -148,25 +167,37 @@ impl Progress {
         (allowed, headroom): (&Allowed, Headroom),
         motion: &Motion,
         neighbours: &[Neighbour],
-    ) -> Option<Report> {
-        let waypoint = course.waypoint?;
+    ) -> Vec<Report> {
+        let Some(waypoint) = course.waypoint.filter(|_| !course.has_arrived) else { return Vec::new() };
         // A place that is too high or too low to be flown to is reached over or under it.
         let offset = allowed.region.clamp_height(&waypoint.target) - motion.position;
-        let is_taken = neighbours.iter().any(|neighbour| {
-            neighbour.armed && (neighbour.position() - waypoint.target).norm() < self.separation_m
+        let separation_m = self.envelope.separation_m;
+        let holder = neighbours.iter().find(|neighbour| {
+            neighbour.armed && (neighbour.position() - waypoint.target).norm() < separation_m
         });
-        let within_m = match (waypoint.lands, is_taken) {
+        // Who has landed where this one is to, or stays where it comes home, is not waited for.
+        let is_down = |node: &NodeName| neighbours.iter().any(|other| other.node == *node && !other.armed);
+        let lands_beside = course.taken_by.as_ref().is_some_and(|by| waypoint.is_home || is_down(by));
+        let within_m = match (waypoint.lands, holder) {
+            (true, _) if lands_beside => f64::INFINITY,
             (true, _) => ARRIVAL_M,
-            (false, false) => PASSING_M,
+            (false, None) => PASSING_M,
             // A place in the air that another vehicle has is passed at a distance, not fought over.
-            (false, true) => 2.0 * self.separation_m,
+            (false, Some(_)) => 2.0 * separation_m,
         };
         // Above or under what covers its home it is as near to it as it can come: where it lands, is seen then.
         let is_covered = waypoint.is_home && headroom.ends_before(offset.z);
-        let arrives = offset.xy().norm() < within_m && offset.z.abs() < ARRIVAL_HEIGHT_M
+        let arrives = offset.xy().norm() < within_m && (offset.z.abs() < ARRIVAL_HEIGHT_M || lands_beside)
             || is_covered && offset.xy().norm() < COVERED_M;
-        (arrives && !std::mem::replace(&mut course.has_arrived, true))
-            .then_some(Report::Arrived { leg: waypoint.leg })
+        if !arrives {
+            return Vec::new();
+        }
+        course.has_arrived = true;
+        let leg = waypoint.leg;
+        let is_beside = leg == OPERATOR_LEG && offset.xy().norm() > PASSING_M;
+        let beside =
+            holder.filter(|_| is_beside).map(|other| Report::PlaceTaken { leg, by: other.node.clone() });
+        beside.into_iter().chain([Report::Arrived { leg }]).collect()
     }
 
     /// Announces what is narrow ahead, with what the vehicle is in; nothing of what is ahead while it makes way.
@@ -217,10 +248,12 @@ impl Progress {
                 .map(Neighbour::position)
                 .filter(|place| (place - motion.position).norm() < QUEUES_M)
                 .map(|place| path.project_within(&place, *station_m, station_m + QUEUES_M))
-                .filter(|on_path| on_path.distance_m < self.separation_m && on_path.station_m > *station_m);
+                .filter(|on_path| {
+                    on_path.distance_m < self.envelope.separation_m && on_path.station_m > *station_m
+                });
             near.any(|on_path| {
                 let width_m = self.passages.width_m;
-                is_narrow_around(map, path, on_path.station_m, self.separation_m, width_m)
+                is_narrow_around(map, path, on_path.station_m, self.envelope.separation_m, width_m)
             })
         };
         if !course.following.as_ref().is_some_and(is_ahead) {

@@ -41,6 +41,8 @@ pub struct Descent<'a> {
     pub speed_m_s: f64,
     /// Where it would come to a stop: from there it would go down.
     pub stop: Vector3<f64>,
+    /// Where it should land, at its height: places near there are tried first.
+    pub wanted: Vector3<f64>,
     /// Height of the ground.
     pub ground_m: f64,
     pub envelope: &'a Envelope,
@@ -54,12 +56,24 @@ pub struct Descent<'a> {
     pub ground_seen: &'a GroundSeen,
 }
 
+/// How far a vehicle lands from others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Apart {
+    /// As far as it keeps from them in flight.
+    AsFlown,
+    /// So far that hulls do not touch: where there is no better place.
+    Hulls,
+}
+
 impl Descent<'_> {
     /// Where to go first, at the vehicle's height: `None` if it is slow and can go down where it is, or nowhere within
     /// reach. `chosen` is kept as long as it will do.
     pub fn detour(&self, chosen: Option<Vector3<f64>>) -> Option<Vector3<f64>> {
-        let mut places = chosen.into_iter().chain(self.places());
-        let place = places.find(|place| self.is_free_below(place) && self.can_be_reached(place))?;
+        let find = |apart: Apart| {
+            let mut places = chosen.into_iter().chain(self.places());
+            places.find(|place| self.is_free_below(place, apart) && self.can_be_reached(place))
+        };
+        let place = find(Apart::AsFlown).or_else(|| find(Apart::Hulls))?;
         let is_there = self.speed_m_s < SLOW_M_S && (place - self.stop).xy().norm() <= ARRIVAL_M;
         (!is_there).then_some(place)
     }
@@ -71,7 +85,7 @@ impl Descent<'_> {
         let seen = if is_covered { self.ground_seen.places(&self.stop) } else { Vec::new() };
         let is_near = |place: &Vector3<f64>| (place - self.stop).xy().norm() <= FURTHEST_M;
         let level: Vec<_> =
-            seen.into_iter().filter(is_near).chain(places_around(&self.stop, REACH_M)).collect();
+            seen.into_iter().filter(is_near).chain(places_around(&self.wanted, REACH_M)).collect();
         let lifts = if is_covered { 2 } else { 1 };
         (0..lifts).flat_map(move |lift| {
             let lift = Vector3::z() * (f64::from(lift) * LIFT_M);
@@ -79,12 +93,16 @@ impl Descent<'_> {
         })
     }
 
-    /// Whether nobody and nothing known is straight below a place.
-    fn is_free_below(&self, place: &Vector3<f64>) -> bool {
+    /// Whether nobody and nothing known is below a place, nor beside it on the ground.
+    fn is_free_below(&self, place: &Vector3<f64>, apart: Apart) -> bool {
         let drift_m = DRIFT_M + STOPS_WITHIN * (self.stop - self.position).xy().norm();
         let is_apart = |neighbour: &Neighbour| {
-            let reach_m = self.envelope.hull_m + neighbour.track.radius_m + drift_m;
-            (neighbour.position() - place).xy().norm() >= reach_m
+            let hulls_m = self.envelope.hull_m + neighbour.track.radius_m;
+            let kept_m = match apart {
+                Apart::AsFlown => neighbour.kept_m(self.envelope).max(hulls_m),
+                Apart::Hulls => hulls_m,
+            };
+            (neighbour.position() - place).xy().norm() >= kept_m + drift_m
         };
         self.neighbours.iter().filter(|neighbour| self.gives_way_to(neighbour)).all(is_apart)
             && self.map.keep_out().is_none_or(|zones| zones.room_below_m(place, self.ground_m) >= 0.0)
@@ -165,7 +183,7 @@ mod tests {
             radius_m: 0.25,
             cooperative: true,
         };
-        Neighbour { node: name(node), armed, track, way: None, right: Right::Free }
+        Neighbour { node: name(node), armed, goal: None, track, way: None, right: Right::Free }
     }
 
     fn map() -> ClearanceMap {
@@ -193,6 +211,7 @@ mod tests {
             position: HERE,
             speed_m_s: 0.0,
             stop: HERE,
+            wanted: HERE,
             ground_m: 0.0,
             envelope: &envelope,
             fence: &FENCE,
@@ -206,7 +225,7 @@ mod tests {
     #[test]
     fn over_free_ground_there_is_no_detour() {
         assert_eq!(detour(&map(), &[], None), None);
-        assert_eq!(detour(&map(), &[other("uav/1", [1.0, 0.0, 0.1], false)], None), None, "it stands aside");
+        assert_eq!(detour(&map(), &[other("uav/1", [1.8, 0.0, 0.1], false)], None), None, "it stands aside");
     }
 
     #[test]
@@ -220,6 +239,7 @@ mod tests {
                 position: HERE,
                 speed_m_s,
                 stop,
+                wanted: stop,
                 ground_m: 0.0,
                 envelope,
                 fence,
@@ -248,7 +268,7 @@ mod tests {
     fn the_place_is_near_and_kept_while_it_will_do() {
         let below = other("uav/1", [0.0, 0.0, 0.1], false);
         let place = detour(&map(), std::slice::from_ref(&below), None).unwrap();
-        assert!((0.8..1.6).contains(&(place - HERE).norm()), "{place}");
+        assert!((1.7..2.6).contains(&(place - HERE).norm()), "as far off as it flies: {place}");
         let chosen = HERE + Vector3::new(-3.0, 2.0, 0.0);
         assert_eq!(detour(&map(), std::slice::from_ref(&below), Some(chosen)), Some(chosen));
         let taken = other("uav/2", [-3.2, 2.0, 0.1], false);

@@ -225,6 +225,7 @@ mod tests {
             self.neighbours.push(Neighbour {
                 node: NodeName::new("uav/2").unwrap(),
                 armed: false,
+                goal: None,
                 track,
                 way: None,
                 right: Right::Free,

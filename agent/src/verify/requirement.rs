@@ -4,10 +4,10 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::facts::{BlockLapsed, Confirmed, DuplicateName, PeerJoined, PeerLost, Stalled};
 use skein_wire::event::{
-    Advance, Airborne, BatteryCritical, BatteryLow, Clear, CommandFailed, Complete, Enter, Failed,
+    Advance, Airborne, Arrived, BatteryCritical, BatteryLow, Clear, CommandFailed, Complete, Enter, Failed,
     FenceBreached, FoundAirborne, Goto, HandBack, Homeward, Land, Landed, Leave, MOTION, MakeWay, OrderTaken,
-    Passage, PathBlocked, PilotTook, Plan, Planned, PositionDoubted, PositionTrusted, Ready, Return, Slept,
-    Stuck, Takeoff, TooClose, Unready, What,
+    Passage, PathBlocked, PilotTook, PlaceFree, PlaceTaken, Plan, Planned, PositionDoubted, PositionTrusted,
+    Ready, Return, Slept, Stuck, Takeoff, TooClose, Unready, What,
 };
 
 use crate::bthreads::{HOME_LEG, OPERATOR_LEG, RIGHT_OF_WAY};
@@ -189,6 +189,12 @@ pub fn requirements(me: &Me, fence: &Fence) -> Vec<Requirement> {
             leave.clone(),
             me.any::<PathBlocked>(),
             me.any::<(Planned, Goto, Land)>(),
+        ),
+        Requirement::absence(
+            "while another vehicle has the place of its leg there is no leave to move there",
+            me.any::<Advance>(),
+            me.any::<PlaceTaken>().and(PlaceTaken::leg(0)),
+            me.any::<(PlaceFree, Arrived, Goto, Land, Landed)>(),
         ),
         Requirement::absence(
             "before a narrow passage there is no leave to move until it is entered, but to make way",

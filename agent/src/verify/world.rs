@@ -11,8 +11,8 @@ use skein_wire::event::{
     Abort, Advance, Ahead, Airborne, Arrived, At, BatteryCritical, BatteryLevel, BatteryLow, Clear,
     CommandFailed, Cornered, Declared as _, Enter, FenceBreached, FoundAirborne, Goto, HandBack, Handover,
     InTheWay, Land, Landed, Launch, Leave, Load, MakeWay, NeighbourAt, OrderTaken, OutOfTheWay, Passage,
-    PathBlocked, PilotTook, Plan, Planned, PositionDoubted, PositionTrusted, Ready, Right, SWARM, Slept,
-    Stuck, Takeoff, TooClose, Unload, Unplannable, Unready, What,
+    PathBlocked, PilotTook, PlaceFree, PlaceTaken, Plan, Planned, PositionDoubted, PositionTrusted, Ready,
+    Right, SWARM, Slept, Stuck, Takeoff, TooClose, Unload, Unplannable, Unready, What,
 };
 
 use super::part::{Part, Place};
@@ -26,11 +26,13 @@ pub(super) const UNHEARD_OF: &str = "not heard of";
 
 /// Reports of the autopilot and the guidance that come only while the agent flies the vehicle.
 type OnTheWay = (Arrived, PathBlocked, Stuck, Passage, At, Ahead, NeighbourAt, BatteryLevel);
-/// The same about the ways of others.
-type AmongOthers = (InTheWay, Cornered);
 /// Reports of watches that look in the air only.
 type InTheAir =
     (BatteryLow, BatteryCritical, FenceBreached, TooClose, Clear, PositionDoubted, PositionTrusted);
+
+fn on_the_way(me: &Me) -> EventSet {
+    me.any::<OnTheWay>().or(me.any::<(PlaceTaken, PlaceFree, InTheWay, Cornered)>())
+}
 
 /// The flight as `flight.rs` conducts it with the autopilot; `disturbed`: commands may fail, and a pilot may take over.
 pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
@@ -38,15 +40,9 @@ pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
         Place::new(name)
             .hears(me.any::<Takeoff>(), "taking off")
             .rules_out(me.any::<InTheAir>())
-            .rules_out(me.any::<OnTheWay>())
-            .rules_out(me.any::<AmongOthers>())
+            .rules_out(on_the_way(me))
     };
-    let not_flying = |name: &str| {
-        Place::new(name)
-            .rules_out(me.any::<OnTheWay>())
-            .rules_out(me.any::<AmongOthers>())
-            .rules_out(me.any::<Ready>())
-    };
+    let not_flying = |name: &str| Place::new(name).rules_out(on_the_way(me)).rules_out(me.any::<Ready>());
     let taken = |place: Place| match disturbed.pilot {
         true => place.offers(me.event(PilotTook { mode: "manual".into(), by: "pilot".into() }), "taken"),
         false => place,
@@ -60,12 +56,8 @@ pub(super) fn flight(me: &Me, disturbed: Disturbed) -> Part {
         true => taken(grounded(UNHEARD_OF)).offers(me.event(FoundAirborne), "adopted"),
         false => grounded(UNHEARD_OF),
     };
-    let taking_off = lands(
-        Place::new("taking off")
-            .rules_out(me.any::<OnTheWay>())
-            .rules_out(me.any::<AmongOthers>())
-            .offers(me.event(Airborne), "flying"),
-    );
+    let taking_off =
+        lands(Place::new("taking off").rules_out(on_the_way(me)).offers(me.event(Airborne), "flying"));
     let taking_off = match disturbed.refusals {
         true => taking_off.offers(me.event(CommandFailed { why: "Arm: denied".into() }), ON_THE_GROUND),
         false => taking_off,
@@ -126,12 +118,14 @@ pub(super) fn guidance(me: &Me, legs: &[i64], hard: bool) -> Part {
         places.push(place(&arrived));
         if hard {
             places.push(new_leg(plans.offers(no_path, to(*leg))));
-            places.push(
-                follows
-                    .offers(me.event(PathBlocked), blocked.as_str())
-                    .keeps_offering(me.event(Stuck))
-                    .keeps_offering(planned),
-            );
+            let follows = follows
+                .offers(me.event(PathBlocked), blocked.as_str())
+                .keeps_offering(me.event(Stuck))
+                .keeps_offering(planned);
+            let taken = format!("beside who has {leg}");
+            let by = || me.event(PlaceTaken { leg: *leg, by: "uav/2".into() });
+            places.push(follows.offers(by(), taken.as_str()));
+            places.push(arrives(place(&taken)).offers(me.event(PlaceFree), following.as_str()));
             places.push(arrives(place(&blocked)).keeps_offering(me.event(Stuck)));
         } else {
             places.push(new_leg(plans));

@@ -11,20 +11,15 @@ use skein_wire::{Fleet, standard_authority};
 use skein_world::{SimulationConfig, VehicleSetup};
 
 use crate::cli;
-use crate::scenario::{self, Scenario, VehiclePlan};
+use crate::scenario::{self, Scenario};
 use crate::sequential::Sequential;
 
 /// The fleet's name on one host.
 pub const FLEET: &str = "sim";
-/// Distance that vehicles keep from centre to centre, in hull radii: 1.4 m for a vehicle of 0.25 m.
-const SEPARATION_HULLS: f64 = 5.6;
 /// Lowest height at which vehicles return, m above the world's origin.
 const RETURN_ALTITUDE_M: f64 = 3.0;
 /// Vehicles return at so many heights, this far apart, m.
 const RETURN_LEVELS: (usize, f64) = (4, 1.0);
-
-/// A goal nearer than this to where another vehicle stands needs that one gone, m.
-const ROOM_TO_LAND_M: f64 = 1.5;
 
 /// The ground station's node name.
 pub static GROUND: LazyLock<NodeName> = LazyLock::new(|| node_name("ground", "main"));
@@ -101,7 +96,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
                 endurance_s: plan.model.endurance_s(),
                 brake_m_s2: plan.model.max_accel_m_s2 * 0.7,
                 hull_m: plan.model.hull_radius_m,
-                separation_m: SEPARATION_HULLS * plan.model.hull_radius_m,
+                separation_m: scenario.separation_m(plan),
                 ..Envelope::default()
             },
             planners: scenario.planners,
@@ -141,15 +136,6 @@ fn scripts_of(scenario: &Scenario, number: usize) -> Vec<Assignment> {
     own.map(|script| script.assignment.clone()).collect()
 }
 
-/// Some vehicle's goal is where another stands before it takes off.
-fn swaps_places(scenario: &Scenario) -> bool {
-    let vehicles = &scenario.vehicles;
-    vehicles.iter().enumerate().any(|(index, one)| {
-        let near = |other: &VehiclePlan| (one.goal() - other.start).xy().norm() < ROOM_TO_LAND_M;
-        vehicles.iter().enumerate().any(|(other_index, other)| other_index != index && near(other))
-    })
-}
-
 /// Lease of every node's bids.
 fn lease(scenario: &Scenario) -> Duration {
     Duration::from_secs_f64(scenario.network.lease_ms / 1000.0)
@@ -171,7 +157,7 @@ pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Control
         orders: orders.collect(),
         loaded: controller == cli::Controller::Bp,
         launch_on_order: scenario.orders.iter().any(|said| said.order.is_launch()),
-        muster: scenario.muster || swaps_places(scenario),
+        muster: scenario.musters(),
         behaviours: scenario.behaviours.clone(),
         operators: NodeName::new(SCRIPT).into_iter().collect(),
         lease: lease(scenario),

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use skein_world::{CsvError, SdfError, VehicleError};
 use thiserror::Error;
 
+use super::thin_solids::ThinSolids;
 use crate::mission::MissionError;
 
 /// Why a scenario cannot be flown. Lines, columns and vehicles are numbered from 1; places are ENU, in metres.
@@ -60,9 +61,16 @@ pub enum ScenarioError {
     #[error("vehicle {vehicle}: {what} {} is in a no-fly zone, in a threat or in terrain: no path leads there", place(.position))]
     Closed { vehicle: usize, what: String, position: Vector3<f64> },
     #[error(
-        "{what}s of vehicles {first} and {second} are {distance_m:.2} m apart: expected at least {least_m:.2} m"
+        "{what}s of vehicles {first} and {second} are {distance_m:.2} m apart: expected at least {least_m:.2} m; move one of them"
     )]
     TooClose { what: &'static str, first: usize, second: usize, distance_m: f64, least_m: f64 },
+    #[error(
+        "goal of vehicle {vehicle} is {distance_m:.2} m beside the start of vehicle {other}: expected at least {least_m:.2} m, or that very place; move one of them"
+    )]
+    GoalBesideStart { vehicle: usize, other: usize, distance_m: f64, least_m: f64 },
+    /// Something on the way that a lidar does not see.
+    #[error(transparent)]
+    ThinSolids(#[from] ThinSolids),
     #[error("vehicle {vehicle} has nowhere to go: give it waypoints or a mission")]
     NoWaypoints { vehicle: usize },
     #[error("vehicle {vehicle}: no place for its {what} near {}: everything within {reach_m} m is too close to an obstacle, to another vehicle or to the bounds", place(.near))]

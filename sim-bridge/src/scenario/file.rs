@@ -30,8 +30,8 @@ use super::targets::{PacedRoute, Targets};
 use super::walker::Walker;
 use super::window::Window;
 use super::{
-    DEFAULT_TIME_LIMIT_S, Network, Order, Scenario, ScenarioError, VehiclePlan, VehicleScript, Who,
-    check_count, read, read_world, stated_datum,
+    DEFAULT_TIME_LIMIT_S, Network, Order, SEPARATION_HULLS, Scenario, ScenarioError, VehiclePlan,
+    VehicleScript, Who, check_count, read, read_world, stated_datum,
 };
 use crate::autopilots::make::Make;
 use crate::mission;
@@ -305,6 +305,7 @@ impl ScenarioFile {
                 nose: table.nose,
                 potential: table.potential,
             },
+            separation_hulls: SEPARATION_HULLS,
             takeoff_height_m,
             without_ground: table.without_ground,
             time_limit_s,
@@ -473,7 +474,9 @@ impl ScenarioFile {
         let at_cruise = |route| PacedRoute { route, pace: 1.0 };
         let table = &self.table;
         if let Some(coverage) = &table.coverage {
-            let routes = coverage.routes(vehicles);
+            let model = self.model(table.model.as_deref().unwrap_or(DEFAULT_MODEL))?;
+            let cruise_m_s = self.cruise_speed_m_s().min(model.max_speed_m_s);
+            let routes = coverage.routes(vehicles, &self.airspace()?, cruise_m_s, model.max_accel_m_s2);
             let routes = routes.map_err(|error| self.contradiction("coverage", error.to_string()))?;
             return Ok(Some(routes.into_iter().map(at_cruise).collect()));
         }

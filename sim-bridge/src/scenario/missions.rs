@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 use skein_world::{Scene, VehicleModel};
 
-use super::Scenario;
 use super::error::ScenarioError;
 use super::layout::SPACING_M;
 use super::placement::{REACH_M, clear_place, is_clear, way_is_clear};
+use super::{HULL_ROOM_M, SAME_PLACE_M, Scenario, VehiclePlan};
 use crate::mission::{Ends, Mission};
 
 /// Clearance of the straight line from a mission's own start or goal to the place a vehicle gets instead, in metres.
@@ -46,11 +46,35 @@ pub fn apply_missions(scenario: &mut Scenario, missions: Vec<Mission>) -> Result
     scenario.include_routes();
     place_starts(scenario, &assigned)?;
     place_goals(scenario, &assigned)?;
+    if assigned.iter().any(|mission| mission.exact) {
+        keep_less(scenario);
+    }
     for vehicle in &mut scenario.vehicles {
         let ahead = vehicle.waypoints.first().map_or(Vector3::x(), |first| first - vehicle.start);
         vehicle.yaw = ahead.y.atan2(ahead.x);
     }
     Ok(())
+}
+
+/// Where starts and goals are exactly where a mission puts them, vehicles keep no more than those are apart;
+/// but some room between hulls.
+fn keep_less(scenario: &mut Scenario) {
+    let vehicles = &scenario.vehicles;
+    let pairs =
+        || vehicles.iter().enumerate().flat_map(|(k, one)| vehicles[..k].iter().map(move |two| (one, two)));
+    let apart = |(one, two): (&VehiclePlan, &VehiclePlan)| {
+        let places = [
+            (one.start, two.start),
+            (one.goal(), two.goal()),
+            (one.goal(), two.start),
+            (two.goal(), one.start),
+        ];
+        let distances = places.map(|(a, b)| (a - b).xy().norm()).into_iter();
+        let least_m = distances.filter(|distance| *distance > SAME_PLACE_M).fold(f64::INFINITY, f64::min);
+        let hulls_m = one.model.hull_radius_m + two.model.hull_radius_m;
+        least_m.max(hulls_m + HULL_ROOM_M) / one.model.hull_radius_m.max(two.model.hull_radius_m)
+    };
+    scenario.separation_hulls = pairs().map(apart).fold(scenario.separation_hulls, f64::min);
 }
 
 /// Take-off height and cruise speed: the lowest and slowest that any mission asks for.
@@ -81,7 +105,7 @@ fn place_starts(scenario: &mut Scenario, missions: &[&Mission]) -> Result<(), Sc
         let place = if mission.exact {
             wanted
         } else {
-            find(&scenario.scene, &wanted, &anchor, height, &taken)
+            find(&scenario.scene, &wanted, &anchor, height, &taken, |_| true)
                 .ok_or_else(|| no_room(i, "start", wanted))?
         };
         scenario.move_start(i, place);
@@ -104,7 +128,8 @@ fn place_goals(scenario: &mut Scenario, missions: &[&Mission]) -> Result<(), Sce
         let place = if mission.exact {
             wanted
         } else {
-            find(&scenario.scene, &wanted, &anchor, wanted.z, &taken)
+            let is_off_starts = |place: &Vector3<f64>| scenario.is_off_starts(i, place);
+            find(&scenario.scene, &wanted, &anchor, wanted.z, &taken, is_off_starts)
                 .ok_or_else(|| no_room(i, "goal", wanted))?
         };
         scenario.move_goal(i, place);
@@ -113,19 +138,21 @@ fn place_goals(scenario: &mut Scenario, missions: &[&Mission]) -> Result<(), Sce
     Ok(())
 }
 
-/// A clear place near `wanted` from which `anchor` is in plain sight; near `anchor` where there is none.
+/// A clear place near `wanted` that `accepts` likes, from which `anchor` is in plain sight if there is such a
+/// one.
 fn find(
     scene: &Scene,
     wanted: &Vector3<f64>,
     anchor: &Vector3<f64>,
     height_m: f64,
     taken: &[Vector3<f64>],
+    accepts: impl Fn(&Vector3<f64>) -> bool,
 ) -> Option<Vector3<f64>> {
     let in_sight = |place: &Vector3<f64>| {
         let above = Vector3::new(place.x, place.y, height_m);
         way_is_clear(scene, &above, anchor, DETOUR_CLEARANCE_M)
     };
-    let clear = |place: &Vector3<f64>| is_clear(scene, place, height_m);
+    let clear = |place: &Vector3<f64>| is_clear(scene, place, height_m) && accepts(place);
     clear_place(wanted, taken, |p| clear(p) && in_sight(p)).or_else(|| clear_place(wanted, taken, clear))
 }
 

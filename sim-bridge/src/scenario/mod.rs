@@ -19,6 +19,7 @@ mod open;
 mod placement;
 mod position_error;
 mod targets;
+mod thin_solids;
 mod walker;
 mod window;
 
@@ -34,6 +35,7 @@ use skein_bp::behaviour::{Behaviours, Chosen};
 use skein_bp::script::Assignment;
 use skein_mav::Datum;
 use skein_planning::airspace::{Airspace, KeepOut};
+use skein_planning::separation::{FilterConfig, Neighbour, distance_kept_m};
 use skein_wire::event::What;
 use skein_world::{Aabb, PositionErrors, Scene, VehicleModel, WindConfig};
 
@@ -60,6 +62,12 @@ const CLIMB_STEP_M: f64 = 0.05;
 
 /// Room between two hulls on the ground, in metres, below which a scenario is refused.
 const HULL_ROOM_M: f64 = 0.2;
+/// Distance that vehicles keep from centre to centre, in hull radii: 1.4 m for a vehicle of 0.25 m.
+pub(crate) const SEPARATION_HULLS: f64 = 5.6;
+/// Nearer to another's start than this, in metres, a goal is that very place, which its owner leaves first.
+const SAME_PLACE_M: f64 = 0.1;
+/// Distances that differ by no more than this are equal, in metres.
+const ROUNDING_M: f64 = 1e-9;
 
 const BUILT_IN: [(&str, &str); 7] = [
     ("forest", include_str!("../../scenarios/forest.toml")),
@@ -94,6 +102,8 @@ pub struct Scenario {
     pub cruise_speed_m_s: f64,
     /// The planners on board.
     pub planners: Planners,
+    /// Distance that vehicles keep from centre to centre, in hull radii.
+    pub separation_hulls: f64,
     /// Height above the ground at which a take-off ends.
     pub takeoff_height_m: f64,
     /// The policy of a vehicle that has been without the ground station for long.
@@ -203,6 +213,10 @@ pub struct Overrides {
     /// A QGroundControl plan or LSC mission; one that all fly in trail, or one for each vehicle.
     #[arg(long = "mission", value_name = "FILE")]
     pub missions: Vec<PathBuf>,
+    /// Fly though there are solids on the way that are thinner than 0.2 m in height, which a planar lidar
+    /// does not see.
+    #[arg(long)]
+    pub thin_solids: bool,
     /// What a vehicle does once the ground station has been silent for 5 s: continue, return or land; the scenario's own
     /// if not given.
     #[arg(long, value_name = "POLICY", value_parser = policy)]
@@ -287,6 +301,9 @@ impl Scenario {
         scenario.without_ground = overrides.without_ground.unwrap_or(scenario.without_ground);
         scenario.fly(set)?;
         scenario.validate()?;
+        if !overrides.thin_solids {
+            scenario.check_thin_solids_on_the_way()?;
+        }
         Ok(scenario)
     }
 
@@ -323,17 +340,28 @@ impl Scenario {
 
     /// Moves each start and goal that stands too near an obstacle to the nearest clear place, and notes it.
     pub fn settle(&mut self) -> Result<(), ScenarioError> {
-        let (mut starts, mut goals) = (Vec::new(), Vec::new());
+        let mut starts = Vec::new();
         for i in 0..self.vehicles.len() {
-            let Some((start, goal)) = self.vehicles.get(i).map(|v| (v.start, v.goal())) else { continue };
-            let start = self.clear_place(i, "start", start, &starts)?;
-            let goal = self.clear_place(i, "goal", goal, &goals)?;
+            let Some(start) = self.vehicles.get(i).map(|v| v.start) else { continue };
+            let start = self.clear_place(i, "start", start, &starts, |_| true)?;
             self.move_start(i, start);
-            self.move_goal(i, goal);
             starts.push(start);
+        }
+        let mut goals = Vec::new();
+        for i in 0..self.vehicles.len() {
+            let Some(goal) = self.vehicles.get(i).map(VehiclePlan::goal) else { continue };
+            let goal = self.clear_place(i, "goal", goal, &goals, |place| self.is_off_starts(i, place))?;
+            self.move_goal(i, goal);
             goals.push(goal);
         }
         Ok(())
+    }
+
+    /// Whether the goal of a vehicle may be here for all that its peers need of the ground they start from.
+    pub(crate) fn is_off_starts(&self, index: usize, place: &Vector3<f64>) -> bool {
+        let Some(vehicle) = self.vehicles.get(index) else { return false };
+        let mut others = self.vehicles.iter().enumerate().filter(|(other, _)| *other != index);
+        others.all(|(_, other)| !self.is_beside_start(vehicle, place, other))
     }
 
     fn clear_place(
@@ -342,8 +370,11 @@ impl Scenario {
         what: &'static str,
         near: Vector3<f64>,
         taken: &[Vector3<f64>],
+        accepts: impl Fn(&Vector3<f64>) -> bool,
     ) -> Result<Vector3<f64>, ScenarioError> {
-        let clear = |place: &Vector3<f64>| placement::is_clear(&self.scene, place, self.takeoff_height_m);
+        let clear = |place: &Vector3<f64>| {
+            placement::is_clear(&self.scene, place, self.takeoff_height_m) && accepts(place)
+        };
         let none = ScenarioError::NoRoom { vehicle: index + 1, what, near, reach_m: placement::REACH_M };
         placement::clear_place(&near, taken, clear).ok_or(none)
     }
@@ -362,14 +393,50 @@ impl Scenario {
         *goal = to;
     }
 
+    /// Distance that a vehicle keeps from those that are no larger, centre to centre, in metres.
+    pub fn separation_m(&self, vehicle: &VehiclePlan) -> f64 {
+        self.separation_hulls * vehicle.model.hull_radius_m
+    }
+
+    /// Distance that two vehicles keep where both know exactly where they are, centre to centre, in metres.
+    pub fn kept_m(&self, one: &VehiclePlan, other: &VehiclePlan) -> f64 {
+        self.kept_from_m(one, other).max(self.kept_from_m(other, one))
+    }
+
+    fn kept_from_m(&self, vehicle: &VehiclePlan, other: &VehiclePlan) -> f64 {
+        let config = FilterConfig {
+            separation_m: self.separation_m(vehicle),
+            hull_radius_m: vehicle.model.hull_radius_m,
+            ..FilterConfig::default()
+        };
+        let there = Neighbour {
+            id: 0,
+            position: other.start,
+            velocity: Vector3::zeros(),
+            sigma_m: 0.0,
+            age_s: 0.0,
+            radius_m: other.model.hull_radius_m,
+            cooperative: true,
+        };
+        distance_kept_m(0.0, &there, &config)
+    }
+
+    /// Whether a place is beside the start of `other`, nearer than `vehicle` keeps, and not that start
+    /// itself.
+    fn is_beside_start(&self, vehicle: &VehiclePlan, place: &Vector3<f64>, other: &VehiclePlan) -> bool {
+        let distance_m = (place - other.start).xy().norm();
+        distance_m > SAME_PLACE_M && distance_m < self.kept_m(vehicle, other) - ROUNDING_M
+    }
+
     /// Checks what a run relies on.
     ///
     /// Whether a goal can be reached is not looked at: the vehicles find that out and land.
     ///
     /// # Errors
-    /// No vehicles or too many; a start inside an obstacle; a start or waypoint outside of the bounds or under the
-    /// ground; a waypoint in a no-fly zone, in a threat or in known terrain; starts or goals so close that vehicles
-    /// would touch.
+    /// No vehicles or too many; a start inside an obstacle; a start or waypoint outside of the bounds or
+    /// under the ground; a waypoint in a no-fly zone, in a threat or in known terrain; starts where vehicles
+    /// would nearly touch; two goals, or a goal and another's start, nearer to one another than the vehicles
+    /// keep.
     pub fn validate(&self) -> Result<(), ScenarioError> {
         check_count(&self.name, self.vehicles.len())?;
         let zones = KeepOut::new(self.airspace.clone(), 0.0, 0.0);
@@ -377,8 +444,7 @@ impl Scenario {
             self.check_start(i + 1, vehicle)?;
             self.check_waypoints(i + 1, vehicle, &zones)?;
         }
-        self.check_spacing("start", |v| v.start)?;
-        self.check_spacing("goal", VehiclePlan::goal)
+        self.check_ends()
     }
 
     fn check_start(&self, number: usize, vehicle: &VehiclePlan) -> Result<(), ScenarioError> {
@@ -448,16 +514,42 @@ impl Scenario {
         Err(ScenarioError::OutsideBounds { vehicle: number, what: what.to_owned(), position, min, max })
     }
 
+    /// Checks that where vehicles stand, before and after the flight, they are as far apart as they keep in
+    /// it.
+    fn check_ends(&self) -> Result<(), ScenarioError> {
+        let together = self.musters() || self.orders.iter().any(|given| given.order == What::LaunchTogether);
+        let starts_m = |a: &VehiclePlan, b: &VehiclePlan| match together {
+            // All are in the air above their starts at once.
+            true => self.kept_m(a, b),
+            false => a.model.hull_radius_m + b.model.hull_radius_m + HULL_ROOM_M,
+        };
+        self.check_spacing("start", |v| v.start, starts_m)?;
+        self.check_spacing("goal", VehiclePlan::goal, |a, b| self.kept_m(a, b))?;
+        for (i, one) in self.vehicles.iter().enumerate() {
+            let beside =
+                |(j, other): &(usize, &VehiclePlan)| *j != i && self.is_beside_start(one, &one.goal(), other);
+            if let Some((j, other)) = self.vehicles.iter().enumerate().find(beside) {
+                return Err(ScenarioError::GoalBesideStart {
+                    vehicle: i + 1,
+                    other: j + 1,
+                    distance_m: (one.goal() - other.start).xy().norm(),
+                    least_m: self.kept_m(one, other),
+                });
+            }
+        }
+        Ok(())
+    }
+
     fn check_spacing(
         &self,
         what: &'static str,
         place: impl Fn(&VehiclePlan) -> Vector3<f64>,
+        least_m: impl Fn(&VehiclePlan, &VehiclePlan) -> f64,
     ) -> Result<(), ScenarioError> {
         for (i, a) in self.vehicles.iter().enumerate() {
             for (j, b) in self.vehicles.iter().enumerate().skip(i + 1) {
-                let distance_m = (place(a) - place(b)).xy().norm();
-                let least_m = a.model.hull_radius_m + b.model.hull_radius_m + HULL_ROOM_M;
-                if distance_m < least_m - 1e-9 {
+                let (distance_m, least_m) = ((place(a) - place(b)).xy().norm(), least_m(a, b));
+                if distance_m < least_m - ROUNDING_M {
                     return Err(ScenarioError::TooClose {
                         what,
                         first: i + 1,
@@ -469,6 +561,19 @@ impl Scenario {
             }
         }
         Ok(())
+    }
+
+    /// Whether nobody sets out before everybody is in the air: the scenario says so, or the goal of one is
+    /// where another stands.
+    pub fn musters(&self) -> bool {
+        let mut pairs = self.vehicles.iter().enumerate().flat_map(|(index, one)| {
+            let others = self.vehicles.iter().enumerate().filter(move |(other, _)| *other != index);
+            others.map(move |(_, other)| (one, other))
+        });
+        let takes_over = |(one, other): (&VehiclePlan, &VehiclePlan)| {
+            (one.goal() - other.start).xy().norm() < self.kept_m(one, other)
+        };
+        self.muster || pairs.any(takes_over)
     }
 
     /// Widens bounds that nobody stated so that every route lies well inside.

@@ -1,4 +1,4 @@
-//! Planar laser scanner with range finders up and down.
+//! Planar laser scanner with range finders up and down, and a second, upright scanner.
 //!
 //! A scan of hundreds of rays against a hundred obstacles would be slow ray by ray. Here it goes
 //! obstacle by obstacle, as a z-buffer does: the obstacle's angular span in the scan plane first,
@@ -70,24 +70,25 @@ pub fn cast_ray(
 #[derive(Debug, Clone)]
 pub struct Lidar {
     model: LidarModel,
-    /// Cosine and sine of each ray's angle.
+    level: Turn,
+    upright: Turn,
+    noise: Noise,
+}
+
+/// One turn of a scanner.
+#[derive(Debug, Clone)]
+struct Turn {
+    /// Cosine and sine of each ray's angle, from -pi on.
     rays: Vec<(f64, f64)>,
     /// The first thing that each ray of the scan in work meets.
     met: Vec<Met>,
-    noise: Noise,
 }
 
 impl Lidar {
     /// A scanner whose noise is drawn from stream `stream` of `seed`.
     pub fn new(model: LidarModel, seed: u64, stream: u64) -> Self {
-        let step = TAU / f64::from(model.rays);
-        let rays = (0..model.rays)
-            .map(|ray| {
-                let (sin, cos) = (f64::from(ray) * step - PI).sin_cos();
-                (cos, sin)
-            })
-            .collect();
-        Self { model, rays, met: Vec::new(), noise: Noise::new(seed, stream) }
+        let (level, upright) = (Turn::of(model.rays), Turn::of(model.upright_rays));
+        Self { model, level, upright, noise: Noise::new(seed, stream) }
     }
 
     /// Turns a second.
@@ -97,74 +98,38 @@ impl Lidar {
 
     /// Scans from a body at `pose` (body FLU to world ENU), `stamp` after the run began.
     pub fn scan(&mut self, stamp: Duration, pose: &Isometry3<f64>, surroundings: &Surroundings<'_>) -> Scan {
-        self.trace(pose, surroundings);
+        self.level.trace(&ScanPlane::level(pose), &self.model, surroundings);
+        self.upright.trace(&ScanPlane::upright(pose), &self.model, surroundings);
         let origin = Point3::from(pose.translation.vector);
         let up = pose.rotation * Vector3::z();
+        let ranges_m = self.told(&self.level.met.clone());
         Scan {
             stamp,
-            ranges_m: self.report_ranges(),
+            ranges_m,
             angle_min: -PI,
             angle_step: TAU / f64::from(self.model.rays),
             max_range_m: self.model.range_m,
             up_m: self.cone(&origin, &up, surroundings),
             down_m: self.cone(&origin, &-up, surroundings),
+            upright_m: self.told_upright(),
         }
     }
 
-    /// Fills in the exact ranges.
-    fn trace(&mut self, pose: &Isometry3<f64>, surroundings: &Surroundings<'_>) {
-        let plane = ScanPlane::of(pose);
-        let height = pose.translation.vector.z;
-        self.met.clear();
-        let reach_m = self.model.range_m;
-        self.met.extend(self.rays.iter().map(|(cos, sin)| {
-            let slope = plane.forward.z * cos + plane.left.z * sin;
-            Met { range_m: ground_range(height, slope).unwrap_or(f64::INFINITY), reach_m }
-        }));
-        for obstacle in surroundings.scene.obstacles() {
-            self.trace_obstacle(&plane, obstacle);
-        }
-        for hull in surroundings.others() {
-            let place = Point3::from(pose.translation.vector - hull.centre);
-            let ball = Shape::Sphere { radius: hull.radius_m };
-            self.trace_shape(&plane.at(place), &ball, reach_m);
-        }
-    }
-
-    fn trace_obstacle(&mut self, plane: &ScanPlane, obstacle: &Obstacle) {
-        let local = ScanPlane {
-            origin: obstacle.pose.inverse_transform_point(&plane.origin),
-            forward: obstacle.pose.inverse_transform_vector(&plane.forward),
-            left: obstacle.pose.inverse_transform_vector(&plane.left),
-        };
-        self.trace_shape(&local, &obstacle.shape, self.model.range_to(obstacle.reflectivity));
-    }
-
-    /// Shortens the rays that meet `shape`, which can be seen from `reach_m`; `plane` is given in the shape's frame.
-    fn trace_shape(&mut self, plane: &ScanPlane, shape: &Shape, reach_m: f64) {
-        let Some(span) = plane.span_of(shape, self.model.range_m) else {
-            return;
-        };
-        for ray in span.rays(self.rays.len()) {
-            let (Some(&(cos, sin)), Some(met)) = (self.rays.get(ray), self.met.get_mut(ray)) else {
-                continue;
-            };
-            let direction = plane.forward * cos + plane.left * sin;
-            let hit = shape.cast_ray(&plane.origin, &direction);
-            if let Some(range_m) = hit.filter(|range_m| *range_m < met.range_m) {
-                *met = Met { range_m, reach_m };
-            }
-        }
+    /// Ranges of the upright scanner, from the nose upwards.
+    fn told_upright(&mut self) -> Vec<f32> {
+        let mut met = self.upright.met.clone();
+        met.rotate_left(self.upright.rays.len() / 2);
+        self.told(&met)
     }
 
     /// Ranges as the instrument tells them: noisy, and none beyond its reach.
-    fn report_ranges(&mut self) -> Vec<f32> {
+    fn told(&mut self, met: &[Met]) -> Vec<f32> {
         let (sigma, noise) = (self.model.sigma_m, &mut self.noise);
         let range = |met: &Met| match met.range_m <= met.reach_m {
             true => (met.range_m + noise.normal(sigma)).max(0.0) as f32,
             false => f32::INFINITY,
         };
-        self.met.iter().map(range).collect()
+        met.iter().map(range).collect()
     }
 
     /// Shortest range inside of the cone about the unit vector `axis`.
@@ -191,6 +156,64 @@ impl Lidar {
     }
 }
 
+impl Turn {
+    fn of(rays: u32) -> Self {
+        let step = TAU / f64::from(rays.max(1));
+        let ray = |ray: u32| {
+            let (sin, cos) = (f64::from(ray) * step - PI).sin_cos();
+            (cos, sin)
+        };
+        Self { rays: (0..rays).map(ray).collect(), met: Vec::new() }
+    }
+
+    /// Fills in the exact ranges.
+    fn trace(&mut self, plane: &ScanPlane, model: &LidarModel, surroundings: &Surroundings<'_>) {
+        self.met.clear();
+        if self.rays.is_empty() {
+            return;
+        }
+        let (height, reach_m) = (plane.origin.z, model.range_m);
+        self.met.extend(self.rays.iter().map(|(cos, sin)| {
+            let slope = plane.forward.z * cos + plane.side.z * sin;
+            Met { range_m: ground_range(height, slope).unwrap_or(f64::INFINITY), reach_m }
+        }));
+        for obstacle in surroundings.scene.obstacles() {
+            self.trace_obstacle(plane, model, obstacle);
+        }
+        for hull in surroundings.others() {
+            let place = Point3::from(plane.origin.coords - hull.centre);
+            let ball = Shape::Sphere { radius: hull.radius_m };
+            self.trace_shape(&plane.at(place), model, &ball, reach_m);
+        }
+    }
+
+    fn trace_obstacle(&mut self, plane: &ScanPlane, model: &LidarModel, obstacle: &Obstacle) {
+        let local = ScanPlane {
+            origin: obstacle.pose.inverse_transform_point(&plane.origin),
+            forward: obstacle.pose.inverse_transform_vector(&plane.forward),
+            side: obstacle.pose.inverse_transform_vector(&plane.side),
+        };
+        self.trace_shape(&local, model, &obstacle.shape, model.range_to(obstacle.reflectivity));
+    }
+
+    /// Shortens the rays that meet `shape`, which can be seen from `reach_m`; `plane` is given in the shape's frame.
+    fn trace_shape(&mut self, plane: &ScanPlane, model: &LidarModel, shape: &Shape, reach_m: f64) {
+        let Some(span) = plane.span_of(shape, model.range_m) else {
+            return;
+        };
+        for ray in span.rays(self.rays.len()) {
+            let (Some(&(cos, sin)), Some(met)) = (self.rays.get(ray), self.met.get_mut(ray)) else {
+                continue;
+            };
+            let direction = plane.forward * cos + plane.side * sin;
+            let hit = shape.cast_ray(&plane.origin, &direction);
+            if let Some(range_m) = hit.filter(|range_m| *range_m < met.range_m) {
+                *met = Met { range_m, reach_m };
+            }
+        }
+    }
+}
+
 /// The first thing that a ray meets.
 #[derive(Debug, Clone, Copy)]
 struct Met {
@@ -202,16 +225,26 @@ struct Met {
 /// The plane in which the scanner turns, in the frame of whatever is looked at.
 struct ScanPlane {
     origin: Point3<f64>,
+    /// To the nose.
     forward: Vector3<f64>,
-    left: Vector3<f64>,
+    /// The direction in which angles count up.
+    side: Vector3<f64>,
 }
 
 impl ScanPlane {
-    fn of(pose: &Isometry3<f64>) -> Self {
+    fn level(pose: &Isometry3<f64>) -> Self {
+        Self::through_nose(pose, &Vector3::y())
+    }
+
+    fn upright(pose: &Isometry3<f64>) -> Self {
+        Self::through_nose(pose, &Vector3::z())
+    }
+
+    fn through_nose(pose: &Isometry3<f64>, side: &Vector3<f64>) -> Self {
         Self {
             origin: pose.translation.vector.into(),
             forward: pose.rotation * Vector3::x(),
-            left: pose.rotation * Vector3::y(),
+            side: pose.rotation * side,
         }
     }
 
@@ -235,20 +268,20 @@ impl ScanPlane {
     /// Cosine of the angle between the plane's normal and the shape's z axis: the determinant of
     /// the projection along z.
     fn turn(&self) -> f64 {
-        self.forward.x * self.left.y - self.forward.y * self.left.x
+        self.forward.x * self.side.y - self.forward.y * self.side.x
     }
 
     /// Scan angle whose ray projects along z to the direction `(x, y)`.
     fn angle_to(&self, x: f64, y: f64) -> f64 {
         let sign = self.turn().signum();
-        let along = sign * (self.left.y * x - self.left.x * y);
+        let along = sign * (self.side.y * x - self.side.x * y);
         let aside = sign * (self.forward.x * y - self.forward.y * x);
         aside.atan2(along)
     }
 
     fn span_of_ball(&self, radius: f64, reach: f64) -> Option<Span> {
         let to_centre = -self.origin.coords;
-        let (along, aside) = (to_centre.dot(&self.forward), to_centre.dot(&self.left));
+        let (along, aside) = (to_centre.dot(&self.forward), to_centre.dot(&self.side));
         let in_plane_2 = along * along + aside * aside;
         let section_2 = radius * radius - (to_centre.norm_squared() - in_plane_2);
         let limit = radius + reach;

@@ -43,6 +43,20 @@ impl Shape {
         }
     }
 
+    /// Length of the longest straight line inside along the unit vector `direction` (own frame), metres: that
+    /// through the middle, for every shape is the same on both sides of it. Infinite for a plane.
+    pub fn thickness_m(&self, direction: &Vector3<f64>) -> f64 {
+        let half = match *self {
+            Self::Box { half_extents } => half_extents.component_div(&direction.abs()).min(),
+            Self::Cylinder { radius, half_height } => {
+                (radius / direction.xy().norm()).min(half_height / direction.z.abs())
+            }
+            Self::Sphere { radius } => radius,
+            Self::Plane { .. } => f64::INFINITY,
+        };
+        2.0 * half
+    }
+
     /// Distance from `point` (own frame) to the surface, negative inside.
     pub fn signed_distance(&self, point: &Point3<f64>) -> f64 {
         match *self {
@@ -206,6 +220,12 @@ impl Obstacle {
             &self.pose.inverse_transform_point(origin),
             &self.pose.inverse_transform_vector(direction),
         )
+    }
+
+    /// Height of the solid over the place of the ground above which it is highest, metres; infinite for a
+    /// plane.
+    pub fn thickness_m(&self) -> f64 {
+        self.shape.thickness_m(&self.pose.inverse_transform_vector(&Vector3::z()))
     }
 
     /// Corners of the smallest box along the world axes that holds the obstacle; `None` for a

@@ -9,8 +9,9 @@ use thiserror::Error;
 /// Standard gravity, m/s^2.
 pub const GRAVITY_M_S2: f64 = 9.806_65;
 
-const BUILT_IN: [(&str, &str); 2] = [
+const BUILT_IN: [(&str, &str); 3] = [
     ("x500", include_str!("../vehicles/x500.toml")),
+    ("x500-vertical-scanner", include_str!("../vehicles/x500-vertical-scanner.toml")),
     ("crazyflie", include_str!("../vehicles/crazyflie.toml")),
 ];
 
@@ -56,7 +57,7 @@ pub struct VehicleModel {
     #[serde(default)]
     pub control: ControlModel,
     pub battery: BatteryModel,
-    /// Planar laser scanner with its range finders up and down, if it has one.
+    /// Planar laser scanner with its range finders up and down, if it has one; and a second, upright scanner.
     pub lidar: Option<LidarModel>,
     pub gps: GpsModel,
     /// Accelerometer and gyroscope.
@@ -133,6 +134,9 @@ pub struct LidarModel {
     pub vertical_range_m: f64,
     /// Full opening of the cone of the finders that look up and down, rad.
     pub vertical_cone_rad: f64,
+    /// Rays in a turn of a second scanner, in the body's xz plane; 0 without one.
+    #[serde(default)]
+    pub upright_rays: u32,
 }
 
 impl LidarModel {
@@ -233,7 +237,8 @@ impl VehicleModel {
         Ok(model)
     }
 
-    /// The built-in vehicle of that name: `x500` (2 kg) or `crazyflie` (27 g).
+    /// The built-in vehicle of that name: `x500` (2 kg), `x500-vertical-scanner`, which sees cables too, or
+    /// `crazyflie` (27 g).
     pub fn built_in(name: &str) -> Result<Self, VehicleError> {
         match BUILT_IN.iter().find(|(known, _)| *known == name) {
             Some((known, text)) => Self::from_toml(text, &format!("vehicles/{known}.toml")),
@@ -351,7 +356,9 @@ impl VehicleModel {
             let divides = found > 0.0 && (250.0 / found).fract() == 0.0;
             range(field, found, divides, "a rate that divides 250, such as 10")?;
         }
-        if let Some(LidarModel { rays, vertical_cone_rad: cone, .. }) = self.lidar {
+        if let Some(LidarModel { rays, vertical_cone_rad: cone, upright_rays, .. }) = self.lidar {
+            let upright = upright_rays == 0 || (4..=4096).contains(&upright_rays);
+            range("lidar.upright_rays", f64::from(upright_rays), upright, "0, or 4 to 4096")?;
             range("lidar.rays", f64::from(rays), (4..=10_000).contains(&rays), "4 to 10000")?;
             range("lidar.vertical_cone_rad", cone, (0.0..=3.0).contains(&cone), "an angle of 0 to 3 rad")?;
         }

@@ -182,3 +182,28 @@ fn a_footprint_is_the_outline_on_the_ground() {
     block.shape = Shape::Sphere { radius: 1.0 };
     assert_eq!(block.footprint().len(), 16);
 }
+
+#[test]
+fn a_solid_is_as_thick_as_it_is_high_over_one_place() {
+    let turned = |shape, roll: f64| Obstacle {
+        name: String::new(),
+        shape,
+        pose: Isometry3::from_parts(
+            nalgebra::Translation3::new(3.0, 4.0, 5.0),
+            nalgebra::UnitQuaternion::from_euler_angles(roll, 0.0, 0.3),
+        ),
+    };
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let cylinder = Shape::Cylinder { radius: 0.01, half_height: 10.0 };
+    let plate = Shape::Box { half_extents: nalgebra::Vector3::new(4.0, 4.0, 0.05) };
+    for (solid, thickness_m) in [
+        (turned(cylinder, 0.0), 20.0),
+        (turned(cylinder, quarter), 0.02),
+        (turned(cylinder, quarter - 0.5), 0.02 / 0.5_f64.cos()),
+        (turned(plate, 0.0), 0.1),
+        (turned(plate, quarter / 2.0), 0.1 * 2.0_f64.sqrt()),
+        (turned(Shape::Sphere { radius: 0.3 }, 0.0), 0.6),
+    ] {
+        assert!((solid.thickness_m() - thickness_m).abs() < 1e-9, "{solid:?}: {}", solid.thickness_m());
+    }
+}

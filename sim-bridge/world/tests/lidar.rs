@@ -17,6 +17,7 @@ const MODEL: LidarModel = LidarModel {
     rate_hz: 10.0,
     vertical_range_m: 15.0,
     vertical_cone_rad: std::f64::consts::FRAC_PI_6,
+    upright_rays: 0,
 };
 
 /// Vehicle 0 looks from `pose`; `others` are the other vehicles.
@@ -43,6 +44,25 @@ fn the_ray_ahead_is_body_x_and_angles_turn_left() {
     assert_eq!(at(PI / 2.0), 2.5);
     assert_eq!(at(-PI / 2.0), f32::INFINITY);
     assert_eq!(scan.stamp, Duration::from_millis(100));
+}
+
+#[test]
+fn an_upright_scanner_sees_a_cable_that_the_level_one_misses_and_counts_from_the_nose_upwards() {
+    let across = UnitQuaternion::from_euler_angles(PI / 2.0, 0.0, 0.0);
+    let cable = Obstacle {
+        name: "cable".to_owned(),
+        shape: Shape::Cylinder { radius: 0.012, half_height: 10.0 },
+        pose: Isometry3::from_parts(Translation3::new(8.0, 0.0, 3.0), across),
+    };
+    let scene = Scene::new("cable", vec![cable]);
+    let model = LidarModel { upright_rays: 3600, ..MODEL };
+    let scan = scan(model, &scene, level(0.0, 0.0, 2.0, 0.0), &[]);
+    assert!(scan.ranges_m.iter().all(|range| range.is_infinite()));
+    // One metre higher and eight ahead: 7.125 degrees, ray 71.
+    let seen = (1..1700).filter(|ray| scan.upright_m[*ray].is_finite()).collect::<Vec<_>>();
+    assert!(seen.contains(&71) && seen.len() <= 3, "{seen:?}");
+    assert!((f64::from(scan.upright_m[71]) - 65.0_f64.sqrt()).abs() < 0.013);
+    assert!((scan.upright_m[2700] - 2.0).abs() < 1e-6, "the ground is straight below");
 }
 
 #[test]

@@ -18,4 +18,5 @@ mod preflight;
 mod scenarios;
 mod scripts;
 mod tasks;
+mod thin_solids;
 mod wind;

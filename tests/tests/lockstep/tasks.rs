@@ -9,7 +9,10 @@ type Point = [f64; 3];
 
 /// Where all vehicles are, ten times a second, until all have landed.
 fn flown(scenario: &str) -> (Lockstep, Vec<Vec<Point>>) {
-    let mut lockstep = Lockstep::new(scenario, None, 1);
+    flown_in(Lockstep::new(scenario, None, 1))
+}
+
+fn flown_in(mut lockstep: Lockstep) -> (Lockstep, Vec<Vec<Point>>) {
     let end = Duration::from_secs_f64(lockstep.scenario.time_limit_s);
     let mut poses = Vec::new();
     while lockstep.swarm.now() < end && !(lockstep.swarm.is_over() && lockstep.swarm.is_grounded()) {
@@ -44,6 +47,57 @@ fn every_place_of_a_surveyed_field_is_seen() {
             .fold(f64::INFINITY, f64::min);
         assert!(nearest_m < 3.0 + 0.5, "({x}, {y}) is seen from {nearest_m} m, half a swath is 3 m");
     }
+}
+
+/// Four vehicles see a field in the form of a comb with two teeth missing; one gap is closed, and so is a
+/// round place in the field.
+const COMB: &str = r#"
+name = "comb"
+vehicles = 4
+time_limit_s = 300.0
+[coverage]
+area_m = [[0, 0], [75, 0], [75, 36], [60, 36], [60, 16], [45, 16], [45, 30], [30, 30], [30, 14], [16, 14], [16, 40], [0, 40]]
+swath_m = 5.0
+height_m = 3.0
+[[airspace.no_fly]]
+corners_m = [[18.0, 16.0], [28.0, 16.0], [28.0, 60.0], [18.0, 60.0]]
+[[airspace.no_fly]]
+centre_m = [38.0, 6.0]
+radius_m = 2.0
+"#;
+
+/// Whether a place is over the comb, by so many metres.
+fn is_over_the_comb(x: f64, y: f64, by_m: f64) -> bool {
+    let height_m = match x {
+        x if x < 16.0 - by_m => 40.0,
+        x if x < 30.0 + by_m => 14.0,
+        x if x < 45.0 - by_m => 30.0,
+        x if x < 60.0 + by_m => 16.0,
+        _ => 36.0,
+    };
+    x > by_m && x < 75.0 - by_m && y > by_m && y < height_m - by_m
+}
+
+#[test]
+fn a_field_with_notches_is_seen_from_above_itself_and_all_are_done_at_the_same_time() {
+    let (_, poses) = flown_in(Lockstep::from_text(COMB));
+    let at_work = |at: &&Point| at[2] > 2.0;
+    for at in poses.iter().flatten().filter(at_work) {
+        assert!(is_over_the_comb(at[0], at[1], 0.0), "{at:?} is not over the field");
+        assert!((at[0] - 38.0).hypot(at[1] - 6.0) > 2.0, "{at:?} is in the round zone");
+    }
+    let places = (0..75).flat_map(|x| (0..40).map(move |y| (f64::from(x) + 0.5, f64::from(y) + 0.5)));
+    let open = places.filter(|(x, y)| is_over_the_comb(*x, *y, 0.0) && (x - 38.0).hypot(y - 6.0) > 2.0);
+    let open: Vec<_> = open.collect();
+    let is_seen = |(x, y): &&(f64, f64)| {
+        poses.iter().flatten().filter(at_work).any(|at| (at[0] - x).hypot(at[1] - y) <= 2.5)
+    };
+    let share = open.iter().filter(is_seen).count() as f64 / open.len() as f64;
+    assert!(share > 0.97, "{share} of the field is seen");
+    let landed_s = |vehicle: usize| poses.iter().rposition(|at| at[vehicle][2] > 2.0).unwrap() as f64 / 10.0;
+    let times_s: Vec<f64> = (0..4).map(landed_s).collect();
+    let last_s = times_s.iter().copied().fold(0.0, f64::max);
+    assert!(times_s.iter().all(|time_s| *time_s > 0.95 * last_s), "{times_s:?}");
 }
 
 #[test]

@@ -31,8 +31,8 @@ impl NoFlyPrism {
         })
     }
 
-    /// Distance from the outline, metres; negative inside it.
-    pub(crate) fn off_outline_m(&self, place: Vector2<f64>) -> f64 {
+    /// Distance of a place (ENU, metres) from the outline, metres; negative inside it.
+    pub fn off_outline_m(&self, place: Vector2<f64>) -> f64 {
         let nearest = self.nearest_on_edges(place).map(|point| (point - place).norm_squared());
         let distance_m = nearest.fold(f64::INFINITY, f64::min).sqrt();
         if self.holds(place) { -distance_m } else { distance_m }

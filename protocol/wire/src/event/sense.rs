@@ -48,6 +48,15 @@ skein_bp::events! {
     PathBlocked = "path_blocked", Own;
     /// Leave to move was given, and yet the vehicle makes no way.
     Stuck = "stuck", Own;
+    /// Where the way ends another vehicle stays, nearer than this one may come.
+    PlaceTaken = "place_taken", Own {
+        /// As in `goto`.
+        leg: i64,
+        /// Which one.
+        by: Text,
+    }
+    /// Nobody else stays any more where the way ends.
+    PlaceFree = "place_free", Own;
     /// A narrow stretch of the way lies ahead, or goes on further, or less of it is left: its first place.
     Passage = "passage", Own {
         x: f64 ["m"],

@@ -10,7 +10,8 @@ use super::record::{Addressee, Kind, Record};
 use crate::decode_error::DecodeError;
 use crate::proto;
 
-/// One turn of a planar lidar in the vehicle's xy plane, with range finders up and down.
+/// One turn of a planar lidar in the vehicle's xy plane, with range finders up and down; and of an upright
+/// one, in its xz plane, if it has one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
     /// When it was measured, on the clock of the program that holds it: time since its run began. Between programs it
@@ -29,6 +30,9 @@ pub struct Scan {
     pub up_m: Option<f32>,
     /// To what is below, metres; none if nothing is in range.
     pub down_m: Option<f32>,
+    /// Of the upright lidar, evenly around: the first ray to the nose, the next above it. Metres, at most
+    /// [`Scan::MAX_RAYS`]; infinite where nothing came back, empty without one.
+    pub upright_m: Vec<f32>,
 }
 
 impl Scan {
@@ -56,6 +60,7 @@ impl From<&Scan> for proto::Scan {
             ranges_m: scan.ranges_m.clone(),
             up_m: scan.up_m,
             down_m: scan.down_m,
+            upright_m: scan.upright_m.clone(),
         }
     }
 }
@@ -65,6 +70,7 @@ impl TryFrom<proto::Scan> for Scan {
 
     fn try_from(scan: proto::Scan) -> Result<Self> {
         at_most("Scan.ranges_m", scan.ranges_m.len(), Self::MAX_RAYS, "at most 4096 rays")?;
+        at_most("Scan.upright_m", scan.upright_m.len(), Self::MAX_RAYS, "at most 4096 rays")?;
         let range = |field, given: Option<f32>| match given {
             Some(given) => not_negative(field, f64::from(given)).map(|_| Some(given)),
             None => Ok(None),
@@ -77,6 +83,7 @@ impl TryFrom<proto::Scan> for Scan {
             ranges_m: scan.ranges_m,
             up_m: range("Scan.up_m", scan.up_m)?,
             down_m: range("Scan.down_m", scan.down_m)?,
+            upright_m: scan.upright_m,
         })
     }
 }

@@ -565,6 +565,7 @@ impl Mouth {
             ranges_m: vec![0.1; 60],
             up_m: Some(0.1),
             down_m: Some(0.1),
+            upright_m: Vec::new(),
         };
         let scene = Scene { min: Vector3::zeros(), max: self.place, solids: Vec::new() };
         let record = self.record(&to, Vec::new());

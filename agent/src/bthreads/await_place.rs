@@ -1,0 +1,84 @@
+//! Await place: a vehicle that is to land where another stays waits for that one, and lands beside it if that
+//! lasts.
+
+use std::time::Duration;
+
+use serde::Serialize;
+use skein_bp::{BThread, Bid, Context, Event};
+use skein_wire::event::{Advance, Arrived, Declared as _, Goto, Land, Landed, PlaceFree, PlaceTaken};
+
+use crate::{me::Me, precedence};
+
+/// How long a vehicle waits in all on the way to one waypoint.
+pub const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Blocks `advance` while another vehicle has the place of the mission's leg; requests `land` once it has
+/// waited for [`PATIENCE`]. The way home is not waited on, nor is an operator's point: those end near the
+/// place.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct AwaitPlace {
+    me: Me,
+    /// What is left of the patience.
+    left: Duration,
+    phase: Phase,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+enum Phase {
+    Free,
+    Waiting { by: String, since: Duration },
+    GivingUp { by: String },
+}
+
+impl AwaitPlace {
+    pub fn new(me: Me) -> Self {
+        Self { me, left: PATIENCE, phase: Phase::Free }
+    }
+
+    fn waits_for(&self, event: &Event, now: Duration) -> Phase {
+        match (PlaceTaken::read(event), &self.phase) {
+            (Some(taken), Phase::Waiting { since, .. }) => {
+                Phase::Waiting { by: taken.by.to_string(), since: *since }
+            }
+            (Some(taken), _) if taken.leg >= 0 => Phase::Waiting { by: taken.by.to_string(), since: now },
+            _ => Phase::Free,
+        }
+    }
+}
+
+impl BThread for AwaitPlace {
+    fn bid(&self) -> Option<Bid> {
+        let me = &self.me;
+        let bid = Bid::new().priority(precedence::MISSION);
+        let over = me.any::<(Goto, Arrived, Land, Landed)>();
+        Some(match &self.phase {
+            Phase::Free => bid.wait_for(me.any::<(PlaceTaken, Goto)>()),
+            Phase::Waiting { since, .. } => bid
+                .block(me.any::<Advance>())
+                .wait_for(me.any::<(PlaceTaken, PlaceFree)>())
+                .wait_for(over)
+                .deadline(*since + self.left),
+            Phase::GivingUp { by } => {
+                let why = format!("{by} stays where it was to land");
+                bid.request(me.event(Land { why: why.as_str().into() })).wait_for(over)
+            }
+        })
+    }
+
+    fn resume(&mut self, event: &Event, cx: &mut Context) {
+        let verb = self.me.verb(event);
+        let phase = match (&self.phase, verb) {
+            (Phase::Waiting { by, .. }, None) => Phase::GivingUp { by: by.clone() },
+            (_, Some(PlaceTaken::NAME)) => self.waits_for(event, cx.now()),
+            _ => Phase::Free,
+        };
+        match (&self.phase, verb) {
+            (_, Some(Goto::NAME)) => self.left = PATIENCE,
+            (Phase::Waiting { since, .. }, Some(PlaceFree::NAME)) => {
+                self.left = self.left.saturating_sub(cx.now().saturating_sub(*since));
+            }
+            _ => {}
+        }
+        self.phase = phase;
+    }
+}
