@@ -10,7 +10,7 @@ use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{GlobalPlanner, LocalPlanner};
 use skein_sim::scenario::{Order, Overrides, Scenario, ScenarioError, Who};
 use skein_wire::event::What;
-use skein_world::{Obstacle, PositionErrors, PositionFaultKind};
+use skein_world::{Obstacle, PositionErrors, PositionFaultKind, Scene};
 
 const YARD: &str = r#"
 name = "yard"
