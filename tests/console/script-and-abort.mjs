@@ -75,7 +75,7 @@ await drive({}, async (console) => {
   const aborted = console.fleet.time_s;
   await console.press('Abort');
   // In the middle of the circle they part first, so that one is down before another begins.
-  const has_landed = (name) => console.history(name, aborted).some((vehicle) => vehicle.mode === 'land');
-  await console.until('everyone lands', () => NAMES.every(has_landed));
+  const hasLanded = (name) => console.history(name, aborted).some((vehicle) => vehicle.mode === 'land');
+  await console.until('everyone lands', () => NAMES.every(hasLanded));
   await console.stay();
 });
