@@ -153,6 +153,11 @@ impl Processes {
         self.nodes.get(node).map(|running| running.since.elapsed())
     }
 
+    /// The number by which the operating system knows a node's process.
+    pub fn process(&self, node: &NodeName) -> Option<u32> {
+        self.nodes.get(node).map(|running| running.child.id())
+    }
+
     fn config_of(&self, node: &NodeName) -> anyhow::Result<&Path> {
         match node.as_str().strip_prefix("uav/").and_then(|number| number.parse::<usize>().ok()) {
             None => Ok(&self.files.ground),

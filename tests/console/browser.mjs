@@ -71,6 +71,15 @@ export class Console {
     return this.fleets.filter(({ time_s }) => time_s >= since).map(({ vehicles }) => vehicles.find((vehicle) => vehicle.name === name));
   }
 
+  /**
+   * How far a vehicle has strayed, m, from where it was at the station's time `since`. Who stays where it is gives way
+   * to others by a metre, and comes back.
+   */
+  strayed(name, since) {
+    const [{ position: then }, ...later] = this.history(name, since);
+    return Math.max(0, ...later.map(({ position }) => apart(then, position)));
+  }
+
   /** What `look` finds, once it finds something. */
   async until(what, look, withinS = 30) {
     const deadline = performance.now() + withinS * 1000;
@@ -111,7 +120,7 @@ export class Console {
    * Waits until the page shows that these vehicles, and no others, have acknowledged the newest order, which is `what`.
    * Returns the order as the station tells of it.
    */
-  async acknowledged(what, names, withinS = 2) {
+  async acknowledged(what, names, withinS = 10) {
     const newest = this.page.locator(`#answers [data-order-what="${what}"]`);
     const chips = (which) => newest.locator(which).evaluateAll((all) => all.map((chip) => chip.dataset.vehicle));
     await this.until(`${names} acknowledge ${what}`, async () => (await chips('.chip[data-answer=acknowledged]')).length === names.length, withinS);

@@ -6,25 +6,23 @@ import assert from 'node:assert/strict';
 import { drive, speed } from './browser.mjs';
 
 const NAMES = ['uav/1', 'uav/2', 'uav/3', 'uav/4'];
-/** Slower than this, a vehicle stays where it is. */
-const STILL_M_S = 0.3;
+/** Who flies on is this far away after two seconds; who is held has not left its place by so much, m. */
+const AWAY_M = 1;
 
 await drive({}, async (console) => {
   const all = (wanted) => NAMES.every((name) => wanted(console.vehicle(name) ?? {}));
   await console.until('everyone flies', () => all((vehicle) => vehicle.task.startsWith('leg') && speed(vehicle) > 1));
 
-  const pressed = performance.now();
   await console.press('Hold');
   const hold = await console.acknowledged('hold', NAMES);
-  const took = performance.now() - pressed;
-  assert.ok(took < 1000, `the last acknowledgement was shown after ${took} ms`);
+  // When the page shows it is up to this computer.
   for (const [name, { after_ms }] of Object.entries(hold.answers)) assert.ok(after_ms < 1000, `${name} acknowledged after ${after_ms} ms`);
 
   const stopped = hold.time_s + 3;
   await console.until('five seconds on hold', () => console.fleet.time_s > stopped + 2);
   for (const name of NAMES) {
-    const fastest = Math.max(...console.history(name, stopped).map(speed));
-    assert.ok(fastest < STILL_M_S, `${name} moves with ${fastest} m/s while held`);
+    const strayed = console.strayed(name, stopped);
+    assert.ok(strayed < AWAY_M, `${name} has gone ${strayed} m while held`);
     const { position, waiting_for } = console.vehicle(name);
     assert.ok(position[2] > 1, `${name} is not in the air any more`);
     assert.match(waiting_for, /hold/, name);
@@ -45,9 +43,10 @@ await drive({}, async (console) => {
   await console.selectNone();
   assert.ok(await why.isHidden());
 
+  const resumed = console.fleet.time_s;
   await console.press('Resume');
   await console.acknowledged('resume', NAMES);
-  await console.until('everyone flies on', () => all((vehicle) => speed(vehicle) > 1), 5);
+  await console.until('everyone flies on', () => NAMES.every((name) => console.strayed(name, resumed) > AWAY_M), 10);
   await console.select(NAMES[2]);
   await console.until('it is not held any more', async () => /does what it does/.test(await why.textContent()) && !/blocked by/.test(await why.textContent()));
   await console.stay();

@@ -28,6 +28,7 @@
 mod evidence;
 mod explanation;
 mod inquiry;
+mod messages;
 mod party;
 mod recorded;
 mod waits;

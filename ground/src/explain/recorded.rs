@@ -10,6 +10,7 @@ use skein_wire::proto::{self, TraceEvent};
 use skein_wire::{DecodeError, State};
 
 use super::Evidence;
+use super::messages::Messages;
 
 /// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -46,15 +47,14 @@ impl Recorded {
     /// Reads the content of a recording, which errors call by `path`.
     pub fn read(file: &[u8], path: &Path) -> Result<Self, RecordedError> {
         let unreadable = |source| RecordedError::Unreadable { path: path.to_owned(), source };
-        let options = mcap::read::Options::IgnoreEndMagic.into();
-        let stream = mcap::MessageStream::new_with_options(file, options).map_err(unreadable)?;
+        let mut messages = Messages::of(file);
         let mut recorded = Self {
             notes: Vec::new(),
             span: (Duration::MAX, Duration::ZERO),
             complete: ends_as_it_should(file),
         };
-        for message in stream {
-            let message = match message {
+        while let Some(message) = messages.next() {
+            let (header, data) = match message {
                 Ok(message) => message,
                 // What follows was not written any more.
                 Err(_) if recorded.is_begun() => {
@@ -63,11 +63,11 @@ impl Recorded {
                 }
                 Err(source) => return Err(unreadable(source)),
             };
-            let at = Duration::from_nanos(message.log_time);
+            let at = Duration::from_nanos(header.log_time);
             recorded.span = (recorded.span.0.min(at), recorded.span.1.max(at));
-            let note = note(&message).map_err(|source| RecordedError::Message {
+            let note = note(messages.schema(&header), &data).map_err(|source| RecordedError::Message {
                 path: path.to_owned(),
-                topic: message.channel.topic.clone(),
+                topic: messages.topic(&header).unwrap_or_default().to_owned(),
                 at_s: at.as_secs_f64(),
                 source,
             })?;
@@ -118,12 +118,11 @@ fn ends_as_it_should(file: &[u8]) -> bool {
     file.get(mcap::MAGIC.len()..).is_some_and(|rest| rest.ends_with(mcap::MAGIC))
 }
 
-fn note(message: &mcap::Message<'_>) -> Result<Option<Note>, DecodeError> {
-    let schema = message.channel.schema.as_ref().map(|schema| schema.name.as_str());
+fn note(schema: Option<&str>, data: &[u8]) -> Result<Option<Note>, DecodeError> {
     Ok(match schema {
-        Some("skein.State") => Some(Note::State(Box::new(proto::State::decode(&*message.data)?.try_into()?))),
-        Some("skein.Board") => Some(Note::Board(proto::Board::decode(&*message.data)?.try_into()?)),
-        Some("skein.TraceEvent") => Some(Note::Event(TraceEvent::decode(&*message.data)?.try_into()?)),
+        Some("skein.State") => Some(Note::State(Box::new(proto::State::decode(data)?.try_into()?))),
+        Some("skein.Board") => Some(Note::Board(proto::Board::decode(data)?.try_into()?)),
+        Some("skein.TraceEvent") => Some(Note::Event(TraceEvent::decode(data)?.try_into()?)),
         _ => None,
     })
 }

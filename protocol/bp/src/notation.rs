@@ -90,6 +90,9 @@ impl<'de> Visitor<'de> for EventVisitor {
 }
 
 fn checked<E: Error>(event: Event) -> Result<Event, E> {
+    if event.name().is_empty() {
+        return Err(E::custom("an event without a name: expected one such as uav/1/land"));
+    }
     event.check_bounds().map_err(E::custom)?;
     Ok(event)
 }
@@ -226,7 +229,7 @@ impl<'de> Visitor<'de> for EventSetVisitor {
     }
 
     fn visit_str<E: Error>(self, name: &str) -> Result<Measured, E> {
-        Measured::leaf(EventSet::Exactly(Event::new(name)))
+        Measured::leaf(EventSet::Exactly(checked(Event::new(name))?))
     }
 
     fn visit_unit<E: Error>(self) -> Result<Measured, E> {

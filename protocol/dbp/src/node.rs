@@ -74,10 +74,14 @@ pub struct Caused {
     pub facts_withheld: u64,
     /// Lives that it has begun more often than a process can.
     pub lives_refused: u64,
-    /// Bids, refusals and served requests that are kept of it, and its occurrences that wait behind a hole.
+    /// Bids, refusals and served requests that are kept of it.
     pub entries: usize,
     /// About how many bytes these are.
     pub entry_bytes: usize,
+    /// Its occurrences that wait behind a hole.
+    pub pending: usize,
+    /// About how many bytes these are.
+    pub pending_bytes: usize,
 }
 
 /// Takes the next step of a program that has been told all: selects an event, or finds that there is none to select.
@@ -299,13 +303,15 @@ impl Node {
     pub fn caused_by(&self, member: &NodeName) -> Caused {
         let telling = self.run.telling(member);
         let (entries, entry_bytes) = self.home.table.entries_of(member);
-        let (waiting, waiting_bytes) = self.channel.waiting_of(member);
+        let (pending, pending_bytes) = self.channel.waiting_of(member);
         Caused {
             facts_told: telling.told,
             facts_withheld: telling.withheld,
             lives_refused: self.channel.peers.lives_refused(member),
-            entries: entries + waiting,
-            entry_bytes: entry_bytes + waiting_bytes,
+            entries,
+            entry_bytes,
+            pending,
+            pending_bytes,
         }
     }
 

@@ -137,10 +137,11 @@ fn read(path: &Path) -> Option<u64> {
     number(&fs::read(path).ok()?)
 }
 
-/// The number that a file holds; one that may have been cut short is none.
+/// The number that a file holds; one that may have been cut short is none, and none that another would not write over
+/// whole.
 fn number(text: &[u8]) -> Option<u64> {
     let text = std::str::from_utf8(text).ok()?;
-    let is_whole = text.ends_with('\n') || text.len() == DIGITS;
+    let is_whole = text.len() <= DIGITS + 1 && (text.ends_with('\n') || text.len() == DIGITS);
     text.trim().parse().ok().filter(|_| is_whole)
 }
 

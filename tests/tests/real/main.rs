@@ -5,6 +5,7 @@
 mod autopilots;
 mod certificates;
 mod console;
+mod logs;
 mod processes;
 mod real_clock;
 mod turn;

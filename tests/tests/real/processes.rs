@@ -10,18 +10,14 @@ use skein_sim::cli::{Network, Setup};
 use skein_sim::processes::{Processes, Programs};
 use skein_sim::scenario::{Overrides, Scenario};
 
+use crate::logs::Logs;
+
 /// Each test has network ports of its own.
 fn try_out(fault: Fault, port_offset: u16, network: Network) {
     let folder = tempfile::tempdir().unwrap();
+    let _logs = Logs::of(folder.path());
     let trial = run(fault, 1, folder.path(), port_offset, network).unwrap();
-    if !trial.violations.is_empty() {
-        let logs = folder.path().join("logs");
-        for log in std::fs::read_dir(logs).unwrap() {
-            let path = log.unwrap().path();
-            println!("--- {}\n{}", path.display(), std::fs::read_to_string(&path).unwrap_or_default());
-        }
-        panic!("{fault:?} at {:.1} s: {:?}", trial.at_s, trial.violations);
-    }
+    assert!(trial.violations.is_empty(), "{fault:?} at {:.1} s: {:?}", trial.at_s, trial.violations);
 }
 
 #[test]
@@ -72,6 +68,7 @@ fn with_slow_agent(scenario: &Scenario, folder: &std::path::Path, port_offset: u
 fn a_vehicle_whose_mission_hangs_avoids_hovers_and_lands() {
     let _turn = crate::turn::turn();
     let folder = tempfile::tempdir().unwrap();
+    let _logs = Logs::of(folder.path());
     let overrides = Overrides { vehicles: Some(3), ..Overrides::default() };
     let scenario = Scenario::open("antipodal", &overrides, 1).unwrap();
     let mut swarm = with_slow_agent(&scenario, folder.path(), 4900);

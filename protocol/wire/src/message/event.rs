@@ -35,7 +35,7 @@ impl TryFrom<proto::Value> for Value {
 impl From<&Event> for proto::Event {
     fn from(event: &Event) -> Self {
         // What no other node would take in is cut here: a hole in the stream of events would be for ever.
-        let mut room = Bound::EventBytes.stated() * 3 / 4;
+        let mut room = Bound::EventBytes.most() / 4 * 3;
         let datum = |(key, value): (&str, &Value)| {
             let value = match value {
                 Value::Text(text) if text.len() > room => Value::from(shortened(text, room)),

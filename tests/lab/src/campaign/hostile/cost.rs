@@ -11,6 +11,8 @@ use skein_wire::{NodeLink, SenderStats};
 const LONGEST: usize = Bound::SceneBytes.stated();
 /// Each message costs as much as so many bytes, at least.
 const PER_MESSAGE: usize = 512;
+/// Ticks of 20 ms.
+const TICKS_PER_SECOND: usize = 50;
 /// Sets looked at in a tick while one member's messages are taken in. What is read in a tick has some 4000 sets, each of
 /// which is looked at some twenty times; one comparison takes 16384.
 #[cfg(feature = "mutants")]
@@ -26,12 +28,34 @@ pub struct Counted {
 /// The worst of each count, by its name.
 pub type Worst = BTreeMap<&'static str, Counted>;
 
+/// The most refusals of one record: one of each bid that is not honoured, two of each that is, and one for each event
+/// that is asked for; and one of each block of a former life.
+const REFUSALS: usize =
+    Bound::RecordBids.stated() + 2 * Bound::HonouredBids.stated() + Bound::RecordRequests.stated();
+
 /// What one node has counted of the member.
 #[derive(Debug, Default)]
 pub struct Cost {
     before: SenderStats,
+    at: Duration,
     incarnation: Option<u64>,
-    lives: u64,
+    bytes: Used,
+    facts: Used,
+    lives: Used,
+}
+
+/// What is used of an allowance that comes back with time. So a member that spares is given no more than one that does
+/// not.
+#[derive(Debug, Default)]
+pub struct Used(f64);
+
+impl Used {
+    /// So many more are used, after a time in which `per_second` have come back; gives what is used now.
+    pub fn add(&mut self, more: u64, per_second: usize, passed: Duration) -> u64 {
+        self.0 = (self.0 - per_second as f64 * passed.as_secs_f64()).max(0.0) + more as f64;
+        // Sums of fractions are a little more than they should be.
+        (self.0 - 1e-6).ceil() as u64
+    }
 }
 
 impl Cost {
@@ -46,51 +70,58 @@ impl Cost {
         worst: &mut Worst,
     ) -> Vec<(&'static str, Counted)> {
         let (_, stats) = node.senders().find(|(name, _)| *name == Some(member)).unwrap_or_default();
-        let (ticks, seconds) = (now.as_millis() as usize / 20, now.as_secs_f64().ceil() as usize);
+        let passed = now - std::mem::replace(&mut self.at, now);
         let since = |of: fn(&SenderStats) -> u64| of(&stats) - of(&self.before);
-        let ahead = stats.bytes.saturating_sub((Bound::TickBytes.stated() * ticks) as u64);
-        let at_rate = |at_once: Bound, per_second: Bound| at_once.stated() + per_second.stated() * seconds;
+        let (messages, bytes) = (since(|stats| stats.messages), since(|stats| stats.bytes));
+        let taken = bytes + messages * PER_MESSAGE as u64;
+        let ahead = self.bytes.add(taken, Bound::TickBytes.stated() * TICKS_PER_SECOND, passed);
+        let told = since(|stats| stats.caused.facts_told);
+        let told = self.facts.add(told, Bound::FactsPerSecond.stated(), passed);
         let program = node.node().program();
         let own = |name: &str| name.split_once('#').is_some_and(|(node, _)| node == member.as_str());
         let proxies = || program.proxies().filter(|(name, _)| own(name));
         let incarnation =
             node.node().peers().find(|(name, _)| *name == member).and_then(|(_, peer)| peer.incarnation);
-        if incarnation != self.incarnation {
-            (self.incarnation, self.lives) = (incarnation, self.lives + 1);
-        }
+        let is_new = std::mem::replace(&mut self.incarnation, incarnation) != incarnation;
+        let lives = self.lives.add(u64::from(is_new), Bound::LivesPerSecond.stated(), passed);
         let facts = |name: &str, key: &str, is_meant: &dyn Fn(&str) -> bool| {
             let is_one =
                 |one: &&&Happened| one.event.kind() == name && one.event.text(key).is_some_and(is_meant);
             happened.iter().filter(is_one).count() as u64
         };
         let stalls = stalls_of_one_event(happened, &own);
-        let entries =
-            Bound::HonouredBids.stated() * 3 + Bound::ListItems.stated() + Bound::PendingOccurrences.stated();
         let counts = [
-            ("messages_per_tick", since(|stats| stats.messages), Bound::TickBytes.stated() / PER_MESSAGE + 1),
-            ("bytes_per_tick", since(|stats| stats.bytes), Bound::TickBytes.stated() + LONGEST),
-            ("bytes_ahead", ahead, Bound::TickBytes.stated() + LONGEST),
+            ("messages_per_tick", messages, Bound::TickBytes.stated() / PER_MESSAGE + 1),
+            ("bytes_per_tick", bytes, Bound::TickBytes.stated() + LONGEST),
+            ("bytes_ahead", ahead, Bound::TickBytes.stated() + LONGEST + PER_MESSAGE),
             ("waiting_messages", stats.waiting as u64, Bound::WaitingMessages.stated()),
             ("waiting_bytes", stats.waiting_bytes as u64, Bound::WaitingBytes.stated()),
-            ("facts", stats.caused.facts_told, at_rate(Bound::FactsAtOnce, Bound::FactsPerSecond)),
+            ("facts", told, Bound::FactsAtOnce.stated()),
             (
                 "denials_per_message",
-                per(facts("denied", "node", &|node| node == member.as_str()), since(|stats| stats.messages)),
+                per(facts("denied", "node", &|node| node == member.as_str()), messages),
                 1,
             ),
             ("stalls_of_one_event", stalls, Bound::StallsNoted.stated()),
-            ("lives", self.lives, at_rate(Bound::LivesPerSecond, Bound::LivesPerSecond)),
-            ("entries", stats.caused.entries as u64, entries),
+            ("lives", lives, Bound::LivesPerSecond.stated()),
+            ("entries", stats.caused.entries as u64, 3 * Bound::HonouredBids.stated() + REFUSALS),
+            ("entry_bytes", stats.caused.entry_bytes as u64, 4 * Bound::BidBytes.stated() * 4),
+            ("pending", stats.caused.pending as u64, Bound::PendingOccurrences.stated()),
             (
-                "entry_bytes",
-                stats.caused.entry_bytes as u64,
-                4 * Bound::BidBytes.stated() * 4 + 2 * Bound::PendingBytes.stated(),
+                "pending_bytes",
+                stats.caused.pending_bytes as u64,
+                Bound::PendingBytes.stated() + Bound::OccurrenceBytes.stated(),
             ),
             ("honoured_bids", proxies().count() as u64, Bound::HonouredBids.stated()),
             (
                 "requests_of_one_bid",
                 proxies().map(|(_, bid)| bid.requests().len()).max().unwrap_or(0) as u64,
                 Bound::BidRequests.stated(),
+            ),
+            (
+                "block_nodes",
+                proxies().map(|(_, bid)| bid.blocks().extent().nodes).max().unwrap_or(0) as u64,
+                Bound::SetNodes.stated(),
             ),
             #[cfg(feature = "mutants")]
             ("sets_per_tick", since(|stats| stats.nodes), SETS_PER_TICK),

@@ -15,12 +15,12 @@ use skein_wire::{Fleet, Link, Network, NetworkConfig, NodeLink, standard_authori
 use skein_world::{STEP, Simulation};
 
 use super::content::beyond;
-use super::cost::{Cost, Worst, note};
+use super::cost::{Cost, Used, Worst, note};
 use super::mouth::{Mouth, Said};
 use super::story::{LAST_TICK, Rank, Story};
 
 /// Vehicles that have a mission.
-const FLYING: usize = 3;
+pub const FLYING: usize = 3;
 const STEPS_PER_TICK: u32 = 5;
 /// Time in which they must have arrived beside a vehicle that lies.
 const PATIENCE: Duration = Duration::from_secs(90);
@@ -29,7 +29,7 @@ const OPERATOR_END: Duration = Duration::from_millis(20 * LAST_TICK + 2000);
 /// Least distance between two centres, m; the filter asks for 1.4 m.
 const LEAST_SEPARATION_M: f64 = 1.0;
 /// Who lands farther from its goal than this has landed early, m.
-const AT_GOAL_M: f64 = 1.5;
+pub const AT_GOAL_M: f64 = 1.5;
 /// Higher than this above its pad a vehicle has taken off, m.
 const ALOFT_M: f64 = 1.0;
 
@@ -111,6 +111,8 @@ struct Flight<'a> {
     goals: Vec<[f64; 2]>,
     authority: Authority,
     costs: BTreeMap<NodeName, Cost>,
+    /// The repeated occurrences of each home, and when they were counted last.
+    repeats: BTreeMap<NodeName, (Used, Duration)>,
     worst: Worst,
     has_flown: [bool; FLYING],
     tick: u64,
@@ -141,7 +143,8 @@ impl<'a> Flight<'a> {
         swarm.kill_agent(FLYING);
         let honest: Vec<NodeName> = (0..FLYING).map(vehicle_name).chain([GROUND.clone()]).collect();
         let place = swarm.simulation().vehicle(FLYING).map(|state| state.motion.position).unwrap_or_default();
-        let mouth = Mouth::new(member.clone(), story.rank, network.join(&member), honest.clone(), place)?;
+        let own = Box::new(network.join(&member));
+        let mouth = Mouth::new(member.clone(), story.rank, own, honest.clone(), place)?;
         Ok(Self {
             story,
             swarm,
@@ -152,6 +155,7 @@ impl<'a> Flight<'a> {
             honest,
             goals,
             authority: standard_authority(),
+            repeats: BTreeMap::new(),
             worst: Worst::new(),
             has_flown: [false; FLYING],
             tick: 0,
@@ -261,11 +265,12 @@ impl<'a> Flight<'a> {
                 found.extend(beyond.map(|beyond| (name.clone(), beyond)));
             }
         }
-        let seconds = now.as_secs_f64().ceil() as usize;
-        for (name, repeated) in &self.mouth.repeated {
-            let stated = Bound::RepeatsAtOnce.stated() + Bound::RepeatsPerSecond.stated() * seconds;
-            let beyond = note(&mut worst, "repeated", *repeated, stated);
-            found.extend(beyond.map(|beyond| (name.clone(), beyond)));
+        for (name, repeated) in std::mem::take(&mut self.mouth.repeated) {
+            let (used, at) = self.repeats.entry(name.clone()).or_default();
+            let passed = now - std::mem::replace(at, now);
+            let used = used.add(repeated, Bound::RepeatsPerSecond.stated(), passed);
+            let beyond = note(&mut worst, "repeated", used, Bound::RepeatsAtOnce.stated());
+            found.extend(beyond.map(|beyond| (name, beyond)));
         }
         (self.worst, self.costs) = (worst, costs);
         let (name, (count, counted)) = found.into_iter().next()?;
@@ -326,12 +331,16 @@ impl<'a> Flight<'a> {
 }
 
 /// Where each flies to, m: their ways cross, in an order that the seed gives.
-fn goals(seed: u64) -> Vec<[f64; 2]> {
+pub fn goals(seed: u64) -> Vec<[f64; 2]> {
     let order = [[0, 1, 2], [1, 0, 2], [2, 1, 0], [0, 2, 1], [1, 2, 0], [2, 0, 1]][seed as usize % 6];
     order.map(|lane| [14.0, 5.0 * f64::from(lane)]).to_vec()
 }
 
-fn scenario(story: &Story, goals: &[[f64; 2]]) -> anyhow::Result<Scenario> {
+/// The world and the missions.
+///
+/// # Errors
+/// None that a seed brings about.
+pub fn scenario(story: &Story, goals: &[[f64; 2]]) -> anyhow::Result<Scenario> {
     let lanes = goals.iter().zip(0..).map(|([x, y], lane)| {
         let from = 5.0 * f64::from(lane);
         format!("[[vehicle]]\nstart_m = [0.0, {from:.1}]\nwaypoints_m = [[{x:.1}, {y:.1}, 3.0]]\n")

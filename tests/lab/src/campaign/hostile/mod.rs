@@ -4,9 +4,11 @@ mod content;
 mod cost;
 mod flight;
 mod mouth;
+mod processes;
 mod story;
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
@@ -16,7 +18,7 @@ use skein_sim::cli::Exit;
 use self::cost::Worst;
 use self::flight::{Flown, Violation, fly};
 use self::mouth::Said;
-use self::story::Story;
+use self::story::{Rank, Story};
 use crate::runs;
 use crate::task::Task;
 
@@ -45,6 +47,12 @@ pub struct Hostile {
     /// End with the first violation.
     #[arg(long)]
     first: bool,
+    /// Fly as processes over TLS instead, in real time and one flight after another: logs stay in this folder.
+    #[arg(long, value_name = "DIR")]
+    processes: Option<PathBuf>,
+    /// With --processes, use network ports so much further up, beside another swarm on this computer.
+    #[arg(long, value_name = "N", default_value_t = 6000)]
+    port_offset: u16,
 }
 
 impl Task for Hostile {
@@ -54,6 +62,9 @@ impl Task for Hostile {
     fn run(&self, as_json: bool) -> anyhow::Result<Exit> {
         let removed = self.mutant.as_deref().map(bound).transpose()?;
         let seeds: Vec<u64> = (self.from..self.from + self.seeds).collect();
+        if let Some(folder) = &self.processes {
+            return self.fly_processes(&seeds, folder, as_json);
+        }
         let mut report = Report::default();
         // With --first, a few at a time.
         let at_once = if self.first { 4 } else { seeds.len().max(1) };
@@ -78,6 +89,38 @@ impl Task for Hostile {
         }
         report.print(as_json, self.mutant.as_deref());
         Ok(Exit::of(report.found.is_empty()))
+    }
+}
+
+impl Hostile {
+    fn fly_processes(&self, seeds: &[u64], folder: &Path, as_json: bool) -> anyhow::Result<Exit> {
+        let fly = |story: &Story, name: &str| processes::fly(story, &folder.join(name), self.port_offset);
+        let quiet = Story { habits: Vec::new(), rank: Rank::Vehicle, ..Story::of(self.from) };
+        let quiet = fly(&quiet, "quiet")?;
+        let mut trials = Vec::new();
+        for seed in seeds {
+            let story = Story { rank: Rank::Vehicle, ..Story::of(*seed) };
+            let mut trial = fly(&story, &seed.to_string())?;
+            trial.judge_growth(&quiet);
+            let verdict =
+                if trial.violations.is_empty() { "ok".to_owned() } else { trial.violations.join("; ") };
+            eprintln!("seed {seed}: {verdict}");
+            trials.push(trial);
+        }
+        let violations: usize = trials.iter().map(|trial| trial.violations.len()).sum();
+        let growth_mb = trials.iter().map(|trial| trial.growth).max().unwrap_or(0) as f64 / 1e6;
+        let tick_ms = trials.iter().map(|trial| trial.tick_ms).fold(0.0, f64::max);
+        if as_json {
+            let failing: Vec<_> = trials.iter().filter(|trial| !trial.violations.is_empty()).collect();
+            let report = json!({ "seeds": trials.len(), "violations": violations, "growth_mb": growth_mb, "tick_ms": tick_ms, "quiet": quiet, "failing_seeds": failing });
+            println!("{report}");
+        } else {
+            println!(
+                "{} flights, {violations} violations; a process grew by {growth_mb:.1} MB and used {tick_ms:.1} ms of a processor in each 20 ms, at most",
+                trials.len()
+            );
+        }
+        Ok(Exit::of(violations == 0))
     }
 }
 

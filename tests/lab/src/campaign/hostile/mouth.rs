@@ -14,8 +14,7 @@ use skein_dbp::{
 use skein_sim::fly::{FLEET, GROUND};
 use skein_wire::event::{Declared as _, Enter, Events as _, Handover, OrderTaken, SWARM, Takeoff, What};
 use skein_wire::{
-    Check, CheckState, Fleet, Key, Link, MAX_PAYLOAD, MemoryLink, MissionState, Payload, Readiness, Scan,
-    Scene, State,
+    Check, CheckState, Fleet, Key, Link, MAX_PAYLOAD, MissionState, Payload, Readiness, Scan, Scene, State,
 };
 
 use super::story::{Habit, Rank, Say};
@@ -24,6 +23,10 @@ use super::story::{Habit, Rank, Say};
 const SIGN_OF_LIFE: u64 = 10;
 /// Messages of others that it has in mind.
 const OVERHEARD: usize = 64;
+/// B-threads that block the same, at most.
+const MOST_BLOCKS: usize = 40;
+/// B-threads of its own that block what another one of them waits for.
+const WAITS_FOR: usize = 8;
 /// A field that no version knows, with a length before its content: number 1000.
 const UNKNOWN_FIELD: [u8; 2] = [0xc2, 0x3e];
 
@@ -40,7 +43,7 @@ pub struct Mouth {
     me: NodeName,
     rank: Rank,
     fleet: Fleet,
-    link: MemoryLink,
+    link: Box<dyn Link>,
     others: Vec<NodeName>,
     /// Where its vehicle stands, m.
     place: Vector3<f64>,
@@ -49,7 +52,9 @@ pub struct Mouth {
     seq: u64,
     tick: u64,
     overheard: VecDeque<(Key, Vec<u8>)>,
-    /// Occurrences that each home has repeated for it alone.
+    /// The newest sign of life of each of the others.
+    signs: BTreeMap<NodeName, Presence>,
+    /// Occurrences that each home has repeated for it alone, since somebody last took them.
     pub repeated: BTreeMap<NodeName, u64>,
     pub said: Said,
     /// For each of the others, the messages that were longer than their kind may be.
@@ -62,7 +67,7 @@ impl Mouth {
     pub fn new(
         me: NodeName,
         rank: Rank,
-        link: MemoryLink,
+        link: Box<dyn Link>,
         others: Vec<NodeName>,
         place: Vector3<f64>,
     ) -> anyhow::Result<Self> {
@@ -78,6 +83,7 @@ impl Mouth {
             seq: 0,
             tick: 0,
             overheard: VecDeque::new(),
+            signs: BTreeMap::new(),
             repeated: BTreeMap::new(),
             said: Said::default(),
             too_long: BTreeMap::new(),
@@ -107,6 +113,9 @@ impl Mouth {
             if key.is_of::<Occurrence>() && key.recipient() == Some(&self.me) {
                 *self.repeated.entry(key.sender().clone()).or_default() += 1;
             }
+            if let Ok(Payload::Message(Message::Presence(presence))) = Payload::decode(&payload) {
+                self.signs.insert(key.sender().clone(), presence);
+            }
             self.overheard.push_back((key, payload));
             if self.overheard.len() > OVERHEARD {
                 self.overheard.pop_front();
@@ -115,8 +124,9 @@ impl Mouth {
     }
 
     fn say(&mut self, habit: &Habit, random: &mut ChaCha8Rng) {
-        // Sizes of every order, the large ones more often.
-        let size = (habit.size.max(1) as f64).powf(random.random_range(0.75_f64..=1.0)).round() as u64;
+        // Sizes of every order, the greatest most often.
+        let order = if random.random_bool(0.5) { 1.0 } else { random.random_range(0.75_f64..=1.0) };
+        let size = (habit.size.max(1) as f64).powf(order).round() as u64;
         let count = usize::try_from(size).unwrap_or(usize::MAX);
         match habit.say {
             Say::Lives => {
@@ -133,10 +143,12 @@ impl Mouth {
             Say::Huge => self.huge(size as f64),
             Say::Words => self.words(count),
             Say::Stale => self.stale(size),
-            Say::Deep => self.block(deep(self.blockable(random), count), random),
+            Say::Deep => self.block_often(&deep(self.blockable(random), count), random),
             Say::Wide => self.block(wide(self.blockable(random), count), random),
+            Say::Keeps => self.keep(count, random),
             Say::Many => self.many(count, random),
             Say::Asks => self.ask(count, random),
+            Say::Waits => self.wait(count),
             Say::Contradicts => self.contradict(count, random),
             Say::Names => self.names(&"n".repeat(count), random),
             Say::Chunks => self.names(&vec!["**"; count].join("/"), random),
@@ -278,16 +290,18 @@ impl Mouth {
 
     fn record(&mut self, home: &NodeName, bids: Vec<RemoteBid>) -> BidRecord {
         self.epoch += 1;
+        let sign = self.signs.get(home);
+        let joint = sign.and_then(|sign| sign.joint);
         BidRecord {
             node: self.me.clone(),
             incarnation: self.life,
             home: home.clone(),
-            home_incarnation: None,
+            home_incarnation: sign.map(|sign| sign.incarnation),
             epoch: self.epoch,
             sent_at: Duration::from_millis(20 * self.tick),
-            applied: 0,
-            term: 0,
-            decided: 0,
+            applied: sign.map_or(0, |sign| sign.latest_seq),
+            term: joint.map_or(0, |joint| joint.term),
+            decided: joint.map_or(0, |joint| joint.decided),
             lease_ms: 1000,
             bids,
         }
@@ -298,9 +312,28 @@ impl Mouth {
         self.bid_to_some(vec![bid], random);
     }
 
+    /// Of as many b-threads as a record of bids may hold.
+    fn block_often(&mut self, block: &EventSet, random: &mut ChaCha8Rng) {
+        let times = (Bound::RecordNodes.stated() / block.extent().nodes.max(1)).clamp(1, MOST_BLOCKS);
+        let bids = (0..times).map(|number| self.bid(&format!("blocks{number}"), block.clone())).collect();
+        self.bid_to_some(bids, random);
+    }
+
     fn bid_to_some(&mut self, bids: Vec<RemoteBid>, random: &mut ChaCha8Rng) {
         let home = pick(random, &self.others.clone());
         let record = self.record(&home, bids);
+        self.put_record(record);
+    }
+
+    fn keep(&mut self, count: usize, random: &mut ChaCha8Rng) {
+        self.life += 1;
+        self.put_presence(self.presence());
+        let first = random.random_range(0..100_000);
+        let enter = |number: usize| EventSet::named(format!("uav/{}/enter", first + number));
+        let block = EventSet::Or((0..count).map(enter).collect());
+        let bid = RemoteBid { on_loss: OnLoss::Hold, ..self.bid("keeps", block) };
+        let home = self.others[0].clone();
+        let record = self.record(&home, vec![bid]);
         self.put_record(record);
     }
 
@@ -349,6 +382,21 @@ impl Mouth {
         };
         let bids = requests.chunks(per_bid).enumerate().map(of_events).collect();
         let record = self.record(&home, bids);
+        self.put_record(record);
+    }
+
+    fn wait(&mut self, count: usize) {
+        let abort = |number: usize| Event::new(format!("{SWARM}/abort")).with("n", number as i64);
+        // A vehicle may ask for that by right, and may not block it.
+        let (awaited, requests) = match self.rank {
+            Rank::Vehicle => ("launch", Vec::new()),
+            Rank::Operator => ("abort", (0..count).map(abort).collect()),
+        };
+        let block = EventSet::from(format!("{SWARM}/{awaited}"));
+        let keeps = (0..WAITS_FOR).map(|number| self.bid(&format!("keeps{number}"), block.clone()));
+        let asks = RemoteBid { requests, ..self.bid("waits", EventSet::None) };
+        let bids = keeps.chain([asks]).collect();
+        let record = self.record(&GROUND, bids);
         self.put_record(record);
     }
 
@@ -578,13 +626,21 @@ impl Mouth {
             requester: me.clone(),
         };
         let said = self.occurrence(Event::new(me.event_name("said")));
-        let (key, payload) = match random.random_range(0..7) {
+        let board = Board {
+            node: me.clone(),
+            incarnation: self.life,
+            at: Duration::ZERO,
+            rows: Vec::new(),
+            left_out: 0,
+        };
+        let (key, payload) = match random.random_range(0..8) {
             0 => (Key::to_all::<State>(&fleet, me), Payload::State(self.state())),
             1 => (Key::to_all::<Presence>(&fleet, me), Payload::Message(Message::Presence(self.presence()))),
             2 => (Key::to_one::<BidRecord>(&fleet, me, to), Payload::Message(Message::Bid(record))),
             3 => (Key::to_all::<Occurrence>(&fleet, me), Payload::Message(Message::Occurrence(said))),
             4 => (Key::to_one::<Repair>(&fleet, me, to), Payload::Message(Message::Repair(repair))),
             5 => (Key::to_one::<Scan>(&fleet, me, to), Payload::Scan(scan)),
+            6 => (Key::to_all::<Board>(&fleet, me), Payload::Board(board)),
             _ => (Key::to_all::<Scene>(&fleet, me), Payload::Scene(scene)),
         };
         let mut encoded = payload.encode();

@@ -37,10 +37,14 @@ skein_bp::words! {
         Deep = "deep",
         /// A block of many sets; how many.
         Wide = "wide",
+        /// A new life that blocks something else than the one before, and for longer than it lasts; sets.
+        Keeps = "keeps",
         /// A record of many b-threads' bids; how many.
         Many = "many",
         /// Bids for events that others decide on; how many.
         Asks = "asks",
+        /// A bid for events that its own blocks keep from happening; how many.
+        Waits = "waits",
         /// Records that contradict one another; how many.
         Contradicts = "contradicts",
         /// Names that are long; bytes.
@@ -88,20 +92,22 @@ impl Say {
             Self::Words => (500, 8000),
             Self::Stale => (100, 1 << 20),
             Self::Deep => (12, 40),
-            Self::Wide => (700, 4000),
-            Self::Many => (500, 700),
+            Self::Wide => (700, 3500),
+            Self::Keeps => (900, 1000),
+            Self::Many => (500, 1200),
             Self::Asks => (100, 300),
+            Self::Waits => (60, 128),
             Self::Contradicts => (8, 30),
             Self::Names => (250, 2000),
             Self::Chunks => (15, 60),
             Self::Fields => (30, 100),
             Self::Refuses => (800, 6000),
             Self::Happens => (60, 400),
-            Self::Long => (30_000, 120_000),
+            Self::Long => (30_000, 190_000),
             Self::Serves => (250, 600),
             Self::Wants => (1000, 1 << 40),
             Self::Forges | Self::Repeats => (10, 40),
-            Self::Boards => (1000, 5000),
+            Self::Boards => (1000, 9000),
             Self::Checks => (60, 2000),
             Self::Padded => (15_000, 1_200_000),
             Self::Floods => (200, 1500),
