@@ -84,6 +84,13 @@ impl Stretch {
         Self(self.0.iter().filter(is_there).copied().collect())
     }
 
+    /// Whether one of its places is entered by this event, whichever way.
+    pub fn is_at(&self, enter: &Event) -> bool {
+        let Some(Enter { x, y, z, .. }) = Enter::read(enter) else { return false };
+        let entered = Place::new(&Vector3::new(x, y, z), None);
+        self.0.iter().any(|place| place.is_same(&entered))
+    }
+
     /// `enter` events, whosever, that go against it, or across.
     pub fn against(&self) -> EventSet {
         if self.0.is_empty() {

@@ -63,9 +63,10 @@ impl Flight {
             ranges_m: (0..720).map(|ray| self.range(f64::from(ray) * angle_step)).collect(),
             up_m: None,
             down_m: None,
+            upright_m: Vec::new(),
         };
         let pose = Pose { position: self.motion.position, attitude: UnitQuaternion::identity() };
-        self.perception.take_in(&scan, &pose, &[]);
+        self.perception.take_in(&scan, &pose, &[], &[]);
         let (returns, map) = (self.perception.returns(), self.perception.map());
         self.guidance.steering.look(self.now, &pose.position, returns, 720, map);
     }

@@ -83,6 +83,7 @@ fn standing_at<'a>(
 #[cfg(test)]
 mod tests {
     use skein_planning::separation::Neighbour as Track;
+    use skein_wire::event::Right;
 
     use super::*;
     use crate::instruction::Waypoint;
@@ -104,7 +105,14 @@ mod tests {
             radius_m: 0.25,
             cooperative: true,
         };
-        Neighbour { node: NodeName::new("uav/4").unwrap(), armed: true, goal, track }
+        Neighbour {
+            node: NodeName::new("uav/4").unwrap(),
+            armed: true,
+            goal,
+            track,
+            way: None,
+            right: Right::Free,
+        }
     }
 
     /// When a vehicle at `position` is told that its goal is taken while `other` is there, s; `None` within

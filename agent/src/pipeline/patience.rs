@@ -83,7 +83,7 @@ mod tests {
     fn ends_at(is_in_the_way: impl Fn(u64) -> bool, place: impl Fn(u64) -> f64) -> Option<u64> {
         let mut patience = Patience::new(1.4);
         let path = Path::new(vec![Vector3::zeros(), Vector3::new(20.0, 0.0, 0.0)]).unwrap();
-        let following = Following::new(Found { path, clearance_m: None }, Region::EVERYWHERE);
+        let following = Following::new(Found { path, clearance_m: None, is_level: true }, Region::EVERYWHERE);
         (0..300).find(|tenths| {
             let mover = separation::Neighbour {
                 id: 1,

@@ -433,7 +433,7 @@ mod tests {
         };
         let mut seen = Scan { upright_m: (0..3600).map(ray).collect(), ..scan(&pose, 100.0) };
         seen.ranges_m[360] = 8.0;
-        perception.take_in(&seen, &pose, &[]);
+        perception.take_in(&seen, &pose, &[], &[]);
         let clearance_m = |x, y, z| perception.map().clearance(&Vector3::new(x, y, z));
         for y in [-2.5, 0.0, 2.5] {
             assert!(clearance_m(5.0, y, 3.5) < 0.3, "the cable at {y}");

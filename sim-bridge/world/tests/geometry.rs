@@ -185,13 +185,9 @@ fn a_footprint_is_the_outline_on_the_ground() {
 
 #[test]
 fn a_solid_is_as_thick_as_it_is_high_over_one_place() {
-    let turned = |shape, roll: f64| Obstacle {
-        name: String::new(),
-        shape,
-        pose: Isometry3::from_parts(
-            nalgebra::Translation3::new(3.0, 4.0, 5.0),
-            nalgebra::UnitQuaternion::from_euler_angles(roll, 0.0, 0.3),
-        ),
+    let turned = |shape, roll: f64| {
+        let turn = nalgebra::UnitQuaternion::from_euler_angles(roll, 0.0, 0.3);
+        Obstacle::new("", shape, Isometry3::from_parts(nalgebra::Translation3::new(3.0, 4.0, 5.0), turn))
     };
     let quarter = std::f64::consts::FRAC_PI_2;
     let cylinder = Shape::Cylinder { radius: 0.01, half_height: 10.0 };

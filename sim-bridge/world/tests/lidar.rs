@@ -49,11 +49,9 @@ fn the_ray_ahead_is_body_x_and_angles_turn_left() {
 #[test]
 fn an_upright_scanner_sees_a_cable_that_the_level_one_misses_and_counts_from_the_nose_upwards() {
     let across = UnitQuaternion::from_euler_angles(PI / 2.0, 0.0, 0.0);
-    let cable = Obstacle {
-        name: "cable".to_owned(),
-        shape: Shape::Cylinder { radius: 0.012, half_height: 10.0 },
-        pose: Isometry3::from_parts(Translation3::new(8.0, 0.0, 3.0), across),
-    };
+    let shape = Shape::Cylinder { radius: 0.012, half_height: 10.0 };
+    let cable =
+        Obstacle::new("cable", shape, Isometry3::from_parts(Translation3::new(8.0, 0.0, 3.0), across));
     let scene = Scene::new("cable", vec![cable]);
     let model = LidarModel { upright_rays: 3600, ..MODEL };
     let scan = scan(model, &scene, level(0.0, 0.0, 2.0, 0.0), &[]);

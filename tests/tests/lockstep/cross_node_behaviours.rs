@@ -4,10 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use skein_agent::Outcome;
+use skein_bp::Event;
 use skein_dbp::{NodeName, facts::PeerLost};
 use skein_ground::{Order, Who};
 use skein_tests::Lockstep;
-use skein_wire::event::{Declared as _, Enter, Landed, Leave, Takeoff};
+use skein_wire::event::{Declared as _, Enter, Landed, Leave, Passage, Takeoff};
 
 fn seconds(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds)
@@ -183,11 +184,37 @@ fn a_narrow_passage_never_has_two_holders() {
     }
 }
 
-/// Whether two of these passages, each with who is in it, are one: their centres are within 3 m per axis.
-fn share_a_passage(holders: &BTreeMap<NodeName, [f64; 3]>) -> bool {
-    let near = |one: &[f64; 3], other: &[f64; 3]| one.iter().zip(other).all(|(a, b)| (a - b).abs() <= 3.0);
-    let places: Vec<_> = holders.values().collect();
-    (1..places.len()).any(|index| places[..index].iter().any(|place| near(place, places[index])))
+/// A narrow place that a vehicle has entered: metres, and its heading in degrees.
+type Place = [f64; 4];
+
+fn near(one: &Place, other: &Place, near_m: f64) -> bool {
+    (0..2).all(|axis| (one[axis] - other[axis]).abs() <= near_m) && (one[2] - other[2]).abs() <= 2.2
+}
+
+/// Whether two vehicles are in the same place and go against one another, or across.
+fn share_a_passage(holders: &BTreeMap<NodeName, Vec<Place>>) -> bool {
+    let turn = |one: &Place, other: &Place| ((one[3] - other[3] + 540.0).rem_euclid(360.0) - 180.0).abs();
+    let against = |one: &Place, other: &Place| near(one, other, 1.2) && turn(one, other) > 61.0;
+    let all: Vec<_> = holders.values().collect();
+    (1..all.len()).any(|index| {
+        let mine =
+            |place: &Place| all[..index].iter().any(|held| held.iter().any(|other| against(place, other)));
+        all[index].iter().any(mine)
+    })
+}
+
+fn entered(event: &Event) -> Place {
+    let Enter { x, y, z, heading } = Enter::read(event).unwrap();
+    [x, y, z, heading.unwrap()]
+}
+
+fn announced(event: &Event) -> Vec<Place> {
+    let way = Passage::read(event).unwrap().way.unwrap();
+    let place = |text: &str| {
+        let numbers: Vec<f64> = text.split(' ').map(|word| word.parse().unwrap()).collect();
+        Place::try_from(numbers).unwrap()
+    };
+    way.split("; ").map(place).collect()
 }
 
 /// Flies `window` and cuts the network of its first vehicle at `cut`, for `apart`. Nobody may ever share the passage.
@@ -195,7 +222,7 @@ fn share_a_passage(holders: &BTreeMap<NodeName, [f64; 3]>) -> bool {
 fn cut_one_off_at_the_window(seed: u64, cut: Duration, apart: Duration) -> (bool, usize) {
     let mut lockstep = Lockstep::new("window", None, seed);
     let (alone, rest) = (lockstep.nodes[0].clone(), lockstep.nodes[1..].to_vec());
-    let mut holders = BTreeMap::new();
+    let mut holders: BTreeMap<NodeName, Vec<Place>> = BTreeMap::new();
     let (mut had_claim, mut through_meanwhile) = (false, 0);
     while !(lockstep.swarm.is_over() && lockstep.swarm.is_grounded()) {
         let now = lockstep.swarm.now();
@@ -208,8 +235,15 @@ fn cut_one_off_at_the_window(seed: u64, cut: Duration, apart: Duration) -> (bool
         for selection in lockstep.step().selections {
             match selection.event.kind() {
                 Enter::NAME => {
-                    let Enter { x, y, z } = Enter::read(&selection.event).unwrap();
-                    holders.insert(selection.home.clone(), [x, y, z]);
+                    holders.entry(selection.home.clone()).or_default().push(entered(&selection.event));
+                }
+                // What lies behind is let go.
+                Passage::NAME => {
+                    let left = announced(&selection.event);
+                    let is_left = |place: &Place| left.iter().any(|other| near(place, other, 0.9));
+                    if let Some(held) = holders.get_mut(&selection.home) {
+                        held.retain(is_left);
+                    }
                 }
                 Landed::NAME => drop(holders.remove(&selection.home)),
                 Leave::NAME => {
