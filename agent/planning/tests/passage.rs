@@ -21,8 +21,10 @@ fn stretch(map: &ClearanceMap, path: &Path) -> Vec<Piece> {
     narrow_stretch(map, path, 0.0, &PassageConfig::default())
 }
 
+/// Half way between its ends.
 fn middle(stretch: &[Piece]) -> Option<Piece> {
-    stretch.get(stretch.len() / 2).copied()
+    let (first, last) = (stretch.first()?, stretch.last()?);
+    Some(Piece { centre: (first.centre + last.centre) / 2.0, ..*stretch.get(stretch.len() / 2)? })
 }
 
 /// The cylinder's outline at the height of flight.

@@ -387,8 +387,8 @@ fn long_events_do_not_fill_the_memory() {
         node.handle(Duration::ZERO, Message::Occurrence(Occurrence { event: long(seq), ..one }));
     }
     let kept = node.caused_by(&name("uav/2"));
-    assert!((10..20).contains(&kept.entries), "{kept:?}");
-    assert!(kept.entry_bytes < Bound::PendingBytes.stated() + 40_000, "{kept:?}");
+    assert!((10..20).contains(&kept.pending), "{kept:?}");
+    assert!(kept.pending_bytes < Bound::PendingBytes.stated() + 40_000, "{kept:?}");
 }
 
 #[test]

@@ -114,6 +114,7 @@ impl Experiment for RightOfWay {
         for (network, is_slow) in [("as in `window`", false), ("100 ms, 20 % lost", true)] {
             let of_both = runs::in_turn(network, &seeds, |seed| {
                 let mut scenario = Scenario::built_in("window", self.vehicles, *seed)?;
+                both_ways(&mut scenario);
                 if is_slow {
                     (scenario.network.latency_ms, scenario.network.loss) = SLOW;
                 }
@@ -158,6 +159,15 @@ impl Experiment for RightOfWay {
             rows,
         );
         Ok(report)
+    }
+}
+
+/// Every second vehicle flies the other way.
+fn both_ways(scenario: &mut Scenario) {
+    for vehicle in scenario.vehicles.iter_mut().skip(1).step_by(2) {
+        let (start, goal) = (vehicle.start, vehicle.goal());
+        vehicle.start = goal.xy().push(start.z);
+        vehicle.waypoints = vec![start.xy().push(goal.z)];
     }
 }
 
