@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn who_gets_on_begins_anew() {
         assert_eq!(
-            ends_at(|tenths| tenths < 60 || tenths > 80, |tenths| if tenths > 70 { 3.5 } else { 0.0 }),
+            ends_at(|tenths| !(60..=80).contains(&tenths), |tenths| if tenths > 70 { 3.5 } else { 0.0 }),
             Some(181)
         );
     }

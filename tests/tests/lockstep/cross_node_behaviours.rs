@@ -1,6 +1,6 @@
 //! What b-threads of one node do to those of another, judged by how the vehicles move.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use skein_agent::Outcome;
@@ -266,6 +266,7 @@ fn cut_one_off_at_the_window(seed: u64, cut: Duration, apart: Duration) -> (bool
             lockstep.network.heal();
         }
         for selection in lockstep.step().selections {
+            watch(&mut holders, &selection.home, &selection.event);
             match selection.event.kind() {
                 Leave::NAME => {
                     through_meanwhile += usize::from(is_cut && selection.home != alone);

@@ -296,7 +296,7 @@ mod tests {
         let config = EscapeConfig::default();
         let told = trapped_at(|_| Vector3::zeros(), config);
         assert!(told.is_some_and(|tenths| (10..=15).contains(&tenths)), "{told:?}");
-        let swinging = |k: u64| if k % 2 == 0 { Vector3::y() } else { -Vector3::y() } * 0.5;
+        let swinging = |k: u64| if k.is_multiple_of(2) { Vector3::y() } else { -Vector3::y() } * 0.5;
         assert!(trapped_at(swinging, config).is_some(), "swinging to and fro is no way out");
         assert_eq!(trapped_at(|_| Vector3::x() * 0.5, config), None, "it is pulled on");
         let by_the_clock = EscapeConfig { balance: 0.0, ..config };

@@ -41,7 +41,10 @@ const CORNER_NAME: &str = "corner";
 /// Which potential, and which escape.
 type Settings = (PotentialConfig, EscapeConfig);
 
-const VARIANTS: [(&str, fn(Settings) -> Settings); 7] = [
+/// A change of the settings.
+type Change = fn(Settings) -> Settings;
+
+const VARIANTS: [(&str, Change); 7] = [
     (NOBODY, |(potential, escape)| (PotentialConfig { gain: 0.0, ..potential }, escape)),
     ("vehicles repel, as by default", |settings| settings),
     (EVERYTHING, |(potential, escape)| (everything(potential), escape)),
