@@ -35,6 +35,8 @@ const LEAVE_LASTS: Duration = Duration::from_millis(250);
 const ROOM_AHEAD_M: f64 = 1.5;
 /// Places looked at for a refuge, at most: those of a room of 40 m by 40 m.
 const REFUGE_BUDGET: usize = 10_000;
+/// A refuge is reached within this distance, m.
+const REFUGE_REACHED_M: f64 = 0.8;
 /// A refuge is not looked for again before so long.
 const REFUGE_PAUSE: Duration = Duration::from_secs(1);
 
@@ -210,8 +212,8 @@ impl Guidance {
         Some(simplify(map, &path, request.clearance_m))
     }
 
-    /// Goes on with making way: no longer than another needs it, and by another way if this one is blocked or ends where
-    /// the other wants to go by now.
+    /// Goes on with making way: no longer than another needs it, and by another way if this one is blocked, by whoever
+    /// stands in it too, or ends where the other wants to go by now.
     fn keep_aside(
         &mut self,
         now: Duration,
@@ -225,7 +227,9 @@ impl Guidance {
             self.aside = None;
         }
         let Some((following, found_at)) = &self.aside else { return report };
-        let is_blocked = !following.can_be_flown(&motion.position, &self.allowed().region, map);
+        let is_held_up = self.way_of_others.stands(now)
+            && (following.path.end() - motion.position).norm() > REFUGE_REACHED_M;
+        let is_blocked = is_held_up || !following.can_be_flown(&motion.position, &self.allowed().region, map);
         let ends_in_the_way = || {
             let other = self.way_of_others.hindered(neighbours)?;
             let end = following.path.end();

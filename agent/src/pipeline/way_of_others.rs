@@ -70,6 +70,11 @@ impl WayOfOthers {
         neighbours.iter().find(|neighbour| neighbour.node == hindered.who)
     }
 
+    /// Whether the vehicle has stood for long enough that something must hold it up.
+    pub fn stands(&self, now: Duration) -> bool {
+        self.stands.is_some_and(|(since, _)| now.saturating_sub(since) >= STANDS_AFTER)
+    }
+
     /// From how near a way to how far the vehicle is out of it, m.
     pub fn kept_m(&self) -> f64 {
         self.separation_m + CLEAR_M
@@ -98,8 +103,7 @@ impl WayOfOthers {
                 return Some(Report::OutOfTheWay);
             }
         }
-        let (since, _) = self.stands?;
-        if now.saturating_sub(since) < STANDS_AFTER {
+        if !self.stands(now) {
             return None;
         }
         self.done_with.take_if(|(_, at)| now.saturating_sub(*at) > MAKES_WAY_FOR);

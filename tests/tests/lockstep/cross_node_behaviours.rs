@@ -201,6 +201,63 @@ fn through_a_doorway_nobody_flies_against_another_and_all_arrive() {
     }
 }
 
+/// Three blind corridors of 1.5 m that meet, and a vehicle at the end of each of two, which wants to the end of the other.
+const JUNCTION: &str = r#"
+name = "junction"
+cruise_speed_m_s = 1.5
+takeoff_height_m = 1.5
+time_limit_s = 200.0
+
+[bounds]
+min_m = [-8.0, -2.0, -1.0]
+max_m = [8.0, 8.0, 9.0]
+
+[[obstacle]]
+centre_m = [0.0, -1.25, 4.0]
+box_m = [15.0, 1.0, 10.0]
+
+[[obstacle]]
+centre_m = [-4.125, 4.25, 4.0]
+box_m = [6.75, 7.0, 10.0]
+
+[[obstacle]]
+centre_m = [4.125, 4.25, 4.0]
+box_m = [6.75, 7.0, 10.0]
+
+[[obstacle]]
+centre_m = [0.0, 7.25, 4.0]
+box_m = [1.5, 1.0, 10.0]
+
+[[obstacle]]
+centre_m = [-7.25, 0.0, 4.0]
+box_m = [0.5, 1.5, 10.0]
+
+[[obstacle]]
+centre_m = [7.25, 0.0, 4.0]
+box_m = [0.5, 1.5, 10.0]
+
+[[vehicle]]
+start_m = [-6.0, 0.0]
+waypoints_m = [[6.0, 0.0, 1.5]]
+
+[[vehicle]]
+start_m = [6.0, 0.0]
+waypoints_m = [[-6.0, 0.0, 1.5]]
+"#;
+
+#[test]
+fn two_that_meet_at_a_junction_of_blind_corridors_let_one_another_pass() {
+    let mut lockstep = Lockstep::from_text(JUNCTION);
+    while !(lockstep.swarm.is_over() && lockstep.swarm.is_grounded()) {
+        lockstep.step();
+        assert!(lockstep.swarm.now() < seconds(60.0), "they stand before one another");
+    }
+    let outcomes = lockstep.swarm.outcomes().flatten();
+    assert_eq!(outcomes.filter(|outcome| **outcome == Outcome::Complete).count(), 2);
+    let truth = lockstep.swarm.truth();
+    assert_eq!((truth.collisions_obstacle, truth.collisions_vehicle), (0, 0));
+}
+
 /// A narrow place that a vehicle has entered: metres, and its heading in degrees.
 type Place = [f64; 4];
 
@@ -208,15 +265,18 @@ fn near(one: &Place, other: &Place, near_m: f64) -> bool {
     (0..2).all(|axis| (one[axis] - other[axis]).abs() <= near_m) && (one[2] - other[2]).abs() <= 2.2
 }
 
-/// Whether two vehicles are in the same place and go against one another, or across.
+/// Whether two go through one place against one another, or across.
+fn against(one: &Place, other: &Place) -> bool {
+    let turn = ((one[3] - other[3] + 540.0).rem_euclid(360.0) - 180.0).abs();
+    near(one, other, 1.2) && turn > 61.0
+}
+
 fn share_a_passage(holders: &BTreeMap<NodeName, Vec<Place>>) -> bool {
-    let turn = |one: &Place, other: &Place| ((one[3] - other[3] + 540.0).rem_euclid(360.0) - 180.0).abs();
-    let against = |one: &Place, other: &Place| near(one, other, 1.2) && turn(one, other) > 61.0;
     let all: Vec<_> = holders.values().collect();
     (1..all.len()).any(|index| {
-        let mine =
+        let is_shared =
             |place: &Place| all[..index].iter().any(|held| held.iter().any(|other| against(place, other)));
-        all[index].iter().any(mine)
+        all[index].iter().any(is_shared)
     })
 }
 
@@ -237,7 +297,12 @@ fn announced(event: &Event) -> Vec<Place> {
 /// Takes in what a vehicle enters and leaves behind.
 fn watch(holders: &mut BTreeMap<NodeName, Vec<Place>>, home: &NodeName, event: &Event) {
     match event.kind() {
-        Enter::NAME => holders.entry(home.clone()).or_default().push(entered(event)),
+        Enter::NAME => {
+            // Entered another way, it is not flown through the former.
+            let held = holders.entry(home.clone()).or_default();
+            held.retain(|place| !against(place, &entered(event)));
+            held.push(entered(event));
+        }
         Passage::NAME => {
             let left = announced(event);
             let is_left = |place: &Place| left.iter().any(|other| near(place, other, 0.9));

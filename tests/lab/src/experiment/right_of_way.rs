@@ -56,7 +56,10 @@ impl Narrow {
                 let mut others = others.flat_map(|(_, entered)| entered);
                 self.entries += 1;
                 self.shared += usize::from(others.any(|other| go_against(other, &happened.event)));
-                self.inside.entry(happened.home.clone()).or_default().push(happened.event.clone());
+                // Entered another way, it is not flown through the former.
+                let entered = self.inside.entry(happened.home.clone()).or_default();
+                entered.retain(|enter| !go_against(enter, &happened.event));
+                entered.push(happened.event.clone());
             }
             Passage::NAME => {
                 // What lies behind is let go.
@@ -78,7 +81,8 @@ impl Narrow {
 
 /// Whether two entered places are one, flown through different ways.
 fn go_against(one: &Event, other: &Event) -> bool {
-    let off = |axis: &str| (one.real(axis).unwrap_or_default() - other.real(axis).unwrap_or_default()).abs();
+    let off =
+        |field: &str| (one.real(field).unwrap_or_default() - other.real(field).unwrap_or_default()).abs();
     let turned = (off("heading") + 180.0).rem_euclid(360.0) - 180.0;
     off("x").max(off("y")) <= SAME_PLACE_M && off("z") <= SAME_HEIGHT_M && turned.abs() > SAME_WAY_DEG
 }

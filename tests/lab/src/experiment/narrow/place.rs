@@ -14,8 +14,8 @@ pub type Square = [i32; 2];
 const ROOM_M: f64 = 7.0;
 /// Those who stand in a room stand so far from one another at least, m.
 const APART_M: f64 = 2.0;
-/// The height of flight, m.
-const HEIGHT_M: f64 = 2.0;
+/// The height of flight, m: low enough that who takes off between two walls takes neither for a roof.
+const HEIGHT_M: f64 = 1.5;
 
 /// The shapes of places.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -257,7 +257,7 @@ impl Place {
     /// The scenario of all vehicles, or of one of them alone.
     pub fn scenario(&self, only: Option<usize>, network: &str) -> String {
         let mut text = format!(
-            "about = \"{} of {:.1} m\"\ncruise_speed_m_s = 1.5\ntime_limit_s = 900.0\n{network}\n",
+            "about = \"{} of {:.1} m\"\ncruise_speed_m_s = 1.5\ntakeoff_height_m = {HEIGHT_M:?}\ntime_limit_s = 600.0\n{network}\n",
             self.shape.name(),
             self.width_m
         );
