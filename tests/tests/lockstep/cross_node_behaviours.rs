@@ -170,7 +170,8 @@ fn doorway(width_m: f64) -> Lockstep {
         let (x, y) = (if n < 3 { -9.0 } else { 9.0 }, f64::from(n % 3 - 1) * 3.0);
         format!("[[vehicle]]\nstart_m = [{x:.1}, {y:.1}]\nwaypoints_m = [[{:.1}, {y:.1}, 2.0]]\n", -x)
     };
-    let world = "name = \"doorway\"\ncruise_speed_m_s = 1.5\ntime_limit_s = 300.0\n[bounds]\nmin_m = [-14.0, -12.0, -1.0]\nmax_m = [14.0, 12.0, 9.0]\n";
+    let world = "name = \"doorway\"\ncruise_speed_m_s = 1.5\ntime_limit_s = 300.0\n\
+         [bounds]\nmin_m = [-14.0, -12.0, -1.0]\nmax_m = [14.0, 12.0, 9.0]\n";
     Lockstep::from_text(&format!(
         "{world}{}{}{}",
         jamb(1.0),

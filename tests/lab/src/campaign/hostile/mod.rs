@@ -112,7 +112,8 @@ impl Hostile {
         let tick_ms = trials.iter().map(|trial| trial.tick_ms).fold(0.0, f64::max);
         if as_json {
             let failing: Vec<_> = trials.iter().filter(|trial| !trial.violations.is_empty()).collect();
-            let report = json!({ "seeds": trials.len(), "violations": violations, "growth_mb": growth_mb, "tick_ms": tick_ms, "quiet": quiet, "failing_seeds": failing });
+            let report = json!({
+                "seeds": trials.len(), "violations": violations, "growth_mb": growth_mb, "tick_ms": tick_ms, "quiet": quiet, "failing_seeds": failing });
             println!("{report}");
         } else {
             println!(

@@ -257,7 +257,8 @@ impl Place {
     /// The scenario of all vehicles, or of one of them alone.
     pub fn scenario(&self, only: Option<usize>, network: &str) -> String {
         let mut text = format!(
-            "about = \"{} of {:.1} m\"\ncruise_speed_m_s = 1.5\ntakeoff_height_m = {HEIGHT_M:?}\ntime_limit_s = 600.0\n{network}\n",
+            "about = \"{} of {:.1} m\"\ncruise_speed_m_s = 1.5\ntakeoff_height_m = {HEIGHT_M:?}\n\
+             time_limit_s = 600.0\n{network}\n",
             self.shape.name(),
             self.width_m
         );
