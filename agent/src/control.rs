@@ -9,6 +9,7 @@ use skein_bp::Bound;
 use skein_dbp::NodeName;
 use skein_mav::{Companion, CompanionConfig, Landed, MavEvent, SetPoint, Station, Telemetry, Text, axes};
 use skein_planning::map::MapError;
+use skein_wire::event::Right;
 use skein_wire::{Limits, Readiness, Scan, State};
 
 use crate::{
@@ -32,6 +33,7 @@ use crate::{
     },
     positioning::{Estimate, Motion, Positioning, excess_m},
     preflight::{Failsafes, HandlingParameters, Others, Preflight, Situation, degrees},
+    rank::goes_before,
     report::Report,
     scripts::Circumstances,
     watches::Watches,
@@ -486,13 +488,18 @@ impl Control {
         match self.keep_alive(now) {
             KeepAlive::Command => {
                 let around = self.neighbours.around();
-                let armed = around.iter().filter(|neighbour| neighbour.armed);
+                let armed = || around.iter().filter(|neighbour| neighbour.armed);
+                let me = (self.name.as_str(), Right::Inside);
+                let goes_first = |other: &&Neighbour| {
+                    !other.track.cooperative || goes_before((other.node.as_str(), other.right), me)
+                };
                 let surroundings = Surroundings {
                     map: self.perception.map(),
                     sees: self.config.lidar,
                     rays: self.perception.rays(),
                     obstacles: self.perception.obstacles(),
-                    neighbours: &armed.map(|neighbour| neighbour.track).collect::<Vec<_>>(),
+                    neighbours: &armed().map(|neighbour| neighbour.track).collect::<Vec<_>>(),
+                    first: &armed().filter(goes_first).map(|first| first.track).collect::<Vec<_>>(),
                     rank: self.rank(around),
                 };
                 let set_point = self.guidance.steer(now, &motion, &surroundings);

@@ -110,16 +110,20 @@ impl Neighbour {
         separation::distance_kept_m(0.0, &track, &envelope.filter())
     }
 
-    /// Whether it may fly where a vehicle of this envelope would climb from `place`, as far as can be known: one that
-    /// is silent may have come closer meanwhile.
+    /// Whether it may fly where a vehicle of this envelope would climb from `place`, now or before that is up, as far as
+    /// can be known: one that is silent may have come closer meanwhile.
     pub fn may_be_over(&self, place: &Vector3<f64>, envelope: &Envelope) -> bool {
         let unseen_s = match self.track.age_s {
             age_s if !(PERIOD_S..=SURELY_DOWN_S).contains(&age_s) => 0.0,
             age_s => age_s.min(MOST_UNSEEN_S) + CLIMB_S,
         };
-        let offset = self.position().xy() - place.xy();
+        let (offset, velocity) = (self.position().xy() - place.xy(), self.track.velocity.xy());
+        let speed_m_s = velocity.norm();
+        // Straight on, it is nearest when it is abeam.
+        let abeam_s = (-offset.dot(&velocity) / speed_m_s.powi(2).max(1e-6)).clamp(0.0, CLIMB_S);
+        let passes = if speed_m_s < STANDING_M_S { offset } else { offset + velocity * abeam_s };
         let off_m = excess_m(self.track.sigma_m);
-        self.armed && offset.norm() <= envelope.separation_m + off_m + unseen_s * envelope.cruise_m_s
+        self.armed && passes.norm() <= envelope.separation_m + off_m + unseen_s * envelope.cruise_m_s
     }
 }
 
@@ -340,6 +344,26 @@ mod tests {
         let mut large = Neighbours::new(name(1), 1, 200);
         (2..200).for_each(|number| hear(&mut large, ms(1), number));
         assert_eq!(large.at(ms(3)).count(), 198, "members are all heard");
+    }
+
+    #[test]
+    fn one_that_flies_this_way_may_be_over_a_vehicle_before_it_is_up() {
+        let mut one = Neighbours::new(name(1), 1, 4);
+        let mut may_be_over = |place: [f64; 2], east_m_s: f64| {
+            let [x, y] = place;
+            let (position, velocity) = (Vector3::new(x, y, 1.5), Vector3::new(east_m_s, 0.0, 0.0));
+            let now = one.last.values().map(|heard| heard.at).max().unwrap_or_default() + ms(100);
+            one.hear(now, State { time: now, position, velocity, armed: true, ..State::new(name(2)) });
+            one.at(now).next().unwrap().may_be_over(&Vector3::zeros(), &Envelope::default())
+        };
+        assert!(may_be_over([-4.0, 0.0], 1.5));
+        assert!(!may_be_over([-4.0, 0.0], 0.2), "it stands");
+        assert!(
+            !may_be_over([-4.0, 0.0], -1.5)
+                && !may_be_over([-9.0, 0.0], 1.5)
+                && !may_be_over([-4.0, 3.0], 1.5)
+        );
+        assert!(may_be_over([1.0, 0.5], 1.5), "it is");
     }
 
     #[test]

@@ -14,6 +14,9 @@ use crate::me::Me;
 
 /// Two places nearer than this, per horizontal axis, are one for two vehicles, m.
 const NEAR_M: f64 = 1.3;
+/// Whoever stands somewhere keeps others so far away per horizontal axis, m: across, that is the separation, within which
+/// it is in their way.
+const KEPT_M: f64 = 1.0;
 /// The same for heights: vehicles pass over one another beyond it.
 const NEAR_HEIGHT_M: f64 = 2.2;
 /// A place nearer than this, per axis, to one of a stretch is of that stretch, m.
@@ -25,7 +28,11 @@ const STRAIGHT_M: f64 = 2.0 * NEAR_M + 0.5;
 
 /// Narrow places in the order in which they are flown through.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize)]
-pub struct Stretch(Vec<Place>);
+pub struct Stretch {
+    places: Vec<Place>,
+    /// Where the vehicle itself is, if that is narrow.
+    here: Option<Place>,
+}
 
 /// A narrow place. Whole decimetres and degrees tell all that matters, and can be compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -36,33 +43,47 @@ pub struct Place {
 }
 
 impl Stretch {
-    /// The stretch of these pieces.
+    /// The stretch of these pieces; the vehicle is outside.
     pub fn of(pieces: &[Piece]) -> Self {
-        Self(pieces.iter().map(|piece| Place::new(&piece.centre, Some(&piece.direction))).collect())
+        pieces.iter().map(Place::of).collect()
+    }
+
+    /// The same, and the vehicle is in it, there.
+    #[must_use]
+    pub fn from(self, here: Option<&Piece>) -> Self {
+        Self { here: here.map(Place::of), ..self }
+    }
+
+    /// Where the vehicle is, alone.
+    #[must_use]
+    pub fn here(&self) -> Self {
+        Self { places: Vec::new(), here: self.here }
     }
 
     /// The stretch that is announced, if the event is a `passage`.
     pub fn read(event: &Event) -> Option<Self> {
-        let Passage { x, y, z, way } = Passage::read(event)?;
+        let Passage { x, y, z, way, here } = Passage::read(event)?;
         let places =
             way.as_deref().and_then(|way| way.split("; ").map(Place::parse).collect::<Option<Vec<_>>>());
-        Some(Self(places.unwrap_or_else(|| vec![Place::new(&Vector3::new(x, y, z), None)])))
+        let places = places.unwrap_or_else(|| vec![Place::new(&Vector3::new(x, y, z), None)]);
+        Some(Self { places, here: here.as_deref().and_then(Place::parse) })
     }
 
     /// The announcement of the stretch; none of an empty one.
     pub fn passage(&self) -> Option<Passage> {
-        let [x, y, z] = self.0.first()?.at_m();
-        let way = self.0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
-        Some(Passage { x, y, z, way: Some(way.into()) })
+        let [x, y, z] = self.places.first()?.at_m();
+        let way = self.places.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+        let here = self.here.map(|here| here.to_string().into());
+        Some(Passage { x, y, z, way: Some(way.into()), here })
     }
 
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.places.is_empty() && self.here.is_none()
     }
 
     /// The `enter` of its place number `index`, counted from 0.
     pub fn enter(&self, index: usize, me: &Me) -> Option<Event> {
-        self.0.get(index).map(|place| me.event(place.enter()))
+        self.places.get(index).map(|place| me.event(place.enter()))
     }
 
     /// Whether each of its places is of another stretch, and flown through the same way.
@@ -73,42 +94,48 @@ impl Stretch {
     /// The number of its first place, from `index` on, that is none of another stretch or flown through another way.
     pub fn first_outside(&self, other: &Self, index: usize) -> Option<usize> {
         let same = other.same_way(SAME_PLACE_M);
-        let is_inside = |place: &Place| other.0.contains(place) || same.contains(&place.enter().at("uav/0"));
-        self.0.iter().enumerate().skip(index).find(|(_, place)| !is_inside(place)).map(|(index, _)| index)
+        let is_inside =
+            |place: &Place| other.places.contains(place) || same.contains(&place.enter().at("uav/0"));
+        self.places
+            .iter()
+            .enumerate()
+            .skip(index)
+            .find(|(_, place)| !is_inside(place))
+            .map(|(index, _)| index)
     }
 
-    /// Those of its places that are places of another stretch, too, whichever way that is flown through.
+    /// Those of its places that are places of another stretch, too, whichever way that is flown through; the vehicle is
+    /// where that says.
     #[must_use]
     pub fn at(&self, other: &Self) -> Self {
-        let is_there = |place: &&Place| other.0.iter().any(|there| there.is_same(place));
-        Self(self.0.iter().filter(is_there).copied().collect())
+        let is_there = |place: &&Place| other.places.iter().any(|there| there.is_same(place));
+        Self { places: self.places.iter().filter(is_there).copied().collect(), here: other.here }
     }
 
     /// Whether one of its places is entered by this event, whichever way.
     pub fn is_at(&self, enter: &Event) -> bool {
         let Some(Enter { x, y, z, .. }) = Enter::read(enter) else { return false };
         let entered = Place::new(&Vector3::new(x, y, z), None);
-        self.0.iter().any(|place| place.is_same(&entered))
+        self.places.iter().any(|place| place.is_same(&entered))
     }
 
     /// `enter` events, whosever, that go against it, or across.
     pub fn against(&self) -> EventSet {
-        if self.0.is_empty() {
-            return EventSet::None;
-        }
-        let along = self.same_way(NEAR_M);
-        EventSet::any_of(self.boxes().map(|[min, max]| EventSet::region(min, max))).and(along.not())
+        let boxes = EventSet::any_of(self.boxes().map(|[min, max]| EventSet::region(min, max)));
+        let places = boxes.and(self.same_way(NEAR_M).not());
+        let here = self.here.map(|here| here.around(KEPT_M).and(here.same_way(KEPT_M).not()));
+        here.into_iter().fold(places, EventSet::or)
     }
 
     /// `enter` events so near to a place of it, per horizontal axis, m, and flown through the same way.
     fn same_way(&self, near_m: f64) -> EventSet {
-        EventSet::any_of(self.0.iter().map(|place| place.same_way(near_m)))
+        EventSet::any_of(self.places.iter().map(|place| place.same_way(near_m)))
     }
 
     /// Boxes around all its places, as few as its bends allow, m.
     fn boxes(&self) -> impl Iterator<Item = [[f64; 3]; 2]> {
         let mut boxes: Vec<[Vector3<f64>; 2]> = Vec::new();
-        for place in &self.0 {
+        for place in &self.places {
             let at = Vector3::from(place.at_m());
             let margin = Vector3::new(NEAR_M, NEAR_M, NEAR_HEIGHT_M);
             let [min, max] = [at - margin, at + margin];
@@ -122,7 +149,17 @@ impl Stretch {
     }
 }
 
+impl FromIterator<Place> for Stretch {
+    fn from_iter<I: IntoIterator<Item = Place>>(places: I) -> Self {
+        Self { places: places.into_iter().collect(), here: None }
+    }
+}
+
 impl Place {
+    fn of(piece: &Piece) -> Self {
+        Self::new(&piece.centre, Some(&piece.direction))
+    }
+
     fn new(at: &Vector3<f64>, direction: Option<&Vector3<f64>>) -> Self {
         let heading =
             |ahead: &Vector3<f64>| ahead.y.atan2(ahead.x).to_degrees().rem_euclid(360.0).round() as i32 % 360;
@@ -158,15 +195,20 @@ impl Place {
     /// `enter` events so near to this place, m, and flown through the same way.
     fn same_way(&self, near_m: f64) -> EventSet {
         let Some(heading_deg) = self.heading_deg.map(f64::from) else { return EventSet::None };
-        let at = Vector3::from(self.at_m());
-        let margin = Vector3::new(near_m, near_m, NEAR_HEIGHT_M);
         // Headings begin anew at a full turn.
         let alike =
             [-360.0, 0.0, 360.0].map(|turn| heading_deg + turn).into_iter().filter_map(|heading_deg| {
                 let (low, high) = (heading_deg - SAME_WAY_DEG, heading_deg + SAME_WAY_DEG);
                 (high >= 0.0 && low <= 360.0).then(|| EventSet::field_range("heading", low, high))
             });
-        EventSet::region((at - margin).into(), (at + margin).into()).and(EventSet::any_of(alike))
+        self.around(near_m).and(EventSet::any_of(alike))
+    }
+
+    /// `enter` events so near to this place, m.
+    fn around(&self, near_m: f64) -> EventSet {
+        let at = Vector3::from(self.at_m());
+        let margin = Vector3::new(near_m, near_m, NEAR_HEIGHT_M);
+        EventSet::region((at - margin).into(), (at + margin).into())
     }
 }
 
@@ -229,7 +271,8 @@ mod tests {
 
     #[test]
     fn what_is_told_is_what_is_read() {
-        let stretch = stretch([1.25, -3.0], 217.0, 4);
+        let stretch = stretch([1.25, -3.0], 217.0, 4)
+            .from(Some(&Piece { centre: Vector3::new(1.0, -2.9, 0.0), direction: Vector3::x() }));
         let told = stretch.passage().unwrap().at("uav/7");
         assert_eq!(Stretch::read(&told), Some(stretch));
     }
@@ -244,7 +287,7 @@ mod tests {
 
     #[test]
     fn where_no_heading_is_told_everybody_is_kept_out() {
-        let announced = Passage { x: 5.0, y: 0.0, z: 2.0, way: None }.at("uav/7");
+        let announced = Passage { x: 5.0, y: 0.0, z: 2.0, way: None, here: None }.at("uav/7");
         let place = Stretch::read(&announced).unwrap();
         assert!(meets(&place, &stretch([4.0, 0.0], 0.0, 3)) && meets(&place, &place));
     }

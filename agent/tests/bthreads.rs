@@ -764,7 +764,7 @@ mod right_of_way {
     const WAY: &str = "5 0 2 0; 6 0 2 0; 7 0 2 0";
 
     fn announced(way: &str) -> Event {
-        Passage { x: 5.0, y: 0.0, z: 2.0, way: Some(way.into()) }.at(ME)
+        Passage { x: 5.0, y: 0.0, z: 2.0, way: Some(way.into()), here: None }.at(ME)
     }
 
     fn enters(node: &str, x: f64, heading: f64) -> Event {
@@ -800,18 +800,65 @@ mod right_of_way {
         assert!(vehicle.may(Advance::NAME));
     }
 
-    #[test]
-    fn who_is_inside_does_not_give_in_and_who_is_outside_insists_for_a_while_only() {
+    /// An announcement by a vehicle that is there itself.
+    fn announced_from(way: &str, node: &str, here: &str) -> Event {
+        Passage { x: 5.0, y: 0.0, z: 2.0, way: Some(way.into()), here: Some(here.into()) }.at(node)
+    }
+
+    /// A vehicle that has entered three places, of which it claims two more in vain.
+    fn stopped(announcement: Event) -> Vehicle {
         let mut vehicle = inside();
         let claim_of_other = Bid::new().block(EventSet::named(mine(Enter::NAME).name()));
         vehicle.program.put_proxy("uav/9#right_of_way", &claim_of_other);
-        vehicle.hears(announced("7 0 2 0; 8 0 2 0; 9 0 2 0"));
+        vehicle.hears(announcement);
         vehicle.learns(confirmed());
+        vehicle
+    }
+
+    fn keeps_from(vehicle: &Vehicle, x: f64) -> bool {
+        !vehicle.allows(enters(LOWER, x, 180.0))
+    }
+
+    #[test]
+    fn who_is_inside_gives_in_to_others_inside_only() {
+        let way = "7 0 2 0; 8 0 2 0; 9 0 2 0";
+        let mut vehicle = stopped(announced_from(way, ME, "7.2 0 2 0"));
         vehicle.learns(stalled(LOWER));
-        assert!(!vehicle.allows(enters(LOWER, 9.0, 180.0)), "it claims on");
+        vehicle.after(8 * SECOND);
+        assert!(keeps_from(&vehicle, 9.0), "the other is outside");
+        vehicle.hears(announced_from("9 0 2 180", LOWER, "9 0 2 180"));
+        vehicle.learns(stalled(LOWER));
+        vehicle.after(2 * SECOND);
+        assert!(!keeps_from(&vehicle, 9.0) && keeps_from(&vehicle, 7.0), "it is there itself");
+        vehicle.after(2 * SECOND);
+        assert!(keeps_from(&vehicle, 9.0), "it tries again");
+        vehicle.learns(confirmed());
+        vehicle.hears(Leave.at(LOWER));
+        vehicle.learns(stalled(LOWER));
+        vehicle.after(8 * SECOND);
+        assert!(keeps_from(&vehicle, 9.0), "the other has left");
+    }
+
+    #[test]
+    fn who_has_entered_and_stands_outside_lets_all_go() {
+        let mut vehicle = stopped(announced("5 0 2 0; 6 0 2 0; 7 0 2 0; 8 0 2 0; 9 0 2 0"));
+        vehicle.learns(stalled(LOWER));
+        vehicle.after(SECOND);
+        assert!(keeps_from(&vehicle, 5.0), "it may not stand yet");
+        vehicle.after(SECOND);
+        assert!(!keeps_from(&vehicle, 5.0) && !keeps_from(&vehicle, 9.0));
+        assert!(!vehicle.may(Advance::NAME));
+    }
+
+    #[test]
+    fn who_is_outside_insists_for_a_while_only_and_not_at_all_against_who_is_inside() {
         let mut outside = against(HIGHER);
         assert!(keeps_out(&outside));
         outside.after(3 * SECOND);
+        assert!(!keeps_out(&outside));
+        let mut outside = against(HIGHER);
+        outside.hears(announced_from("6 0 2 180", HIGHER, "6 0 2 180"));
+        outside.learns(stalled(HIGHER));
         assert!(!keeps_out(&outside));
     }
 
@@ -819,6 +866,7 @@ mod right_of_way {
     fn way_is_made_for_who_goes_first_and_for_nobody_else() {
         let asks = |of: &str, right| InTheWay { of: of.into(), right }.at(ME);
         let mut vehicle = inside();
+        vehicle.hears(announced_from(WAY, ME, "5 0 2 0"));
         assert_eq!(vehicle.hears(asks(LOWER, Right::Free)), ["in_the_way"], "it is inside");
         assert_eq!(vehicle.hears(asks(HIGHER, Right::Inside)), ["in_the_way"], "the lower number goes first");
         assert_eq!(vehicle.hears(asks(LOWER, Right::Inside)), ["in_the_way", "make_way"]);

@@ -56,6 +56,7 @@ fn second_in(
         rays: perception.rays(),
         obstacles: &[],
         neighbours,
+        first: neighbours,
         rank,
     };
     (0..50).map(|tick| guidance.steer(Duration::from_millis(20 * tick), &motion, &surroundings)).collect()

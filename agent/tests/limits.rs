@@ -83,6 +83,7 @@ impl Flight {
             rays: self.perception.rays(),
             obstacles: &[],
             neighbours: &self.others,
+            first: &self.others,
             rank: 0,
         };
         let set_point = self.guidance.steer(self.now, &self.motion, &surroundings);

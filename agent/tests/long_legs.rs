@@ -101,6 +101,7 @@ impl Flight {
             rays: self.perception.rays(),
             obstacles: self.perception.obstacles(),
             neighbours: &[],
+            first: &[],
             rank: 0,
         };
         let velocity = match self.guidance.steer(self.now, &self.motion, &surroundings) {

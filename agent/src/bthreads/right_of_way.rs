@@ -5,8 +5,8 @@
 //! the stretch (*block, await confirmation, act*). Those who go the same way are not kept out. As the way unfolds the
 //! stretch grows, and is claimed anew; what lies behind is let go. Nothing but this block keeps the others out.
 //!
-//! Two that claim at once block each other; the one with the higher number then gives way. Who waits outside withdraws
-//! its claim now and then, so that whoever is inside gets on with its own.
+//! Two that claim at once block each other; the one with the higher number then gives way. Who waits withdraws its claim
+//! now and then, and all that it has entered but where it is, so that whoever is further in gets on with its own.
 //!
 //! Vehicles may meet inside, where neither could know of the other. Who stands in the way of one that goes before it
 //! makes way: see [`Right`]. If it cannot, it is cornered, and goes first.
@@ -16,7 +16,7 @@
 //! confirmation of those who have lost it. So on a cut network one side at most goes on, and whoever was inside is
 //! waited for. Whoever has just heard another again first lets claims cross, for as long as it takes to repeat them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use serde::Serialize;
@@ -33,8 +33,11 @@ use crate::{me::Me, precedence, rank::goes_before, stretch::Stretch};
 pub const NAME: &str = "right_of_way";
 /// A vehicle that gave way claims again when it hears that another has left a passage, or after this long.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Who waits outside for others to come out claims no longer than this at a time.
+/// Who waits for others claims no longer than this at a time, outside and inside.
 const INSISTS_FOR: Duration = Duration::from_secs(3);
+const INSISTS_INSIDE_FOR: Duration = Duration::from_secs(10);
+/// Who has no leave to move any more stands after this.
+const STOPS_WITHIN: Duration = Duration::from_secs(2);
 /// Claims that were made apart are known to both sides so many leases after they have met again: records are repeated
 /// every tenth of one.
 const MEETING_LEASES: f64 = 1.5;
@@ -45,11 +48,13 @@ pub struct RightOfWay {
     me: Me,
     /// The other vehicles and the ground station.
     others: BTreeMap<String, Other>,
+    /// Those of them that are in a narrow place, by what they said last.
+    inside: BTreeSet<String>,
     /// The time that claims take to cross.
     meeting: Duration,
     /// No claim counts before this.
     met: Duration,
-    /// The stretch that it is in, entered place by place.
+    /// The stretch that it has entered, place by place, or where it is.
     held: Stretch,
     /// The stretch of its way that lies ahead, with that part of it in which it is.
     ahead: Stretch,
@@ -96,13 +101,23 @@ impl RightOfWay {
     pub fn new<'a>(me: Me, others: impl IntoIterator<Item = &'a str>, lease: Duration) -> Self {
         let others = others.into_iter().map(|node| (node.to_owned(), Other::Unheard)).collect();
         let meeting = lease.mul_f64(MEETING_LEASES);
-        let (held, ahead) = (Stretch::default(), Stretch::default());
-        Self { me, others, meeting, met: Duration::ZERO, held, ahead, cornered: false, phase: Phase::Clear }
+        let (held, ahead, inside) = (Stretch::default(), Stretch::default(), BTreeSet::new());
+        Self {
+            me,
+            others,
+            inside,
+            meeting,
+            met: Duration::ZERO,
+            held,
+            ahead,
+            cornered: false,
+            phase: Phase::Clear,
+        }
     }
 
     /// Its right to go first.
     pub fn right(&self) -> Right {
-        match (self.cornered, self.held.is_empty()) {
+        match (self.cornered, self.held.here().is_empty()) {
             (true, _) => Right::Cornered,
             (false, false) => Right::Inside,
             (false, true) => Right::Free,
@@ -126,14 +141,27 @@ impl RightOfWay {
         EventSet::any_of(needed.map(|(node, _)| of::<Enter>(node))).and(against)
     }
 
-    /// Whether the claim is to be withdrawn because another vehicle's is in its way: outside, if that has the lower
-    /// number. Who is inside makes way before it withdraws anything.
-    fn gives_in_to(&self, stalled: &Stalled) -> bool {
+    /// What becomes of its claim on the place with number `next`, which it insists on until then, now that another
+    /// vehicle's is in its way: if that goes before it, who has entered nothing withdraws its claim at once, and who
+    /// has, soon.
+    fn stand_against(&self, stalled: &Stalled, (next, until): (usize, Duration), now: Duration) -> Phase {
         // Facts name a remote b-thread `node#bthread`.
         let node = stalled.by.split('#').next().unwrap_or_default();
-        stalled.event.ends_with(Enter::NAME)
-            && self.held.is_empty()
-            && goes_before((node, self.right()), (self.me.name(), self.right()))
+        let its_right = if self.inside.contains(node) { Right::Inside } else { Right::Free };
+        let gives_in = stalled.event.ends_with(Enter::NAME)
+            && goes_before((node, its_right), (self.me.name(), self.right()));
+        match (gives_in, self.held.is_empty()) {
+            (true, true) => Phase::Yielding { until: now + PATIENCE },
+            (true, false) => Phase::Entering { next, until: until.min(now + STOPS_WITHIN) },
+            (false, _) => Phase::Entering { next, until },
+        }
+    }
+
+    /// Withdraws its claim for a while, and lets go what it has entered but where it is: it stands, and whoever is
+    /// further in may want to come out there.
+    fn give_in(&mut self, now: Duration) -> Phase {
+        self.held = self.ahead.here();
+        Phase::Yielding { until: now + PATIENCE }
     }
 
     /// Takes in that another node is heard or lost.
@@ -180,22 +208,36 @@ impl RightOfWay {
     /// Takes in what lies ahead now.
     fn look_ahead(&mut self, stretch: Stretch, now: Duration) -> Phase {
         self.ahead = stretch;
+        self.held = self.held.at(&self.ahead);
         match &self.phase {
             Phase::Yielding { until } if !self.ahead.is_part_of(&self.held) => {
                 Phase::Yielding { until: *until }
             }
-            // Nothing is told then but where it is.
-            Phase::MakingWay => {
-                self.held = self.held.at(&self.ahead);
-                Phase::MakingWay
-            }
-            Phase::Asked { of } => Phase::Asked { of: of.clone() },
+            phase @ (Phase::MakingWay | Phase::Asked { .. }) => phase.clone(),
             _ => self.go_on(now),
         }
     }
 
+    /// Takes in whether another vehicle is in a narrow place, and tries again at once if one has left.
+    fn hear_other(&mut self, event: &Event, now: Duration) -> Option<Phase> {
+        let (node, verb) =
+            event.name().rsplit_once('/').filter(|(node, _)| self.others.contains_key(*node))?;
+        let is_inside = Stretch::read(event).is_some_and(|stretch| !stretch.here().is_empty());
+        match is_inside {
+            true => self.inside.insert(node.to_owned()),
+            false => self.inside.remove(node),
+        };
+        Some(match self.phase {
+            Phase::Yielding { .. } if verb == Leave::NAME => self.go_on(now),
+            _ => self.phase.clone(),
+        })
+    }
+
     /// What happened to it as a whole: what is ahead, whether it is made way for, whether it is out.
     fn hear(&mut self, event: &Event, now: Duration) -> Option<Phase> {
+        if let Some(phase) = self.hear_other(event, now) {
+            return Some(phase);
+        }
         let me = &self.me;
         if let Some(stretch) = Stretch::read(event).filter(|_| me.heard::<Passage>(event)) {
             return Some(self.look_ahead(stretch, now));
@@ -229,14 +271,9 @@ impl RightOfWay {
 impl BThread for RightOfWay {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
-        let bid = Bid::new().priority(precedence::COLLISION).wait_for(me.any::<(
-            PeerJoined,
-            PeerLost,
-            Passage,
-            InTheWay,
-            Leave,
-            Landed,
-        )>());
+        let bid = Bid::new().priority(precedence::COLLISION);
+        let bid = bid.wait_for(me.any::<(PeerJoined, PeerLost, InTheWay)>());
+        let bid = bid.wait_for(of_every_vehicle::<(Passage, Leave, Landed)>());
         // Whoever comes back meanwhile stays out too.
         let holds = |bid: Bid| bid.block(self.of_everyone(self.held.against()));
         let stands = |bid: Bid| bid.block(me.any::<(Advance, Homeward)>());
@@ -244,13 +281,11 @@ impl BThread for RightOfWay {
             Phase::Clear => holds(bid),
             Phase::Claiming => stands(bid).block(self.claim()).wait_for(me.any::<Confirmed>()),
             Phase::Entering { next, until } => {
-                let bid = stands(bid).block(self.claim()).wait_for(me.any::<(Stalled, BlockLapsed)>());
-                let bid = if self.held.is_empty() { bid.deadline(*until) } else { bid };
+                let facts = me.any::<(Stalled, BlockLapsed)>();
+                let bid = stands(bid).block(self.claim()).wait_for(facts).deadline(*until);
                 self.ahead.enter(*next, me).into_iter().fold(bid, Bid::request)
             }
-            Phase::Yielding { until } => {
-                stands(holds(bid)).wait_for(of_every_vehicle::<Leave>()).deadline(*until)
-            }
+            Phase::Yielding { until } => stands(holds(bid)).deadline(*until),
             Phase::Asked { of } => {
                 let make_way = me.event(MakeWay { of: of.as_str().into() });
                 holds(bid).request(make_way).wait_for(me.any::<OutOfTheWay>())
@@ -268,20 +303,21 @@ impl BThread for RightOfWay {
         let confirmed = Confirmed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
         let lapsed = BlockLapsed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
         self.phase = match (self.phase.clone(), self.me.verb(event)) {
-            (Phase::Claiming, _) if confirmed => self.enter_from(0, now + INSISTS_FOR),
+            (Phase::Claiming, _) if confirmed => {
+                let is_inside = self.right() != Right::Free;
+                self.enter_from(0, now + if is_inside { INSISTS_INSIDE_FOR } else { INSISTS_FOR })
+            }
             (Phase::Entering { next, until }, Some(Enter::NAME)) => self.enter_from(next + 1, until),
             (Phase::Entering { .. }, _) if lapsed => Phase::Claiming,
-            (Phase::Entering { .. }, _)
-                if Stalled::read(event).is_some_and(|stalled| self.gives_in_to(&stalled)) =>
-            {
-                Phase::Yielding { until: now + PATIENCE }
-            }
-            (Phase::Entering { .. }, None) => Phase::Yielding { until: now + PATIENCE },
+            (Phase::Entering { .. }, None) => self.give_in(now),
+            (Phase::Entering { next, until }, _) => match Stalled::read(event) {
+                Some(stalled) => self.stand_against(&stalled, (next, until), now),
+                None => Phase::Entering { next, until },
+            },
             (Phase::Yielding { until }, None) if self.met <= until => {
                 self.met = Duration::ZERO;
                 Phase::Claiming
             }
-            // Time is up, or a vehicle that is not this one has left.
             (Phase::Yielding { .. }, None) => self.go_on(now),
             (phase, _) => phase,
         };

@@ -320,7 +320,12 @@ impl Guidance {
         let aside = self.aside.as_mut().map(|(following, _)| following);
         let following = aside.or(self.course.following.as_mut()).filter(|path| has_leave && !path.is_blocked);
         let attraction = self.progress.attraction();
-        let lead = following.map(|following| Lead { following, attraction });
+        // Who has entered a narrow place is not pushed out of its mouth by those who come after it.
+        let repelled_by = match self.progress.is_at_passage(&motion.position) {
+            true => surroundings.first,
+            false => surroundings.neighbours,
+        };
+        let lead = following.map(|following| Lead { following, attraction, repelled_by });
         let set_point = self.steering.steer(now, motion, lead, &allowed, surroundings);
         self.headroom.keep(set_point, &motion.position)
     }

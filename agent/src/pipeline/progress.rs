@@ -35,6 +35,14 @@ const COVERED_M: f64 = 1.5;
 /// A place of a narrow stretch lies behind once the vehicle is this far from it, m: who has made way for others, who
 /// keep further from it, is in none.
 const PASSAGE_BEHIND_M: f64 = 1.5;
+/// The vehicle is in a narrow stretch if there is no more room where it is, and a place of it is so near, m, and until none
+/// is as near as that. Where it is, is told where it stands, slower than so, m/s, so far from where it was.
+const HERE_M: f64 = 1.0;
+const GONE_M: f64 = 1.3;
+const STANDS_M_S: f64 = 0.3;
+const ELSEWHERE_M: f64 = 0.5;
+/// A vehicle as near to a narrow place as this, m, is not kept from it by those who come after it.
+const AT_PASSAGE_M: f64 = 3.0;
 /// So many places more or less of a stretch are worth a word, or a new one that is as near as that, m.
 const PASSAGE_CHANGES_PIECES: usize = 3;
 const PASSAGE_CHANGES_M: f64 = 5.0;
@@ -79,8 +87,9 @@ pub struct Progress {
     envelope: Envelope,
     berth: Berth,
     passages: PassageConfig,
-    /// The narrow stretch that was announced last.
+    /// The narrow stretch that was announced last, and where the vehicle was then, if in it.
     announced: Vec<Piece>,
+    here: Option<Piece>,
     /// Since when another vehicle is in front of this one in a narrow place.
     queues_since: Option<Duration>,
     escape: EscapeDetector,
@@ -97,6 +106,7 @@ impl Progress {
             berth: Berth::default(),
             passages,
             announced: Vec::new(),
+            here: None,
             queues_since: None,
             escape: EscapeDetector::new(escape),
             minimum: None,
@@ -111,6 +121,7 @@ impl Progress {
     /// The flight is over.
     pub fn forget(&mut self) {
         self.announced.clear();
+        self.here = None;
         self.berth.forget();
         self.minimum = None;
         self.patience.forget();
@@ -153,6 +164,11 @@ impl Progress {
         let moves_at = moves_at.filter(|now| !self.queues(*now, course, motion, map, neighbours));
         reports.extend(self.check_progress(moves_at, course, motion, felt));
         reports
+    }
+
+    /// Whether a narrow stretch is as near as others are felt.
+    pub fn is_at_passage(&self, position: &Vector3<f64>) -> bool {
+        self.announced.iter().any(|piece| (piece.centre - position).norm() < AT_PASSAGE_M)
     }
 
     /// Where whoever comes out of the narrow stretch that the vehicle is at will be, if there is one.
@@ -215,9 +231,9 @@ impl Progress {
         };
         let is_ahead =
             |piece: &Piece| ahead.iter().any(|other| (piece.centre - other.centre).norm() < PIECE_M);
-        let is_here = |piece: &&Piece| (piece.centre - motion.position).xy().norm() < PASSAGE_BEHIND_M;
-        let behind: Vec<_> =
-            self.announced.iter().filter(is_here).filter(|piece| !is_ahead(piece)).copied().collect();
+        let off_m = |piece: &Piece| (piece.centre - motion.position).xy().norm();
+        let is_behind = |piece: &&Piece| off_m(piece) < PASSAGE_BEHIND_M && !is_ahead(piece);
+        let behind: Vec<_> = self.announced.iter().filter(is_behind).copied().collect();
         let pieces = [behind, ahead].concat();
         let (stretch, announced) = (Stretch::of(&pieces), Stretch::of(&self.announced));
         let is_less = self.announced.len() >= pieces.len() + PASSAGE_CHANGES_PIECES;
@@ -225,11 +241,24 @@ impl Progress {
         let new: Vec<&Piece> = pieces.iter().filter(is_new).collect();
         let is_more = new.len() >= PASSAGE_CHANGES_PIECES
             || new.first().is_some_and(|piece| (piece.centre - motion.position).norm() < PASSAGE_CHANGES_M);
-        if !(is_less || is_more || pieces.is_empty() && !self.announced.is_empty()) {
+        let nearest = pieces.iter().min_by(|a, b| off_m(a).total_cmp(&off_m(b)));
+        let near_m = if self.here.is_some() { GONE_M } else { HERE_M };
+        let is_narrow = map.clearance(&motion.position) < self.passages.width_m / 2.0;
+        let here = nearest.filter(|piece| is_narrow && off_m(piece) < near_m);
+        let here = here.map(|piece| Piece { centre: motion.position, ..*piece });
+        let is_elsewhere = match (&self.here, &here) {
+            _ if motion.velocity.norm() > STANDS_M_S => false,
+            (Some(was), Some(is)) => (was.centre - is.centre).norm() > ELSEWHERE_M,
+            (was, is) => was.is_some() != is.is_some(),
+        };
+        if !(is_less || is_more || is_elsewhere || pieces.is_empty() && !self.announced.is_empty()) {
             return None;
         }
-        self.announced = pieces;
-        Some(if stretch.is_empty() { Report::PassageLeft } else { Report::Passage(stretch) })
+        (self.announced, self.here) = (pieces, here);
+        Some(match stretch.is_empty() {
+            true => Report::PassageLeft,
+            false => Report::Passage(stretch.from(here.as_ref())),
+        })
     }
 
     /// Whether the vehicle waits for one in front of it, where there is no room to pass.

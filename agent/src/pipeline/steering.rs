@@ -68,6 +68,8 @@ pub struct Steering {
 pub struct Lead<'a> {
     pub following: &'a mut Following,
     pub attraction: f64,
+    /// Those who push it aside.
+    pub repelled_by: &'a [separation::Neighbour],
 }
 
 impl Steering {
@@ -163,13 +165,15 @@ impl Steering {
         self.movers.clear();
         self.movers.extend(self.moving.moving(now));
         self.forces.pull = Vector3::zeros();
+        let repelled_by = lead.as_ref().map_or(surroundings.neighbours, |lead| lead.repelled_by);
         let wish = match (self.settles_at, lead) {
             (Some(place), _) => self.aside(place, motion),
             (None, Some(lead)) => part_of(self.along_path(lead, motion, allowed, surroundings)),
             (None, None) => part_of(self.keep_station(motion, surroundings.map)),
         };
-        let others: Vec<_> = surroundings.neighbours.iter().chain(&self.movers).copied().collect();
-        let push = repulsion(&motion.position, &wish.velocity, &others, &self.repulsion);
+        let with_movers = |others: &[_]| [others, &self.movers].concat();
+        let others = with_movers(surroundings.neighbours);
+        let push = repulsion(&motion.position, &wish.velocity, &with_movers(repelled_by), &self.repulsion);
         self.forces.net = wish.velocity + push;
         let is_level = (wish.height_m - motion.position.z).abs() < PLANAR_BAND_M;
         let Envelope { cruise_m_s, climb_m_s, .. } = self.envelope;
@@ -211,7 +215,7 @@ impl Steering {
         surroundings: &Surroundings<'_>,
     ) -> Wish {
         let map = surroundings.map;
-        let Lead { following: Following { path, station_m, .. }, attraction } = lead;
+        let Lead { following: Following { path, station_m, .. }, attraction, .. } = lead;
         self.hover_at = None;
         let ahead = path.direction_at(*station_m);
         let [mapped_m, seen_m] = self.free_ahead_m(&motion.position, &ahead, surroundings);

@@ -18,6 +18,8 @@ pub struct Surroundings<'a> {
     pub obstacles: &'a [Vector3<f64>],
     /// The other vehicles in the air.
     pub neighbours: &'a [separation::Neighbour],
+    /// Those of them that go before this vehicle where there is room for one, once it has entered there.
+    pub first: &'a [separation::Neighbour],
     /// How many of them, and of those on the ground, have names that come before this vehicle's.
     pub rank: u32,
 }

@@ -160,7 +160,7 @@ pub(super) fn passage(me: &Me, other: Option<&NodeName>) -> Part {
         ahead = ahead.keeps_offering(Leave.at(other));
     }
     let way = Some("5 0 2 0; 6 0 2 0".into());
-    let passage = Passage { x: 5.0, y: 0.0, z: 2.0, way };
+    let passage = Passage { x: 5.0, y: 0.0, z: 2.0, way, here: None };
     Part::new(vec![Place::new("none").offers(me.event(passage), "ahead"), ahead])
 }
 

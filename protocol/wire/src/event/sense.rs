@@ -64,6 +64,8 @@ skein_bp::events! {
         z: f64 ["m"],
         /// All its places, as `x y z heading` in metres and degrees, with `; ` between two; without it, this one.
         way: Option<Text>,
+        /// Where the vehicle itself is, if that is in it, likewise.
+        here: Option<Text>,
     }
     /// The narrow stretch lies behind.
     Leave = "leave", Own;

@@ -204,6 +204,7 @@ impl<'a> Flight<'a> {
             map: self.perception.map(),
             obstacles: self.perception.obstacles(),
             neighbours: &neighbours,
+            first: &neighbours,
             rank: 0,
         };
         let set_point = self.guidance.steer(now, &self.motion, &surroundings);

@@ -4,7 +4,10 @@
 mod place;
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
 
+use anyhow::Context as _;
 use clap::Args;
 use serde_json::json;
 use skein_agent::bthreads::RIGHT_OF_WAY;
@@ -43,6 +46,9 @@ pub struct Narrow {
     /// The seed of the first mission.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     first_seed: u64,
+    /// A folder for the missions' scenarios, as `skein-sim fly` reads them.
+    #[arg(long, value_name = "DIR")]
+    scenarios: Option<PathBuf>,
 }
 
 /// One mission that was flown.
@@ -111,7 +117,7 @@ impl Experiment for Narrow {
             .iter()
             .zip(&flights)
             .filter(|(_, flight)| flight.is_solvable && !flight.arrived())
-            .map(|(seed, flight)| json!({ "seed": seed, "shape": flight.shape.name(), "why": flight.summary.reason }))
+            .map(|(seed, flight)| json!({ "seed": seed, "shape": flight.shape.name(), "why": flight.summary.reason, "longest_wait_s": flight.wait_s }))
             .collect();
         report.number("not_arrived", failed);
         report.goal(
@@ -165,8 +171,14 @@ impl Narrow {
                 latency_ms.unwrap_or(20.0)
             ),
         };
-        let name = format!("{}-{seed}.toml", place.shape.name());
-        Ok(Scenario::from_toml(&place.scenario(only, &network), &name, None, seed)?)
+        let name = format!("{}-{seed}.toml", place.shape.name().replace(' ', "-"));
+        let text = place.scenario(only, &network);
+        if let Some(folder) = self.scenarios.as_ref().filter(|_| only.is_none()) {
+            let file = folder.join(&name);
+            let written = fs::create_dir_all(folder).and_then(|()| fs::write(&file, &text));
+            written.with_context(|| format!("{} cannot be written", file.display()))?;
+        }
+        Ok(Scenario::from_toml(&text, &name, None, seed)?)
     }
 }
 
