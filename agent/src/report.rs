@@ -77,6 +77,8 @@ pub enum Report {
     PlaceTaken {
         leg: i64,
         by: NodeName,
+        /// Whether that is on its way elsewhere.
+        leaves: bool,
     },
     /// Nobody does any more.
     PlaceFree,
@@ -125,7 +127,9 @@ impl Report {
             Self::Planned { leg, length_m } => me.event(Planned { leg, length_m }),
             Self::Unplannable { leg, why } => me.event(Unplannable { leg, why: why.into() }),
             Self::Arrived { leg } => me.event(Arrived { leg }),
-            Self::PlaceTaken { leg, by } => me.event(PlaceTaken { leg, by: by.as_str().into() }),
+            Self::PlaceTaken { leg, by, leaves } => {
+                me.event(PlaceTaken { leg, by: by.as_str().into(), leaves })
+            }
             Self::PlaceFree => me.event(PlaceFree),
             Self::PathBlocked => me.event(PathBlocked),
             Self::Stuck => me.event(Stuck),

@@ -23,6 +23,8 @@ const NEAR_HEIGHT_M: f64 = 2.2;
 const SAME_PLACE_M: f64 = 0.9;
 /// Headings that differ by less are the same way, degrees.
 const SAME_WAY_DEG: f64 = 60.0;
+/// Headings that differ by less are straight on, degrees.
+const STRAIGHT_DEG: f64 = 20.0;
 /// Boxes around places become one box if that is no wider than this across, m.
 const STRAIGHT_M: f64 = 2.0 * NEAR_M + 0.5;
 
@@ -81,6 +83,11 @@ impl Stretch {
         self.places.is_empty() && self.here.is_none()
     }
 
+    /// Whether it is more than where the vehicle is.
+    pub fn is_entered(&self) -> bool {
+        !self.places.is_empty()
+    }
+
     /// The `enter` of its place number `index`, counted from 0.
     pub fn enter(&self, index: usize, me: &Me) -> Option<Event> {
         self.places.get(index).map(|place| me.event(place.enter()))
@@ -127,9 +134,16 @@ impl Stretch {
         here.into_iter().fold(places, EventSet::or)
     }
 
-    /// `enter` events so near to a place of it, per horizontal axis, m, and flown through the same way.
+    /// `enter` events so near to a place of it, per horizontal axis, m, and flown through the same way; in a bend, as the
+    /// stretch goes before or behind it.
     fn same_way(&self, near_m: f64) -> EventSet {
-        EventSet::any_of(self.places.iter().map(|place| place.same_way(near_m)))
+        let along = |index: usize, place: &Place| {
+            let neighbours = self.places.iter().take(index + 2).skip(index.saturating_sub(1));
+            let bends = neighbours.filter(|other| place.bends_to(other));
+            let bent = bends.map(|other| Place { heading_deg: other.heading_deg, ..*place });
+            EventSet::any_of([*place].into_iter().chain(bent).map(|place| place.same_way(near_m)))
+        };
+        EventSet::any_of(self.places.iter().enumerate().map(|(index, place)| along(index, place)))
     }
 
     /// Boxes around all its places, as few as its bends allow, m.
@@ -190,6 +204,13 @@ impl Place {
     fn enter(&self) -> Enter {
         let [x, y, z] = self.at_m();
         Enter { x, y, z, heading: self.heading_deg.map(f64::from) }
+    }
+
+    /// Whether the way to another place, the one before it or behind it, is no more straight on.
+    fn bends_to(&self, other: &Self) -> bool {
+        let [Some(here), Some(there)] = [self.heading_deg, other.heading_deg] else { return false };
+        let turn_deg = (here - there + 180).rem_euclid(360) - 180;
+        f64::from(turn_deg.abs()) > STRAIGHT_DEG
     }
 
     /// `enter` events so near to this place, m, and flown through the same way.
@@ -264,6 +285,10 @@ mod tests {
             Stretch::of(&pieces)
         };
         assert!(!meets(&bend(0.0), &bend(0.3)));
+        let mut wide = straight([0.0, 0.0], 0.0, 7);
+        wide.extend(straight([6.4, 0.7], 80.0, 3));
+        assert!(!meets(&bend(0.0), &Stretch::of(&wide)), "who takes it wide");
+        assert!(meets(&bend(0.0), &stretch([2.5, -4.0], 90.0, 10)), "who crosses before it");
         let mut back = straight([5.5, 6.0], 270.0, 6);
         back.extend(straight([4.5, 0.0], 180.0, 5));
         assert!(meets(&bend(0.0), &Stretch::of(&back)));

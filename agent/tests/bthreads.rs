@@ -373,7 +373,7 @@ mod await_place {
     use super::*;
 
     fn taken(leg: i64) -> Event {
-        PlaceTaken { leg, by: "uav/4".into() }.at(ME)
+        PlaceTaken { leg, by: "uav/4".into(), leaves: false }.at(ME)
     }
 
     #[test]
@@ -402,6 +402,17 @@ mod await_place {
         vehicle.reports(Planned::NAME);
         vehicle.hears(taken(1));
         assert_eq!(vehicle.after(19 * SECOND), NOTHING, "for each waypoint anew");
+    }
+
+    #[test]
+    fn who_is_on_its_way_elsewhere_is_waited_for_longer() {
+        let leaves = || PlaceTaken { leg: 0, by: "uav/4".into(), leaves: true }.at(ME);
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.hears(leaves());
+        assert_eq!(vehicle.after(89 * SECOND), NOTHING);
+        vehicle.hears(taken(0));
+        assert_eq!(vehicle.after(19 * SECOND), NOTHING, "it has landed there after all");
+        assert_eq!(vehicle.after(SECOND), ["land: uav/4 stays where it was to land"]);
     }
 
     #[test]

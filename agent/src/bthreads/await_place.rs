@@ -9,39 +9,46 @@ use skein_wire::event::{Advance, Arrived, Declared as _, Goto, Land, Landed, Pla
 
 use crate::{me::Me, precedence};
 
-/// How long a vehicle waits in all on the way to one waypoint.
+/// How long a vehicle waits in all on the way to one waypoint, for one that stays.
 pub const PATIENCE: Duration = Duration::from_secs(20);
+/// The same, for one that is on its way elsewhere: it may wait for others itself.
+pub const LONG_PATIENCE: Duration = Duration::from_secs(90);
 
 /// Blocks `advance` while another vehicle has the place of the mission's leg; requests `land` once it has
-/// waited for [`PATIENCE`]. The way home is not waited on, nor is an operator's point: those end near the
+/// waited for [`PATIENCE`] or [`LONG_PATIENCE`]. The way home is not waited on, nor is an operator's point: those end near the
 /// place.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct AwaitPlace {
     me: Me,
-    /// What is left of the patience.
+    /// What is left of the patience with who stays.
     left: Duration,
+    /// The same with who is on its way.
+    left_with_leaving: Duration,
     phase: Phase,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 enum Phase {
     Free,
-    Waiting { by: String, since: Duration },
+    Waiting { by: String, since: Duration, leaves: bool },
     GivingUp { by: String },
 }
 
 impl AwaitPlace {
     pub fn new(me: Me) -> Self {
-        Self { me, left: PATIENCE, phase: Phase::Free }
+        Self { me, left: PATIENCE, left_with_leaving: LONG_PATIENCE, phase: Phase::Free }
+    }
+
+    /// What is left of the patience with one that stays or leaves.
+    fn left(&mut self, leaves: bool) -> &mut Duration {
+        if leaves { &mut self.left_with_leaving } else { &mut self.left }
     }
 
     fn waits_for(&self, event: &Event, now: Duration) -> Phase {
-        match (PlaceTaken::read(event), &self.phase) {
-            (Some(taken), Phase::Waiting { since, .. }) => {
-                Phase::Waiting { by: taken.by.to_string(), since: *since }
-            }
-            (Some(taken), _) if taken.leg >= 0 => Phase::Waiting { by: taken.by.to_string(), since: now },
-            _ => Phase::Free,
+        let Some(PlaceTaken { leg, by, leaves }) = PlaceTaken::read(event) else { return Phase::Free };
+        match self.phase {
+            Phase::Free | Phase::GivingUp { .. } if leg < 0 => Phase::Free,
+            _ => Phase::Waiting { by: by.to_string(), since: now, leaves },
         }
     }
 }
@@ -53,11 +60,11 @@ impl BThread for AwaitPlace {
         let over = me.any::<(Goto, Arrived, Land, Landed)>();
         Some(match &self.phase {
             Phase::Free => bid.wait_for(me.any::<(PlaceTaken, Goto)>()),
-            Phase::Waiting { since, .. } => bid
+            Phase::Waiting { since, leaves, .. } => bid
                 .block(me.any::<Advance>())
                 .wait_for(me.any::<(PlaceTaken, PlaceFree)>())
                 .wait_for(over)
-                .deadline(*since + self.left),
+                .deadline(*since + if *leaves { self.left_with_leaving } else { self.left }),
             Phase::GivingUp { by } => {
                 let why = format!("{by} stays where it was to land");
                 bid.request(me.event(Land { why: why.as_str().into() })).wait_for(over)
@@ -72,10 +79,11 @@ impl BThread for AwaitPlace {
             (_, Some(PlaceTaken::NAME)) => self.waits_for(event, cx.now()),
             _ => Phase::Free,
         };
-        match (&self.phase, verb) {
-            (_, Some(Goto::NAME)) => self.left = PATIENCE,
-            (Phase::Waiting { since, .. }, Some(PlaceFree::NAME)) => {
-                self.left = self.left.saturating_sub(cx.now().saturating_sub(*since));
+        match (self.phase.clone(), verb) {
+            (_, Some(Goto::NAME)) => (self.left, self.left_with_leaving) = (PATIENCE, LONG_PATIENCE),
+            (Phase::Waiting { since, leaves, .. }, Some(PlaceFree::NAME | PlaceTaken::NAME)) => {
+                let left = self.left(leaves);
+                *left = left.saturating_sub(cx.now().saturating_sub(since));
             }
             _ => {}
         }

@@ -16,7 +16,7 @@
 //! confirmation of those who have lost it. So on a cut network one side at most goes on, and whoever was inside is
 //! waited for. Whoever has just heard another again first lets claims cross, for as long as it takes to repeat them.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -48,8 +48,8 @@ pub struct RightOfWay {
     me: Me,
     /// The other vehicles and the ground station.
     others: BTreeMap<String, Other>,
-    /// Those of them that are in a narrow place, by what they said last.
-    inside: BTreeSet<String>,
+    /// The rights of those of them that are in a narrow place, by what they said last.
+    inside: BTreeMap<String, Right>,
     /// The time that claims take to cross.
     meeting: Duration,
     /// No claim counts before this.
@@ -101,7 +101,7 @@ impl RightOfWay {
     pub fn new<'a>(me: Me, others: impl IntoIterator<Item = &'a str>, lease: Duration) -> Self {
         let others = others.into_iter().map(|node| (node.to_owned(), Other::Unheard)).collect();
         let meeting = lease.mul_f64(MEETING_LEASES);
-        let (held, ahead, inside) = (Stretch::default(), Stretch::default(), BTreeSet::new());
+        let (held, ahead, inside) = (Stretch::default(), Stretch::default(), BTreeMap::new());
         Self {
             me,
             others,
@@ -143,16 +143,16 @@ impl RightOfWay {
 
     /// What becomes of its claim on the place with number `next`, which it insists on until then, now that another
     /// vehicle's is in its way: if that goes before it, who has entered nothing withdraws its claim at once, and who
-    /// has, soon.
+    /// has, when it stands.
     fn stand_against(&self, stalled: &Stalled, (next, until): (usize, Duration), now: Duration) -> Phase {
         // Facts name a remote b-thread `node#bthread`.
         let node = stalled.by.split('#').next().unwrap_or_default();
-        let its_right = if self.inside.contains(node) { Right::Inside } else { Right::Free };
+        let its_right = self.inside.get(node).copied().unwrap_or(Right::Free);
         let gives_in = stalled.event.ends_with(Enter::NAME)
             && goes_before((node, its_right), (self.me.name(), self.right()));
-        match (gives_in, self.held.is_empty()) {
-            (true, true) => Phase::Yielding { until: now + PATIENCE },
-            (true, false) => Phase::Entering { next, until: until.min(now + STOPS_WITHIN) },
+        match (gives_in, self.held.is_entered()) {
+            (true, false) => Phase::Yielding { until: now + PATIENCE },
+            (true, true) => Phase::Entering { next, until: until.min(now + STOPS_WITHIN) },
             (false, _) => Phase::Entering { next, until },
         }
     }
@@ -218,15 +218,17 @@ impl RightOfWay {
         }
     }
 
-    /// Takes in whether another vehicle is in a narrow place, and tries again at once if one has left.
+    /// Takes in what right another vehicle has, and tries again at once if one has left.
     fn hear_other(&mut self, event: &Event, now: Duration) -> Option<Phase> {
         let (node, verb) =
             event.name().rsplit_once('/').filter(|(node, _)| self.others.contains_key(*node))?;
         let is_inside = Stretch::read(event).is_some_and(|stretch| !stretch.here().is_empty());
-        match is_inside {
-            true => self.inside.insert(node.to_owned()),
-            false => self.inside.remove(node),
-        };
+        match (verb, self.inside.get(node)) {
+            (Cornered::NAME, _) => drop(self.inside.insert(node.to_owned(), Right::Cornered)),
+            (Passage::NAME, Some(Right::Cornered)) => {}
+            (Passage::NAME, _) if is_inside => drop(self.inside.insert(node.to_owned(), Right::Inside)),
+            _ => drop(self.inside.remove(node)),
+        }
         Some(match self.phase {
             Phase::Yielding { .. } if verb == Leave::NAME => self.go_on(now),
             _ => self.phase.clone(),
@@ -273,7 +275,7 @@ impl BThread for RightOfWay {
         let me = &self.me;
         let bid = Bid::new().priority(precedence::COLLISION);
         let bid = bid.wait_for(me.any::<(PeerJoined, PeerLost, InTheWay)>());
-        let bid = bid.wait_for(of_every_vehicle::<(Passage, Leave, Landed)>());
+        let bid = bid.wait_for(of_every_vehicle::<(Passage, Cornered, Leave, Landed)>());
         // Whoever comes back meanwhile stays out too.
         let holds = |bid: Bid| bid.block(self.of_everyone(self.held.against()));
         let stands = |bid: Bid| bid.block(me.any::<(Advance, Homeward)>());

@@ -21,6 +21,8 @@ const LOOKS_M: f64 = 1.0;
 pub struct Berth {
     /// Who stands there, and since when.
     standing: Option<(NodeName, Duration)>,
+    /// Whether the one that has the place was said to be on its way elsewhere.
+    leaves: bool,
 }
 
 impl Berth {
@@ -51,11 +53,13 @@ impl Berth {
         let leads_away = |goal: Vector3<f64>| (goal - other.position()).xy().norm() > other.kept_m(envelope);
         let is_on_its_way = other.track.cooperative && other.armed && other.goal.is_some_and(leads_away);
         let stays = now.saturating_sub(since) >= if is_on_its_way { HELD_AFTER } else { STAYS_AFTER };
-        if !stays || course.taken_by.as_ref() == Some(&other.node) {
+        let is_known = course.taken_by.as_ref() == Some(&other.node) && self.leaves == is_on_its_way;
+        if !stays || is_known {
             return None;
         }
+        self.leaves = is_on_its_way;
         course.taken_by = Some(other.node.clone());
-        Some(Report::PlaceTaken { leg: waypoint.leg, by: other.node.clone() })
+        Some(Report::PlaceTaken { leg: waypoint.leg, by: other.node.clone(), leaves: is_on_its_way })
     }
 }
 
@@ -125,7 +129,7 @@ mod tests {
             let report = berth.look(now, &mut course, &position, &envelope, std::slice::from_ref(other));
             assert!(
                 report.is_none()
-                    || matches!(&report, Some(Report::PlaceTaken { leg: 0, by }) if *by == other.node)
+                    || matches!(&report, Some(Report::PlaceTaken { leg: 0, by, .. }) if *by == other.node)
             );
             report.is_some()
         })
@@ -166,6 +170,8 @@ mod tests {
         assert_eq!(look(0, &there), None);
         assert!(matches!(look(3, &there), Some(Report::PlaceTaken { .. })));
         assert_eq!(look(4, &there), None, "it is told once");
-        assert_eq!([look(5, &[]), look(6, &[])], [Some(Report::PlaceFree), None]);
+        let leaves = [other(GOAL, Some(Vector3::new(-20.0, 0.0, 3.0)))];
+        assert!(matches!(look(14, &leaves), Some(Report::PlaceTaken { leaves: true, .. })), "it is to go on");
+        assert_eq!([look(15, &[]), look(16, &[])], [Some(Report::PlaceFree), None]);
     }
 }

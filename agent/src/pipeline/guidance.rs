@@ -317,6 +317,7 @@ impl Guidance {
     pub fn steer(&mut self, now: Duration, motion: &Motion, surroundings: &Surroundings<'_>) -> SetPoint {
         let (has_leave, allowed) = (self.has_leave(now), self.allowed());
         // Until there is a new path, a blocked one is not flown.
+        let makes_way = self.aside.is_some();
         let aside = self.aside.as_mut().map(|(following, _)| following);
         let following = aside.or(self.course.following.as_mut()).filter(|path| has_leave && !path.is_blocked);
         let attraction = self.progress.attraction();
@@ -325,7 +326,12 @@ impl Guidance {
             true => surroundings.first,
             false => surroundings.neighbours,
         };
-        let lead = following.map(|following| Lead { following, attraction, repelled_by });
+        let end = match (&following, self.course.waypoint) {
+            (Some(following), _) if makes_way => Some(following.path.end()),
+            (_, waypoint) => waypoint.map(|waypoint| waypoint.target),
+        };
+        let to_go_m = end.map_or(f64::INFINITY, |end| (end - motion.position).norm());
+        let lead = following.map(|following| Lead { following, attraction, repelled_by, to_go_m });
         let set_point = self.steering.steer(now, motion, lead, &allowed, surroundings);
         self.headroom.keep(set_point, &motion.position)
     }

@@ -211,8 +211,11 @@ impl Progress {
         course.has_arrived = true;
         let leg = waypoint.leg;
         let is_beside = leg == OPERATOR_LEG && offset.xy().norm() > PASSING_M;
-        let beside =
-            holder.filter(|_| is_beside).map(|other| Report::PlaceTaken { leg, by: other.node.clone() });
+        let beside = holder.filter(|_| is_beside).map(|other| Report::PlaceTaken {
+            leg,
+            by: other.node.clone(),
+            leaves: false,
+        });
         beside.into_iter().chain([Report::Arrived { leg }]).collect()
     }
 

@@ -63,6 +63,9 @@ pub struct Steering {
     pub settles_at: Option<Vector3<f64>>,
 }
 
+/// Nearer to where a vehicle wants to be than this, m, others push it less, so that it gets there (Ge and Cui 2000).
+const NEAR_END_M: f64 = 1.5;
+
 /// A path that may be followed now, and the share of its attraction that is left.
 #[derive(Debug)]
 pub struct Lead<'a> {
@@ -70,6 +73,8 @@ pub struct Lead<'a> {
     pub attraction: f64,
     /// Those who push it aside.
     pub repelled_by: &'a [separation::Neighbour],
+    /// From the vehicle to where it wants to be in the end, m.
+    pub to_go_m: f64,
 }
 
 impl Steering {
@@ -166,6 +171,11 @@ impl Steering {
         self.movers.extend(self.moving.moving(now));
         self.forces.pull = Vector3::zeros();
         let repelled_by = lead.as_ref().map_or(surroundings.neighbours, |lead| lead.repelled_by);
+        let to_go_m = match (self.settles_at, &lead) {
+            (Some(place), _) => (place - motion.position).norm(),
+            (None, Some(lead)) => lead.to_go_m,
+            (None, None) => f64::INFINITY,
+        };
         let wish = match (self.settles_at, lead) {
             (Some(place), _) => self.aside(place, motion),
             (None, Some(lead)) => part_of(self.along_path(lead, motion, allowed, surroundings)),
@@ -174,6 +184,7 @@ impl Steering {
         let with_movers = |others: &[_]| [others, &self.movers].concat();
         let others = with_movers(surroundings.neighbours);
         let push = repulsion(&motion.position, &wish.velocity, &with_movers(repelled_by), &self.repulsion);
+        let push = push * (to_go_m / NEAR_END_M).min(1.0);
         self.forces.net = wish.velocity + push;
         let is_level = (wish.height_m - motion.position.z).abs() < PLANAR_BAND_M;
         let Envelope { cruise_m_s, climb_m_s, .. } = self.envelope;

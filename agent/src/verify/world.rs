@@ -123,8 +123,8 @@ pub(super) fn guidance(me: &Me, legs: &[i64], hard: bool) -> Part {
                 .keeps_offering(me.event(Stuck))
                 .keeps_offering(planned);
             let taken = format!("beside who has {leg}");
-            let by = || me.event(PlaceTaken { leg: *leg, by: "uav/2".into() });
-            places.push(follows.offers(by(), taken.as_str()));
+            let by = |leaves| me.event(PlaceTaken { leg: *leg, by: "uav/2".into(), leaves });
+            places.push(follows.offers(by(false), taken.as_str()).offers(by(true), taken.as_str()));
             places.push(arrives(place(&taken)).offers(me.event(PlaceFree), following.as_str()));
             places.push(arrives(place(&blocked)).keeps_offering(me.event(Stuck)));
         } else {

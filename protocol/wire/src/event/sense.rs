@@ -54,6 +54,8 @@ skein_bp::events! {
         leg: i64,
         /// Which one.
         by: Text,
+        /// Whether that is on its way elsewhere.
+        leaves: bool,
     }
     /// Nobody else stays any more where the way ends.
     PlaceFree = "place_free", Own;
