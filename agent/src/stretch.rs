@@ -23,8 +23,8 @@ const NEAR_HEIGHT_M: f64 = 2.2;
 const SAME_PLACE_M: f64 = 0.9;
 /// Headings that differ by less are the same way, degrees.
 const SAME_WAY_DEG: f64 = 60.0;
-/// Headings that differ by less are straight on, degrees.
-const STRAIGHT_DEG: f64 = 20.0;
+/// Headings that differ by so much are those of a bend, degrees; less is straight on, and more is back.
+const BEND_DEG: std::ops::Range<f64> = 20.0..120.0;
 /// Boxes around places become one box if that is no wider than this across, m.
 const STRAIGHT_M: f64 = 2.0 * NEAR_M + 0.5;
 
@@ -81,6 +81,13 @@ impl Stretch {
 
     pub fn is_empty(&self) -> bool {
         self.places.is_empty() && self.here.is_none()
+    }
+
+    /// With the first so many places of another stretch.
+    #[must_use]
+    pub fn and_first(&self, places: usize, other: &Self) -> Self {
+        let more = other.places.iter().take(places).filter(|place| !self.places.contains(place));
+        Self { places: self.places.iter().chain(more).copied().collect(), here: self.here }
     }
 
     /// Whether it is more than where the vehicle is.
@@ -206,11 +213,11 @@ impl Place {
         Enter { x, y, z, heading: self.heading_deg.map(f64::from) }
     }
 
-    /// Whether the way to another place, the one before it or behind it, is no more straight on.
+    /// Whether the way bends to another place, the one before it or behind it.
     fn bends_to(&self, other: &Self) -> bool {
         let [Some(here), Some(there)] = [self.heading_deg, other.heading_deg] else { return false };
         let turn_deg = (here - there + 180).rem_euclid(360) - 180;
-        f64::from(turn_deg.abs()) > STRAIGHT_DEG
+        BEND_DEG.contains(&f64::from(turn_deg.abs()))
     }
 
     /// `enter` events so near to this place, m, and flown through the same way.
@@ -292,6 +299,14 @@ mod tests {
         let mut back = straight([5.5, 6.0], 270.0, 6);
         back.extend(straight([4.5, 0.0], 180.0, 5));
         assert!(meets(&bend(0.0), &Stretch::of(&back)));
+    }
+
+    #[test]
+    fn who_turns_back_keeps_others_out_both_ways() {
+        let mut there_and_back = straight([0.0, 0.0], 180.0, 3);
+        there_and_back.extend(straight([-2.0, 0.5], 0.0, 3));
+        let there_and_back = Stretch::of(&there_and_back);
+        assert!(meets(&there_and_back, &stretch([1.0, -1.0], 0.0, 1)));
     }
 
     #[test]

@@ -23,8 +23,8 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::facts::{BlockLapsed, Confirmed, PeerJoined, PeerLost, Stalled};
 use skein_wire::event::{
-    Advance, Cornered, Declared as _, Enter, Homeward, InTheWay, Landed, Leave, MakeWay, OutOfTheWay,
-    Passage, Right, of, of_every_vehicle,
+    Advance, Cornered, Declared as _, Enter, GiveWay, Homeward, InTheWay, Landed, Leave, MakeWay,
+    OutOfTheWay, Passage, Right, of, of_every_vehicle,
 };
 
 use crate::{me::Me, precedence, rank::goes_before, stretch::Stretch};
@@ -85,6 +85,8 @@ enum Phase {
         next: usize,
         until: Duration,
     },
+    /// It stands, and lets go what it has entered, but where it is.
+    GivingWay,
     Yielding {
         until: Duration,
     },
@@ -144,24 +146,30 @@ impl RightOfWay {
     /// What becomes of its claim on the place with number `next`, which it insists on until then, now that another
     /// vehicle's is in its way: if that goes before it, who has entered nothing withdraws its claim at once, and who
     /// has, when it stands.
-    fn stand_against(&self, stalled: &Stalled, (next, until): (usize, Duration), now: Duration) -> Phase {
+    fn stand_against(&mut self, stalled: &Stalled, (next, until): (usize, Duration), now: Duration) -> Phase {
         // Facts name a remote b-thread `node#bthread`.
         let node = stalled.by.split('#').next().unwrap_or_default();
         let its_right = self.inside.get(node).copied().unwrap_or(Right::Free);
         let gives_in = stalled.event.ends_with(Enter::NAME)
             && goes_before((node, its_right), (self.me.name(), self.right()));
         match (gives_in, self.held.is_entered()) {
-            (true, false) => Phase::Yielding { until: now + PATIENCE },
+            (true, false) => self.give_in(now),
             (true, true) => Phase::Entering { next, until: until.min(now + STOPS_WITHIN) },
             (false, _) => Phase::Entering { next, until },
         }
     }
 
-    /// Withdraws its claim for a while, and lets go what it has entered but where it is: it stands, and whoever is
-    /// further in may want to come out there.
+    /// What it has entered of a stretch is its own, though it does not go on entering it now.
+    fn keep_entered(&mut self) {
+        if let Phase::Entering { next, .. } = self.phase {
+            self.held = self.held.and_first(next, &self.ahead);
+        }
+    }
+
+    /// Withdraws its claim for a while, with all that it has entered.
     fn give_in(&mut self, now: Duration) -> Phase {
-        self.held = self.ahead.here();
-        Phase::Yielding { until: now + PATIENCE }
+        self.keep_entered();
+        if self.held.is_entered() { Phase::GivingWay } else { Phase::Yielding { until: now + PATIENCE } }
     }
 
     /// Takes in that another node is heard or lost.
@@ -207,6 +215,7 @@ impl RightOfWay {
 
     /// Takes in what lies ahead now.
     fn look_ahead(&mut self, stretch: Stretch, now: Duration) -> Phase {
+        self.keep_entered();
         self.ahead = stretch;
         self.held = self.held.at(&self.ahead);
         match &self.phase {
@@ -245,8 +254,11 @@ impl RightOfWay {
             return Some(self.look_ahead(stretch, now));
         }
         if let Some(InTheWay { of, right }) = me.read(event) {
-            let goes_first = goes_before((&of, right), (me.name(), self.right()));
-            return goes_first.then(|| Phase::Asked { of: of.to_string() });
+            if !goes_before((&of, right), (me.name(), self.right())) {
+                return None;
+            }
+            self.keep_entered();
+            return Some(Phase::Asked { of: of.to_string() });
         }
         match me.verb(event)? {
             Leave::NAME | Landed::NAME => {
@@ -262,6 +274,7 @@ impl RightOfWay {
             OutOfTheWay::NAME => Some(self.go_on(now)),
             PeerJoined::NAME | PeerLost::NAME => {
                 self.note(event, now);
+                self.keep_entered();
                 let claims = matches!(self.phase, Phase::Claiming | Phase::Entering { .. });
                 Some(if claims { self.go_on(now) } else { self.phase.clone() })
             }
@@ -287,6 +300,7 @@ impl BThread for RightOfWay {
                 let bid = stands(bid).block(self.claim()).wait_for(facts).deadline(*until);
                 self.ahead.enter(*next, me).into_iter().fold(bid, Bid::request)
             }
+            Phase::GivingWay => stands(bid).block(self.claim()).request(me.event(GiveWay)),
             Phase::Yielding { until } => stands(holds(bid)).deadline(*until),
             Phase::Asked { of } => {
                 let make_way = me.event(MakeWay { of: of.as_str().into() });
@@ -310,8 +324,15 @@ impl BThread for RightOfWay {
                 self.enter_from(0, now + if is_inside { INSISTS_INSIDE_FOR } else { INSISTS_FOR })
             }
             (Phase::Entering { next, until }, Some(Enter::NAME)) => self.enter_from(next + 1, until),
-            (Phase::Entering { .. }, _) if lapsed => Phase::Claiming,
+            (Phase::Entering { .. }, _) if lapsed => {
+                self.keep_entered();
+                Phase::Claiming
+            }
             (Phase::Entering { .. }, None) => self.give_in(now),
+            (Phase::GivingWay, Some(GiveWay::NAME)) => {
+                self.held = self.ahead.here();
+                Phase::Yielding { until: now + PATIENCE }
+            }
             (Phase::Entering { next, until }, _) => match Stalled::read(event) {
                 Some(stalled) => self.stand_against(&stalled, (next, until), now),
                 None => Phase::Entering { next, until },

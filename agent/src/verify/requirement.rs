@@ -5,9 +5,9 @@ use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::facts::{BlockLapsed, Confirmed, DuplicateName, PeerJoined, PeerLost, Stalled};
 use skein_wire::event::{
     Advance, Airborne, Arrived, BatteryCritical, BatteryLow, Clear, CommandFailed, Complete, Enter, Failed,
-    FenceBreached, FoundAirborne, Goto, HandBack, Homeward, Land, Landed, Leave, MOTION, MakeWay, OrderTaken,
-    Passage, PathBlocked, PilotTook, PlaceFree, PlaceTaken, Plan, Planned, PositionDoubted, PositionTrusted,
-    Ready, Return, Slept, Stuck, Takeoff, TooClose, Unready, What,
+    FenceBreached, FoundAirborne, GiveWay, Goto, HandBack, Homeward, Land, Landed, Leave, MOTION, MakeWay,
+    OrderTaken, Passage, PathBlocked, PilotTook, PlaceFree, PlaceTaken, Plan, Planned, PositionDoubted,
+    PositionTrusted, Ready, Return, Slept, Stuck, Takeoff, TooClose, Unready, What,
 };
 
 use crate::bthreads::{HOME_LEG, OPERATOR_LEG, RIGHT_OF_WAY};
@@ -199,7 +199,7 @@ pub fn requirements(me: &Me, fence: &Fence) -> Vec<Requirement> {
         Requirement::absence(
             "before a narrow passage there is no leave to move until it is entered, but to make way",
             leave,
-            me.any::<Passage>(),
+            me.any::<(Passage, GiveWay)>(),
             me.any::<(Enter, Leave, Landed, MakeWay)>(),
         ),
         Requirement::absence_from_start(

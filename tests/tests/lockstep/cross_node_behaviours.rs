@@ -8,7 +8,7 @@ use skein_bp::Event;
 use skein_dbp::{NodeName, facts::PeerLost};
 use skein_ground::{Order, Who};
 use skein_tests::Lockstep;
-use skein_wire::event::{Declared as _, Enter, Landed, Leave, Passage, Takeoff};
+use skein_wire::event::{Declared as _, Enter, GiveWay, Landed, Leave, Passage, Takeoff};
 
 fn seconds(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds)
@@ -311,7 +311,7 @@ fn watch(holders: &mut BTreeMap<NodeName, Vec<Place>>, home: &NodeName, event: &
                 held.retain(is_left);
             }
         }
-        Leave::NAME | Landed::NAME => drop(holders.remove(home)),
+        GiveWay::NAME | Leave::NAME | Landed::NAME => drop(holders.remove(home)),
         _ => {}
     }
 }

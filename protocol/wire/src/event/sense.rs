@@ -71,6 +71,8 @@ skein_bp::events! {
     }
     /// The narrow stretch lies behind.
     Leave = "leave", Own;
+    /// The vehicle stands, and lets go all that it has entered but where it is, for whoever wants to come out there.
+    GiveWay = "give_way", Own;
     /// The vehicle stands where another wants to go, and there is no room to pass.
     InTheWay = "in_the_way", Own {
         /// Of which one.

@@ -12,7 +12,7 @@ use skein_dbp::{Happened, NodeName};
 use skein_sim::cli::Controller;
 use skein_sim::fly::Trial;
 use skein_sim::scenario::Scenario;
-use skein_wire::event::{Declared as _, Enter, Landed, Leave, Passage};
+use skein_wire::event::{Declared as _, Enter, GiveWay, Landed, Leave, Passage};
 
 use super::naive_right_of_way::Naive;
 use crate::figure::{Figure, Line, Style};
@@ -68,7 +68,7 @@ impl Narrow {
                     entered.retain(|enter| left.is_at(enter));
                 }
             }
-            Leave::NAME | Landed::NAME => drop(self.inside.remove(&happened.home)),
+            GiveWay::NAME | Leave::NAME | Landed::NAME => drop(self.inside.remove(&happened.home)),
             _ => {}
         }
         let now = self.inside.len();
