@@ -276,7 +276,7 @@ impl Control {
     fn watch(&mut self, now: Duration, reports: &mut Vec<Report>) {
         let charge = known_charge(now, self.companion.telemetry().battery);
         self.watch_energy(now, charge, reports);
-        let fence = &self.config.fence;
+        let AgentConfig { fence, airspace, .. } = &*self.config;
         let (telemetry, estimate) = (self.companion.telemetry(), self.estimate);
         let around = self.neighbours.around();
         reports.extend(self.preflight.update(&Situation {
@@ -303,7 +303,7 @@ impl Control {
             let position = motion.value.position;
             let sigma_m = motion.value.position_sigma_m();
             reports.extend(self.watches.doubt(self.doubt.as_deref(), sigma_m));
-            reports.extend(self.watches.fence(&motion.value, fence));
+            reports.extend(self.watches.fence(&motion.value, fence, &airspace.stay_inside));
             reports.extend(self.watches.separation(position, around));
         } else {
             self.watches.stand();
