@@ -32,6 +32,7 @@ use crate::{
     },
     positioning::{Estimate, Motion, Positioning, excess_m},
     preflight::{Failsafes, HandlingParameters, Others, Preflight, Situation, degrees},
+    refuge::Refuge,
     report::Report,
     scripts::Circumstances,
     watches::Watches,
@@ -82,6 +83,7 @@ pub struct Control {
     perception: Perception,
     neighbours: Neighbours,
     watches: Watches,
+    refuge: Refuge,
     energy: Energy,
     guidance: Guidance,
     heading: Heading,
@@ -125,6 +127,7 @@ impl Control {
             perception: Perception::of_mission(&config)?,
             neighbours: Neighbours::new(name.clone(), config.incarnation, config.roster.len()),
             watches: Watches::default(),
+            refuge: Refuge::new([config.home[0], config.home[1], config.return_altitude_m], &config.rally),
             energy: Energy::new(config.clone()),
             guidance: Guidance::new(config.envelope, layers),
             heading: Heading::new(config.planners.nose),
@@ -305,6 +308,7 @@ impl Control {
             reports.extend(self.watches.doubt(self.doubt.as_deref(), sigma_m));
             reports.extend(self.watches.fence(&motion.value, fence, &airspace.stay_inside));
             reports.extend(self.watches.separation(position, around));
+            reports.extend(self.refuge.look(&self.name, &position, around, self.guidance.goes_home()));
         } else {
             self.watches.stand();
         }

@@ -10,6 +10,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use skein_bp::behaviour::Behaviours;
 
 use crate::autopilots::Autopilots;
+use crate::mission::Allowances;
 use crate::scenario::{Overrides, Scenario, ScenarioError};
 
 /// The end of a program.
@@ -68,8 +69,11 @@ pub enum Command {
     List,
     /// Check a scenario, world or mission file.
     Check {
-        /// A scenario (.toml), world (.sdf, .world, .csv) or mission (.plan, .json), or a built-in scenario's name.
+        /// A scenario (.toml), world (.sdf, .world, .csv) or mission (.plan, .waypoints, .json), or a built-in
+        /// scenario's name.
         file: PathBuf,
+        #[command(flatten)]
+        allowances: Allowances,
         /// Find nothing wrong with solids near the heights of flight that are thinner than 0.2 m in height,
         /// which a planar lidar does not see.
         #[arg(long)]

@@ -368,7 +368,7 @@ fn is_measured(range_m: f32) -> bool {
 /// The least and the greatest height in the world at which a mission may fly, metres.
 fn heights(config: &AgentConfig) -> [f64; 2] {
     let [_, _, home_m] = config.home;
-    let waypoints = config.waypoints.iter().map(|[_, _, z]| *z);
+    let waypoints = config.waypoints.iter().chain(&config.rally).map(|[_, _, z]| *z);
     let heights = || waypoints.clone().chain([config.return_altitude_m, home_m + config.takeoff_height_m]);
     let lowest_m = heights().fold(f64::INFINITY, f64::min) - BELOW_WAYPOINTS_M;
     [lowest_m.max(home_m + LEAST_HEIGHT_M), heights().fold(0.0, f64::max) + ABOVE_WAYPOINTS_M]

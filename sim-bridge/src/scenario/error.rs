@@ -40,6 +40,8 @@ pub enum ScenarioError {
     TooManyVehicles { vehicles: usize, limit: usize },
     #[error("scenario `{scenario}` describes {described} vehicles, {wanted} were asked for")]
     TooFewDescribed { scenario: String, wanted: usize, described: usize },
+    #[error("{place}, and the scenario's ground is not flat: expected heights above home or above the sea")]
+    AboveTerrain { place: String },
     #[error(
         "{missions} missions for {vehicles} vehicles: give one mission that all fly in trail, or one for each vehicle"
     )]

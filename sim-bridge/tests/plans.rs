@@ -1,0 +1,400 @@
+//! Plans as ground stations draw them: places that mean "here", jumps, surveys, fences, rally points, stays and speeds;
+//! and how they are flown.
+
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+use skein_sim::cli::Controller;
+use skein_sim::element::Verdict;
+use skein_sim::fly::Trial;
+use skein_sim::mission::{Account, Allowances, MissionSet};
+use skein_sim::scenario::{Overrides, Scenario, ScenarioError};
+use skein_sim::summary::Summary;
+
+use super::missions::{HOME, at, item, near, plan, read, refusal};
+
+fn waypoint(x: f64, y: f64, height: f64) -> String {
+    item(16, 3, &format!("0, 0, 0, null, {}", at(&HOME, x, y, height)))
+}
+
+fn takeoff(height: f64) -> String {
+    item(22, 3, &format!("0, 0, 0, null, {}", at(&HOME, 0.0, 0.0, height)))
+}
+
+fn home() -> String {
+    item(20, 2, "0, 0, 0, 0, 0, 0, 0")
+}
+
+fn corner(x: f64, y: f64) -> String {
+    let place = HOME.to_geodetic(&Vector3::new(x, y, 0.0));
+    format!("[{:.10}, {:.10}]", place.latitude_rad.to_degrees(), place.longitude_rad.to_degrees())
+}
+
+fn corners(places: &[[f64; 2]]) -> String {
+    format!("[{}]", places.iter().map(|[x, y]| corner(*x, *y)).collect::<Vec<_>>().join(", "))
+}
+
+/// The plan with these polygons to stay inside of.
+fn inside(text: &str, polygons: &[&[[f64; 2]]]) -> String {
+    let zone = |places: &&[[f64; 2]]| {
+        format!(r#"{{"inclusion": true, "polygon": {}, "version": 1}}"#, corners(places))
+    };
+    let zones = polygons.iter().map(zone).collect::<Vec<_>>().join(",\n");
+    text.replace(r#""polygons": []"#, &format!(r#""polygons": [{zones}]"#))
+}
+
+fn rally(text: &str, places: &[[f64; 3]]) -> String {
+    let point = |[x, y, z]: &[f64; 3]| format!("{}, {z}]", corner(*x, *y).trim_end_matches(']'));
+    let points = places.iter().map(point).collect::<Vec<_>>().join(", ");
+    text.replace(r#""points": []"#, &format!(r#""points": [{points}]"#))
+}
+
+fn survey(places: &[[f64; 3]]) -> String {
+    let items: Vec<_> = places.iter().map(|[x, y, z]| waypoint(*x, *y, *z)).collect();
+    format!(
+        r#"{{"type": "ComplexItem", "complexItemType": "survey", "TransectStyleComplexItem": {{"Items": [{}]}}}}"#,
+        items.join(", ")
+    )
+}
+
+fn route(text: &str) -> Vec<[f64; 3]> {
+    let places = read(text).missions[0].waypoints.iter().map(|w| w.position).collect::<Vec<_>>();
+    places.iter().map(|place| [place.x, place.y, place.z].map(|c| (c * 10.0).round() / 10.0)).collect()
+}
+
+fn allowing(text: &str, allowances: Allowances) -> Result<MissionSet, String> {
+    let account = Account::read(text, "f.plan", None, allowances).map_err(|error| error.to_string())?;
+    account.set.map_err(|error| error.to_string())
+}
+
+#[test]
+fn nought_nought_is_where_the_item_before_ends() {
+    let stay = item(16, 3, "4, 0, 0, null, 0, 0, 5");
+    let loiter = item(19, 3, "4, 0, 0, null, null, null, 7");
+    let text = plan(&HOME, &[takeoff(4.0), stay.clone(), waypoint(20.0, 3.0, 5.0), loiter, stay]);
+    assert_eq!(route(&text), [[0.0, 0.0, 5.0], [20.0, 3.0, 5.0], [20.0, 3.0, 7.0], [20.0, 3.0, 5.0]]);
+    let holds: Vec<f64> = read(&text).missions[0].waypoints.iter().map(|w| w.hold_s).collect();
+    assert_eq!(holds, [4.0, 0.0, 4.0, 4.0]);
+    let equator = plan(&HOME, &[item(16, 3, "0, 0, 0, null, 0, 8.5, 5")]);
+    assert!(refusal(&equator).contains("--long-legs"), "latitude 0 alone is a place");
+}
+
+#[test]
+fn a_leg_of_kilometres_is_flown_only_if_that_is_meant() {
+    let text =
+        plan(&HOME, &[waypoint(20.0, 0.0, 5.0), waypoint(20.0, 1400.0, 5.0), waypoint(20.0, 20.0, 5.0)]);
+    let error = refusal(&text);
+    assert!(
+        error.starts_with("f.plan:6: field `mission.items[1].params[4]`") && error.contains("1400 m"),
+        "{error}"
+    );
+    let allowances = Allowances { long_legs: true, ..Allowances::default() };
+    assert_eq!(allowing(&text, allowances).unwrap().missions[0].waypoints.len(), 3);
+}
+
+#[test]
+fn heights_from_the_sea_and_from_home_that_contradict_one_another_are_flown_only_if_that_is_meant() {
+    let above_sea =
+        |height: f64| item(16, 0, &format!("0, 0, 0, null, {}", at(&HOME, 20.0, 0.0, 488.0 + height)));
+    let mixed = plan(&HOME, &[takeoff(5.0), above_sea(72.0), waypoint(20.0, 20.0, 5.0)]);
+    let error = refusal(&mixed);
+    assert!(error.starts_with("f.plan:6: field `mission.items[1].params[6]`"), "{error}");
+    assert!(error.contains("--mixed-heights"), "{error}");
+    let allowances = Allowances { mixed_heights: true, ..Allowances::default() };
+    assert!(allowing(&mixed, allowances).is_ok());
+    assert!(allowing(&plan(&HOME, &[takeoff(5.0), above_sea(9.0)]), Allowances::default()).is_ok());
+    let climb = plan(&HOME, &[takeoff(5.0), waypoint(20.0, 0.0, 80.0)]);
+    assert_eq!(route(&climb), [[20.0, 0.0, 80.0]], "of one kind they may differ");
+}
+
+#[test]
+fn a_home_without_height_will_do_unless_a_height_counts_from_the_sea() {
+    let unknown = |items: &[String]| plan(&HOME, items).replace(", 488]", ", null]");
+    assert_eq!(route(&unknown(&[waypoint(9.0, 0.0, 5.0)])), [[9.0, 0.0, 5.0]]);
+    let error = refusal(&unknown(&[item(16, 0, &format!("0, 0, 0, null, {}", at(&HOME, 9.0, 0.0, 493.0)))]));
+    assert!(error.contains("mission.items[0].frame") && error.contains("plannedHomePosition"), "{error}");
+}
+
+#[test]
+fn heights_above_terrain_are_refused_where_the_ground_is_not_flat() -> Result<(), Box<dyn std::error::Error>>
+{
+    let folder = tempfile::tempdir()?;
+    let above_terrain = plan(&HOME, &[item(16, 10, &format!("0, 0, 0, null, {}", at(&HOME, 9.0, 0.0, 5.0)))]);
+    std::fs::write(folder.path().join("t.plan"), above_terrain)?;
+    let hill = "[[airspace.mountain]]\ncentre_m = [30.0, 30.0]\nheight_m = 6.0\nslope_m = [4.0, 4.0]\n";
+    let open = |more: &str| {
+        let path = folder.path().join("s.toml");
+        std::fs::write(&path, format!("vehicles = 1\nmission = [\"t.plan\"]\n{more}"))?;
+        Ok::<_, std::io::Error>(Scenario::open(&path.to_string_lossy(), &Overrides::default(), 1))
+    };
+    assert!(open("")?.is_ok());
+    let error = open(hill)?.expect_err("a hill").to_string();
+    assert!(error.contains("t.plan:5: mission.items[0].frame"), "{error}");
+    Ok(())
+}
+
+#[test]
+fn jumps_are_flown_as_often_as_they_say() {
+    let jump = |to: u32, times: i32| item(177, 2, &format!("{to}, {times}, 0, 0, 0, 0, 0"));
+    let (a, b) = (waypoint(9.0, 0.0, 5.0), waypoint(9.0, 9.0, 5.0));
+    let text = plan(&HOME, &[a.clone(), b.clone(), jump(1, 2), waypoint(0.0, 9.0, 5.0)]);
+    let norths: Vec<f64> = route(&text).iter().map(|place| place[1]).collect();
+    assert_eq!(norths, [0.0, 9.0, 0.0, 9.0, 0.0, 9.0, 9.0]);
+    let forward = plan(&HOME, &[a.clone(), jump(4, 1), b.clone(), waypoint(0.0, 9.0, 5.0)]);
+    assert_eq!(route(&forward), [[9.0, 0.0, 5.0], [0.0, 9.0, 5.0]]);
+    let error = refusal(&plan(&HOME, &[a.clone(), jump(9, 1)]));
+    assert!(error.contains("params[0]`: expected the number of an item, found 9"), "{error}");
+    let often: Vec<_> = (0..20).map(|_| jump(1, 1000)).collect();
+    let error = refusal(&plan(&HOME, &[vec![a, b], often].concat()));
+    assert!(error.contains("at most 10000 items that are flown again"), "{error}");
+}
+
+#[test]
+fn turns_are_flown_around_their_place() {
+    let loiter = item(18, 3, &format!("2, 0, -6, null, {}", at(&HOME, 20.0, 0.0, 5.0)));
+    let text = plan(&HOME, &[waypoint(9.0, 0.0, 5.0), loiter]);
+    let circle = read(&text).missions[0].waypoints.clone();
+    let around = Vector3::new(20.0, 0.0, 5.0);
+    assert_eq!(circle.len(), 26);
+    assert!(circle[1..].iter().all(|w| ((w.position - around).norm() - 6.0).abs() < 0.01));
+    assert!(near(circle[1].position, [14.0, 0.0, 5.0]) && near(circle[4].position, [20.0, -6.0, 5.0]));
+}
+
+#[test]
+fn plans_of_former_years_are_read() {
+    let old = waypoint(9.0, 3.0, 5.0);
+    let place = at(&HOME, 9.0, 3.0, 5.0);
+    let old = old
+        .replace(&format!("[0, 0, 0, null, {place}]"), &format!("[0, 0, 0, 0], \"coordinate\": [{place}]"));
+    assert!(old.contains("coordinate"));
+    assert_eq!(route(&plan(&HOME, std::slice::from_ref(&old))), [[9.0, 3.0, 5.0]]);
+    let fence = format!(
+        r#""geoFence": {{"polygon": {}, "version": 1}}"#,
+        corners(&[[-9.0, -9.0], [9.0, -9.0], [0.0, 9.0]])
+    );
+    let empty = r#""geoFence": {"circles": [], "polygons": [], "version": 2}"#;
+    let error = refusal(&plan(&HOME, &[old]).replace(empty, &fence));
+    assert!(error.contains("expected a place inside the zones"), "{error}");
+    let other =
+        refusal(&plan(&HOME, &[waypoint(1.0, 0.0, 5.0)]).replace(empty, r#""geoFence": {"ellipses": [1]}"#));
+    assert!(other.contains("geoFence.ellipses"), "{other}");
+}
+
+#[test]
+fn outside_of_what_a_fence_includes_an_item_a_home_and_a_rally_point_are_refused() {
+    let l: &[[f64; 2]] =
+        &[[-10.0, -10.0], [60.0, -10.0], [60.0, 15.0], [15.0, 15.0], [15.0, 60.0], [-10.0, 60.0]];
+    let fenced = |x, y| inside(&plan(&HOME, &[waypoint(50.0, 0.0, 5.0), waypoint(x, y, 5.0)]), &[l]);
+    assert_eq!(route(&fenced(0.0, 50.0)).len(), 2);
+    let error = refusal(&fenced(50.0, 50.0));
+    assert!(error.starts_with("f.plan:6: field `mission.items[1]`: expected a place inside"), "{error}");
+    let away: &[[f64; 2]] = &[[20.0, -10.0], [60.0, -10.0], [60.0, 15.0], [20.0, 15.0]];
+    let error = refusal(&inside(&plan(&HOME, &[waypoint(50.0, 0.0, 5.0)]), &[away]));
+    assert!(error.contains("mission.plannedHomePosition"), "{error}");
+    let error = refusal(&rally(&fenced(0.0, 50.0), &[[40.0, 40.0, 5.0]]));
+    assert!(error.contains("rallyPoints.points[0]"), "{error}");
+}
+
+#[test]
+fn of_several_zones_that_include_one_will_do_unless_the_autopilot_asks_for_all() {
+    let (west, east): (&[[f64; 2]], &[[f64; 2]]) = (
+        &[[-20.0, -20.0], [30.0, -20.0], [30.0, 20.0], [-20.0, 20.0]],
+        &[[20.0, -20.0], [70.0, -20.0], [70.0, 20.0], [20.0, 20.0]],
+    );
+    let text = inside(&plan(&HOME, &[waypoint(50.0, 0.0, 5.0)]), &[west, east]);
+    assert_eq!(route(&text).len(), 1);
+    let ardupilot = text.replace("\"hoverSpeed\"", "\"firmwareType\": 3, \"hoverSpeed\"");
+    assert!(refusal(&ardupilot).contains("plannedHomePosition"), "{}", refusal(&ardupilot));
+}
+
+#[test]
+fn a_structure_scan_goes_round_in_layers() {
+    let scan = format!(
+        r#"{{"type": "ComplexItem", "complexItemType": "StructureScan", "version": 3, "EntranceAltitude": 12,
+        "ScanBottomAlt": 4, "StructureHeight": 6, "StartFromTop": false, "Layers": 2, "GimbalPitch": 0,
+        "CameraCalc": {{"DistanceToSurface": 5, "AdjustedFootprintFrontal": 3}}, "polygon": {}}}"#,
+        corners(&[[20.0, 0.0], [30.0, 0.0], [30.0, 10.0], [20.0, 10.0]])
+    );
+    let places = route(&plan(&HOME, &[takeoff(12.0), scan]));
+    assert_eq!(places.len(), 12);
+    assert_eq!(places[..3], [[15.0, -5.0, 12.0], [15.0, -5.0, 5.5], [35.0, -5.0, 5.5]]);
+    assert_eq!(places[10..], [[15.0, -5.0, 8.5], [15.0, -5.0, 12.0]]);
+}
+
+#[test]
+fn every_element_is_accounted_for_and_reading_goes_on_after_a_refusal() {
+    let items = [
+        takeoff(5.0),
+        waypoint(20.0, 5000.0, 5.0),
+        item(206, 2, "5, 0, 0, 0, 0, 0, 0"),
+        item(115, 2, "0, 0, 0, 0, 0, 0, 0"),
+        item(208, 2, "2, 0, 0, 0, 0, 0, 0"),
+        home(),
+    ];
+    let account = Account::read(&plan(&HOME, &items), "f.plan", None, Allowances::default()).unwrap();
+    assert!(account.set.is_err());
+    let verdicts: Vec<_> =
+        account.elements.iter().filter(|e| e.what.contains("items")).map(|e| (e.line, e.verdict)).collect();
+    use Verdict::{Harmless, Honoured, Refused};
+    assert_eq!(
+        verdicts,
+        [(5, Honoured), (6, Refused), (7, Honoured), (8, Harmless), (9, Refused), (10, Honoured)]
+    );
+    assert!(account.elements.iter().any(|e| e.what == "mission.items[4]: 208 parachute"));
+}
+
+#[test]
+fn a_mission_planner_file_is_read_by_its_text() {
+    let text = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t46.5\t7.25\t620\t1\n\
+                1\t0\t3\t22\t15\t0\t0\t0\t0\t0\t5\t1\n\
+                2\t0\t3\t16\t2\t0\t0\t0\t46.5\t7.25026054\t5\t1\n\
+                3\t0\t0\t16\t0\t0\t0\t0\t46.50017992\t7.25\t626\t1\n\
+                4\t0\t3\t177\t2\t1\t0\t0\t0\t0\t0\t1\n5\t0\t3\t20\t0\t0\t0\t0\t0\t0\t0\t1\n";
+    for file in ["a.waypoints", "a.plan"] {
+        let set = MissionSet::read(text, file, None).unwrap();
+        let places: Vec<_> = set.missions[0].waypoints.iter().map(|w| w.position).collect();
+        assert!(near(places[0], [20.0, 0.0, 5.0]) && near(places[1], [0.0, 20.0, 6.0]), "{places:?}");
+        assert_eq!((places.len(), set.missions[0].waypoints[0].hold_s), (4, 2.0));
+    }
+    let wrong = |from: &str, to: &str| {
+        MissionSet::read(&text.replacen(from, to, 1), "a.waypoints", None).expect_err("is wrong").to_string()
+    };
+    assert!(wrong("2\t0\t3\t16", "2\t0\t3\t4000").starts_with("a.waypoints:4: field `column 4, command`"));
+    assert!(
+        wrong("7.25026054\t5\t1", "7.25026054\t1")
+            .starts_with("a.waypoints:4: field `row`: expected 12 columns")
+    );
+    assert!(wrong("7.25026054", "seven").contains("`column 10`: expected a number, found seven"));
+    assert!(wrong("WPL 110", "WPL 100").contains("expected `QGC WPL 110`, found 100"));
+}
+
+/// A flight of a plan over open ground, with the way of each vehicle in the air, second by second, and where it ended.
+struct Flown {
+    summary: Summary,
+    ways: Vec<Vec<Vector3<f64>>>,
+}
+
+fn fly(text: &str, vehicles: usize, more: &str) -> Flown {
+    let scenario = scenario(text, vehicles, more).unwrap();
+    let mut ways = vec![Vec::new(); vehicles];
+    let flown = Trial::new(&scenario, Controller::Bp).fly(&mut |swarm, _| {
+        for (index, way) in ways.iter_mut().enumerate() {
+            way.extend(swarm.simulation().vehicle(index).map(|vehicle| vehicle.motion.position));
+        }
+    });
+    Flown { summary: flown.unwrap().summary, ways }
+}
+
+fn scenario(text: &str, vehicles: usize, more: &str) -> Result<Scenario, ScenarioError> {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| -> PathBuf {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).map(|()| path).unwrap()
+    };
+    put("p.plan", text);
+    let file = put(
+        "s.toml",
+        &format!("generator = \"open\"\nvehicles = {vehicles}\nmission = [\"p.plan\"]\n{more}"),
+    );
+    Scenario::open(&file.to_string_lossy(), &Overrides::default(), 1)
+}
+
+#[test]
+fn a_plan_is_flown_with_its_stays_and_each_leg_at_its_speed() {
+    let speed = |m_s: f64| item(178, 2, &format!("1, {m_s}, -1, 0, 0, 0, 0"));
+    let hold = item(16, 3, &format!("10, 0, 0, null, {}", at(&HOME, 20.0, 0.0, 5.0)));
+    let items = [
+        takeoff(5.0),
+        speed(1.0),
+        hold,
+        speed(4.0),
+        waypoint(20.0, 40.0, 5.0),
+        item(93, 2, "20, 0, 0, 0, 0, 0, 0"),
+        home(),
+    ];
+    let flown = fly(&plan(&HOME, &items), 1, "");
+    assert_eq!(flown.summary.reason, None);
+    let way = &flown.ways[0];
+    let tick_s = flown.summary.sim_time_s / way.len() as f64;
+    let near_s = |place: [f64; 2]| {
+        let there = way.iter().filter(|at| (at.xy() - nalgebra::Vector2::from(place)).norm() < 0.6);
+        there.count() as f64 * tick_s
+    };
+    assert!((9.5..14.0).contains(&near_s([20.0, 0.0])), "{}", near_s([20.0, 0.0]));
+    assert!((19.5..24.0).contains(&near_s([20.0, 40.0])), "{}", near_s([20.0, 40.0]));
+    let passes_s = |from: f64, to: f64, axis: usize| {
+        let first = |beyond: f64| way.iter().position(|at| at[axis] > beyond).unwrap() as f64 * tick_s;
+        (to - from) / (first(to) - first(from))
+    };
+    let (slow, fast) = (passes_s(5.0, 15.0, 0), passes_s(15.0, 25.0, 1));
+    assert!((0.85..1.1).contains(&slow), "{slow} m/s");
+    assert!((3.2..4.3).contains(&fast), "{fast} m/s");
+}
+
+#[test]
+fn vehicles_that_return_land_at_the_nearest_rally_point_one_each() {
+    let around = [waypoint(60.0, 0.0, 5.0), waypoint(60.0, 40.0, 5.0), waypoint(0.0, 40.0, 5.0)];
+    let items = [vec![takeoff(5.0)], around.to_vec(), vec![home()]].concat();
+    let points = [[58.0, 12.0, 5.0], [30.0, 45.0, 5.0]];
+    let text = rally(&plan(&HOME, &items), &points);
+    let flown = fly(&text, 2, "[[order]]\nat_s = 32.0\norder = \"return\"\n");
+    let ends: Vec<_> = flown.ways.iter().map(|way| way[way.len() - 1]).collect();
+    let at_point = |end: &Vector3<f64>| {
+        points.iter().position(|p| (end.xy() - nalgebra::Vector2::new(p[0], p[1])).norm() < 1.0)
+    };
+    let mut had: Vec<_> = ends.iter().map(|end| at_point(end)).collect();
+    had.sort_unstable();
+    assert_eq!(had, [Some(0), Some(1)], "{ends:?} {:?}", flown.summary.reason);
+    assert_eq!(flown.summary.collisions.vehicle, 0);
+}
+
+#[test]
+fn a_plan_that_ends_with_a_return_ends_at_a_rally_point_if_that_is_nearer() {
+    let text = rally(&plan(&HOME, &[takeoff(5.0), waypoint(60.0, 0.0, 5.0), home()]), &[[50.0, 9.0, 5.0]]);
+    let flown = fly(&text, 1, "");
+    assert_eq!(flown.summary.reason, None);
+    assert!((flown.ways[0].last().unwrap().xy() - nalgebra::Vector2::new(50.0, 9.0)).norm() < 1.0);
+}
+
+#[test]
+fn a_survey_is_flown_once_by_all_together() {
+    let lines = [
+        [10.0, 10.0, 5.0],
+        [10.0, 50.0, 5.0],
+        [20.0, 50.0, 5.0],
+        [20.0, 10.0, 5.0],
+        [30.0, 10.0, 5.0],
+        [30.0, 50.0, 5.0],
+        [40.0, 50.0, 5.0],
+        [40.0, 10.0, 5.0],
+    ];
+    let text = plan(&HOME, &[takeoff(5.0), survey(&lines), home()]);
+    let flown = fly(&text, 2, "");
+    assert_eq!(flown.summary.reason, None);
+    let passes = |way: &[Vector3<f64>], x: f64| {
+        way.iter().any(|at| (at.x - x).abs() < 1.0 && (at.y - 30.0).abs() < 1.0)
+    };
+    for line in [10.0, 20.0, 30.0, 40.0] {
+        let by = flown.ways.iter().filter(|way| passes(way, line)).count();
+        assert_eq!(by, 1, "the line {line} m east");
+    }
+    let lengths: Vec<f64> =
+        flown.ways.iter().map(|way| way.windows(2).map(|leg| (leg[1] - leg[0]).norm()).sum()).collect();
+    assert!((lengths[0] - lengths[1]).abs() < 0.35 * lengths[0], "{lengths:?}");
+}
+
+#[test]
+fn a_leg_is_flown_round_inside_the_fence_that_a_plan_draws() {
+    let l: &[[f64; 2]] =
+        &[[-10.0, -10.0], [60.0, -10.0], [60.0, 15.0], [15.0, 15.0], [15.0, 60.0], [-10.0, 60.0]];
+    let text = inside(
+        &plan(&HOME, &[takeoff(5.0), waypoint(50.0, 0.0, 5.0), waypoint(0.0, 50.0, 5.0), home()]),
+        &[l],
+    );
+    let flown = fly(&text, 3, "");
+    assert_eq!(flown.summary.reason, None);
+    for at in flown.ways.iter().flatten() {
+        assert!(at.x < 15.0 || at.y < 15.0, "{at}");
+        assert!(at.x > -10.0 && at.y > -10.0 && at.x < 60.0 && at.y < 60.0, "{at}");
+    }
+}
