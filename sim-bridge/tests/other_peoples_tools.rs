@@ -51,6 +51,11 @@ fn pymavlink_arms_takes_off_flies_offboard_and_lands() {
 }
 
 #[test]
+fn two_stations_with_pymavlink_are_told_the_truth() {
+    run_script("test_stations.py", "pymavlink");
+}
+
+#[test]
 fn mavsdk_attaches_to_a_flying_vehicle() {
     run_script("test_mavsdk.py", "mavsdk");
 }

@@ -1,10 +1,13 @@
 //! Frames: MAVLink 1 and 2 packets to and from bytes, whatever carries the bytes.
 
+use std::collections::VecDeque;
+
 use mavlink::dialects::common::MavMessage;
 use mavlink::error::ParserError;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc, consts};
 
 use crate::ekf_status;
+use crate::unparsed::Unparsed;
 
 /// A sender or receiver: a MAVLink system and one component of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -70,7 +73,12 @@ pub struct FrameReader {
     start: usize,
     bad_bytes: u64,
     unknown_messages: u64,
+    /// Those that want an answer, until they are taken.
+    unparsed: VecDeque<Unparsed>,
 }
+
+/// Messages kept that want an answer though their content is not known; more are dropped.
+const MAX_UNPARSED: usize = 64;
 
 /// The front of the buffer.
 enum Candidate {
@@ -111,6 +119,9 @@ impl FrameReader {
                 Candidate::Intact(layout) => {
                     let payload = bytes.get(layout.payload).unwrap_or_default();
                     let parsed = parse(layout.version, layout.message_id, payload);
+                    if parsed.is_none() && self.unparsed.len() < MAX_UNPARSED {
+                        self.unparsed.extend(Unparsed::read(layout.sender, layout.message_id, payload));
+                    }
                     self.start += layout.frame_len;
                     let Layout { sender, sequence, version, .. } = layout;
                     match parsed {
@@ -130,6 +141,11 @@ impl FrameReader {
     /// Intact frames skipped so far because their content is not in the common dialect.
     pub fn unknown_messages(&self) -> u64 {
         self.unknown_messages
+    }
+
+    /// The next message that wants an answer though its content is not known.
+    pub(crate) fn next_unparsed(&mut self) -> Option<Unparsed> {
+        self.unparsed.pop_front()
     }
 
     fn skip_to_marker(&mut self) {
@@ -266,9 +282,14 @@ impl FrameWriter {
     pub fn write<D: MessageData>(&mut self, message: &D) {
         let mut payload = [0; consts::MAX_PAYLOAD_LEN];
         let payload_len = message.ser(self.version, &mut payload);
-        let [id0, id1, id2, _] = D::ID.to_le_bytes();
+        self.write_payload((D::ID, D::EXTRA_CRC), payload.get(..payload_len).unwrap_or_default());
+    }
+
+    /// The same of a message whose number and checksum's seed are these.
+    pub(crate) fn write_payload(&mut self, (message_id, extra_crc): (u32, u8), payload: &[u8]) {
+        let [id0, id1, id2, _] = message_id.to_le_bytes();
         let Address { system_id, component_id } = self.sender;
-        let (len, sequence) = (payload_len as u8, self.sequence);
+        let (len, sequence) = (payload.len() as u8, self.sequence);
         let frame_start = self.buffer.len();
         match (self.version, id1, id2) {
             (MavlinkVersion::V2, ..) => self.buffer.extend_from_slice(&[
@@ -295,9 +316,9 @@ impl FrameWriter {
             }
             (MavlinkVersion::V1, ..) => return,
         }
-        self.buffer.extend(payload.iter().take(payload_len));
+        self.buffer.extend_from_slice(payload);
         let covered = self.buffer.get(frame_start + 1..).unwrap_or_default();
-        let crc = calculate_crc(covered, D::EXTRA_CRC);
+        let crc = calculate_crc(covered, extra_crc);
         self.buffer.extend_from_slice(&crc.to_le_bytes());
         self.sequence = self.sequence.wrapping_add(1);
     }
