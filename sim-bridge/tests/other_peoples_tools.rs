@@ -56,6 +56,11 @@ fn two_stations_with_pymavlink_are_told_the_truth() {
 }
 
 #[test]
+fn mavsdk_uploads_and_reads_back_missions_fences_and_parameters() {
+    run_script("test_mavsdk_missions.py", "mavsdk");
+}
+
+#[test]
 fn mavsdk_attaches_to_a_flying_vehicle() {
     run_script("test_mavsdk.py", "mavsdk");
 }
