@@ -20,16 +20,15 @@ pub struct Refuge {
 }
 
 impl Refuge {
-    /// Home, and rally points with the height of the way there; world ENU, m.
+    /// Home at the height of the way there, and rally points with theirs, which is no lower; world ENU, m.
     pub fn new(home: [f64; 3], rally: &[[f64; 3]]) -> Self {
-        Self {
-            places: std::iter::once(&home).chain(rally).map(|place| Vector3::from(*place)).collect(),
-            told: 0,
-        }
+        let [.., height_m] = home;
+        let at_height = |[x, y, z]: &[f64; 3]| Vector3::new(*x, *y, z.max(height_m));
+        Self { places: std::iter::once(&home).chain(rally).map(at_height).collect(), told: 0 }
     }
 
-    /// Looks which place is nearest and not another's; says when that has changed. Who is on the way to one stays with
-    /// it, unless another vehicle takes it.
+    /// Looks which place is nearest and not another's; says when that has changed. Who is on the way to one
+    /// stays with it, unless another vehicle takes it.
     pub fn look(
         &mut self,
         me: &NodeName,
@@ -46,8 +45,8 @@ impl Refuge {
         self.places.get(nearest).filter(|_| changed).map(|place| Report::Refuge(*place))
     }
 
-    /// Whoever is nearest to a point has it; of those that are left the next nearest has another, and so on. All
-    /// vehicles come to the same, as they know of one another.
+    /// Whoever is nearest to a point has it; of those that are left the next nearest has another, and so on.
+    /// All vehicles come to the same, as they know of one another.
     fn nearest(&self, me: &NodeName, position: &Vector3<f64>, neighbours: &[Neighbour]) -> usize {
         let away_m = |place: usize, from: &Vector3<f64>| (self.places[place] - from).xy().norm();
         // Home is this vehicle's own, so that nobody else need know which of the two it prefers.
@@ -77,8 +76,8 @@ impl Refuge {
         }
     }
 
-    /// Whether another vehicle has a place that this one cannot have any more: of two on their way, the first by name has
-    /// it.
+    /// Whether another vehicle has a place that this one cannot have any more: of two on their way, the first
+    /// by name has it.
     fn takes(&self, me: &NodeName, other: &Neighbour, place: usize) -> bool {
         let is_down = !other.armed;
         place > 0 && self.has(other, place) && (is_down || place != self.told || other.node < *me)

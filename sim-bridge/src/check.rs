@@ -34,7 +34,7 @@ impl fmt::Display for Findings {
 }
 
 /// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`), a mission (`.plan`, `.waypoints`,
-/// `.json`), or else a scenario; `thin_solids` may be in its way.
+/// `.kml`, `.geojson`, `.json`), or else a scenario; `thin_solids` may be in its way.
 pub fn check(
     file: &Path,
     allowances: Allowances,
@@ -47,7 +47,7 @@ pub fn check(
             let (scene, warnings) = read_world(file)?;
             ("world", world(&scene), warnings)
         }
-        Some("plan" | "waypoints" | "mission" | "txt" | "json") => {
+        Some("plan" | "waypoints" | "mission" | "txt" | "json" | "geojson" | "kml") => {
             let set = mission::read_files(&[file.to_owned()], None, allowances)?;
             ("mission", missions(&set), notes(file, &set, allowances, known)?)
         }
@@ -72,7 +72,10 @@ pub fn check(
 
 /// What becomes of each element of a file, sound or not; none of one that is too broken to have any.
 pub fn elements(file: &Path, allowances: Allowances) -> Vec<Element> {
-    if !matches!(extension(file).as_deref(), Some("plan" | "waypoints" | "mission" | "txt" | "json")) {
+    if !matches!(
+        extension(file).as_deref(),
+        Some("plan" | "waypoints" | "mission" | "txt" | "json" | "geojson" | "kml")
+    ) {
         return Vec::new();
     }
     mission::account_of(file, None, allowances).map(|account| account.elements).unwrap_or_default()
@@ -93,7 +96,8 @@ fn notes(
         return Ok(set.warnings.iter().map(ToString::to_string).collect());
     }
     let missions = vec![file.to_owned()];
-    let overrides = Overrides { vehicles: Some(1), missions, allowances, ..Overrides::default() };
+    let vehicles = (set.missions.len() == 1).then_some(1);
+    let overrides = Overrides { vehicles, missions, allowances, ..Overrides::default() };
     Ok(Scenario::open_with("open", &overrides, 1, known)?.notes)
 }
 

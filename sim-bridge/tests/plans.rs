@@ -268,6 +268,15 @@ fn a_mission_planner_file_is_read_by_its_text() {
     assert!(wrong("WPL 110", "WPL 100").contains("expected `QGC WPL 110`, found 100"));
 }
 
+#[test]
+fn a_rally_point_outside_of_stated_bounds_is_refused() {
+    let text = rally(&plan(&HOME, &[takeoff(5.0), waypoint(20.0, 0.0, 5.0), home()]), &[[90.0, 0.0, 5.0]]);
+    let bounds = "[bounds]\nmin_m = [-30.0, -30.0, -1.0]\nmax_m = [30.0, 30.0, 12.0]\n";
+    let error = scenario(&text, 1, bounds).expect_err("far out").to_string();
+    assert!(error.starts_with("rally point (90.00, ") && error.contains("is outside the world"), "{error}");
+    assert!(scenario(&text, 1, "").is_ok(), "bounds that nobody states hold it");
+}
+
 /// A flight of a plan over open ground, with the way of each vehicle in the air, second by second, and where it ended.
 struct Flown {
     summary: Summary,
@@ -396,5 +405,224 @@ fn a_leg_is_flown_round_inside_the_fence_that_a_plan_draws() {
     for at in flown.ways.iter().flatten() {
         assert!(at.x < 15.0 || at.y < 15.0, "{at}");
         assert!(at.x > -10.0 && at.y > -10.0 && at.x < 60.0 && at.y < 60.0, "{at}");
+    }
+}
+
+/// Longitude and latitude, as maps have them.
+fn map_place(x: f64, y: f64) -> [f64; 2] {
+    let place = HOME.to_geodetic(&Vector3::new(x, y, 0.0));
+    [place.longitude_rad.to_degrees(), place.latitude_rad.to_degrees()]
+}
+
+#[test]
+fn polygons_and_lines_of_geojson_are_zones_and_routes() {
+    let ring = |places: &[[f64; 2]]| places.iter().map(|[x, y]| map_place(*x, *y)).collect::<Vec<_>>();
+    let square =
+        |x: f64, size: f64| ring(&[[x, -size], [x + size, -size], [x + size, size], [x, size], [x, -size]]);
+    let line: Vec<_> = ring(&[[0.0, 0.0], [30.0, 0.0], [30.0, 20.0]]);
+    let collection = |line: serde_json::Value, mode: &str| {
+        serde_json::json!({"type": "FeatureCollection", "features": [
+            {"type": "Feature", "properties": {"altitudeMode": mode}, "geometry": {"type": "LineString", "coordinates": line}},
+            {"type": "Feature", "properties": {"inclusion": true}, "geometry": {"type": "Polygon", "coordinates": [square(-50.0, 150.0)]}},
+            {"type": "Feature", "properties": null, "geometry": {"type": "Polygon", "coordinates": [square(50.0, 8.0)]}},
+            {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": line[0]}},
+        ]})
+        .to_string()
+    };
+    let flat = collection(serde_json::json!(line), "");
+    let set = MissionSet::read(&flat, "m.geojson", None).unwrap();
+    let places: Vec<_> = set.missions[0].waypoints.iter().map(|w| w.position).collect();
+    assert!(near(places[1], [30.0, 0.0, 5.0]) && near(places[2], [30.0, 20.0, 5.0]), "{places:?}");
+    assert_eq!((set.airspace.stay_inside.len(), set.airspace.prisms.len(), set.warnings.len()), (1, 1, 2));
+    let high: Vec<_> = line.iter().map(|[x, y]| [*x, *y, 7.0]).collect();
+    let set =
+        MissionSet::read(&collection(serde_json::json!(high), "relativeToGround"), "m.json", None).unwrap();
+    assert_eq!(set.missions[0].waypoints[0].position.z, 7.0);
+    let error =
+        MissionSet::read(&collection(serde_json::json!(high), ""), "m.json", None).unwrap_err().to_string();
+    assert!(error.contains("altitudeMode") && error.contains("a height of 7 m"), "{error}");
+    let through = collection(serde_json::json!(ring(&[[0.0, 0.0], [54.0, 0.0]])), "");
+    let error = MissionSet::read(&through, "m.json", None).unwrap_err().to_string();
+    assert!(error.contains("outside the zones that `geoFence` excludes"), "{error}");
+}
+
+#[test]
+fn placemarks_of_kml_are_zones_and_routes() {
+    let words = |places: &[[f64; 2]], height: &str| {
+        let place = |[x, y]: &[f64; 2]| {
+            let [longitude, latitude] = map_place(*x, *y);
+            format!("{longitude:.9},{latitude:.9}{height}")
+        };
+        places.iter().map(place).collect::<Vec<_>>().join(" ")
+    };
+    let kml = |mode: &str| {
+        format!(
+            "<?xml version=\"1.0\"?>\n<kml xmlns=\"http://www.opengis.net/kml/2.2\"><Document>\n\
+             <Placemark><name>Way</name><LineString><altitudeMode>{mode}</altitudeMode>\n\
+             <coordinates>{}</coordinates></LineString></Placemark>\n\
+             <Placemark><name>Field</name><ExtendedData><Data name=\"inclusion\"><value>true</value></Data></ExtendedData>\n\
+             <Polygon><outerBoundaryIs><LinearRing><coordinates>{}</coordinates></LinearRing></outerBoundaryIs>\n\
+             <innerBoundaryIs><LinearRing><coordinates>{}</coordinates></LinearRing></innerBoundaryIs></Polygon></Placemark>\n\
+             </Document></kml>",
+            words(&[[0.0, 0.0], [30.0, 0.0], [30.0, 20.0]], ",6"),
+            words(&[[-50.0, -50.0], [50.0, -50.0], [50.0, 50.0], [-50.0, 50.0], [-50.0, -50.0]], ""),
+            words(&[[10.0, 10.0], [15.0, 10.0], [15.0, 15.0], [10.0, 10.0]], ""),
+        )
+    };
+    let set = MissionSet::read(&kml("relativeToGround"), "m.kml", None).unwrap();
+    assert!(near(set.missions[0].waypoints[2].position, [30.0, 20.0, 6.0]));
+    assert_eq!(
+        (set.airspace.stay_inside.len(), set.airspace.prisms.len()),
+        (1, 1),
+        "a hole is stayed out of"
+    );
+    let error = MissionSet::read(&kml("absolute"), "m.kml", None).unwrap_err().to_string();
+    assert!(error.starts_with("m.kml:3: field `Way: LineString`: expected an altitudeMode"), "{error}");
+    let broken = MissionSet::read("<kml><Placemark></kml>", "m.kml", None).unwrap_err().to_string();
+    assert!(broken.starts_with("m.kml:1:"), "{broken}");
+}
+
+mod round_trip {
+    use proptest::prelude::*;
+    use skein_planning::airspace::{Airspace, Area, StayInside};
+    use skein_sim::mission::write::{Surroundings, to_plan};
+    use skein_sim::mission::{Ends, Mission, Payload, Waypoint};
+
+    use super::*;
+
+    fn position() -> impl Strategy<Value = Vector3<f64>> {
+        (-90.0..90.0, -90.0..90.0, 1.0..60.0).prop_map(|(x, y, z)| Vector3::new(x, y, z))
+    }
+
+    fn payload() -> impl Strategy<Value = Vec<Payload>> {
+        let one = (prop_oneof![Just(206), Just(2000), Just(183)], 0.0..9.0, any::<bool>()).prop_map(
+            |(command, first, none)| {
+                let fourth = if none { f64::NAN } else { 4.0 };
+                Payload { command, params: [first, 1.0, 0.0, fourth, 0.0, 0.0, 0.0] }
+            },
+        );
+        prop::collection::vec(one, 0..3)
+    }
+
+    fn mission() -> impl Strategy<Value = Mission> {
+        let speed = || prop_oneof![Just(1.5), Just(4.0)];
+        let waypoint = (position(), prop_oneof![Just(0.0), 0.5..40.0], payload()).prop_map(
+            |(position, hold_s, payload)| Waypoint { position, hold_s, payload, ..Waypoint::default() },
+        );
+        let legs = prop::collection::vec((waypoint, speed()), 1..8);
+        (legs, any::<bool>(), 1.0..9.0, payload(), any::<bool>()).prop_map(
+            |(legs, back, takeoff_m, last_payload, slows)| {
+                let waypoints = legs
+                    .into_iter()
+                    .map(|(leg, speed)| Waypoint { speed_m_s: slows.then_some(speed), ..leg });
+                Mission {
+                    waypoints: waypoints.collect(),
+                    ends: if back { Ends::Return } else { Ends::Land },
+                    takeoff_height_m: Some(takeoff_m),
+                    delay_s: if back { 3.0 } else { 0.0 },
+                    last_payload,
+                    ..Mission::default()
+                }
+            },
+        )
+    }
+
+    fn airspace() -> impl Strategy<Value = Airspace> {
+        (0_usize..3, any::<bool>()).prop_map(|(areas, each)| {
+            let area = |index: usize| Area::round(nalgebra::Vector2::new(index as f64, 0.0), 400.0);
+            let all: Vec<_> = (0..areas).map(area).collect();
+            let stay_inside = match (areas, each) {
+                (0, _) => Vec::new(),
+                (1, _) | (_, false) => vec![StayInside { any_of: all }],
+                _ => all.into_iter().map(|one| StayInside { any_of: vec![one] }).collect(),
+            };
+            Airspace { stay_inside, ..Airspace::default() }
+        })
+    }
+
+    fn is_same(one: &Mission, other: &Mission) -> bool {
+        let same_leg = |(a, b): (&Waypoint, &Waypoint)| {
+            (a.position - b.position).norm() < 1e-5
+                && (a.hold_s, a.speed_m_s) == (b.hold_s, b.speed_m_s)
+                && a.payload == b.payload
+        };
+        one.waypoints.len() == other.waypoints.len()
+            && one.waypoints.iter().zip(&other.waypoints).all(same_leg)
+            && (one.ends, one.takeoff_height_m, one.delay_s)
+                == (other.ends, other.takeoff_height_m, other.delay_s)
+            && one.last_payload == other.last_payload
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_written_is_read_as_the_same(mission in mission(), airspace in airspace(), rally in prop::collection::vec(position(), 0..3)) {
+            let around = Surroundings { datum: &HOME, airspace: &airspace, rally: &rally };
+            let text = to_plan(&mission, &around).unwrap();
+            let set = MissionSet::read(&text, "w.plan", Some(HOME)).unwrap();
+            prop_assert!(is_same(&mission, &set.missions[0]), "{mission:?} became {:?}", set.missions[0]);
+            prop_assert!(set.rally.iter().zip(&rally).all(|(one, other)| (one - other).norm() < 1e-5));
+            prop_assert_eq!(set.rally.len(), rally.len());
+            let shape = |airspace: &Airspace| airspace.stay_inside.iter().map(|zone| zone.any_of.len()).collect::<Vec<_>>();
+            prop_assert_eq!(shape(&set.airspace), shape(&airspace));
+            prop_assert!(set.warnings.is_empty());
+        }
+    }
+
+    #[test]
+    fn what_is_written_keeps_to_qgroundcontrols_rules() {
+        let waypoint = Waypoint { position: Vector3::new(9.0, 0.0, 5.0), ..Waypoint::default() };
+        let mission = Mission { waypoints: vec![waypoint], ..Mission::default() };
+        let around = Surroundings { datum: &HOME, airspace: &Airspace::default(), rally: &[] };
+        let plan: serde_json::Value = serde_json::from_str(&to_plan(&mission, &around).unwrap()).unwrap();
+        assert_eq!((plan["fileType"].as_str(), plan["version"].as_u64()), (Some("Plan"), Some(1)));
+        assert!(plan["groundStation"].is_string());
+        let versions = ["mission", "geoFence", "rallyPoints"].map(|part| plan[part]["version"].as_u64());
+        assert_eq!(versions, [Some(2); 3]);
+        for field in ["firmwareType", "vehicleType", "cruiseSpeed", "hoverSpeed"] {
+            assert!(plan["mission"][field].is_number(), "{field}");
+        }
+        assert_eq!(plan["mission"]["plannedHomePosition"].as_array().map(Vec::len), Some(3));
+        for (number, item) in (1..).zip(plan["mission"]["items"].as_array().unwrap()) {
+            assert_eq!(
+                (item["type"].as_str(), item["doJumpId"].as_u64()),
+                (Some("SimpleItem"), Some(number))
+            );
+            assert!(item["autoContinue"].is_boolean() && item["params"].as_array().unwrap().len() == 7);
+            let in_place = item["frame"] == 3;
+            assert_eq!(in_place, item.get("Altitude").is_some() && item["AltitudeMode"] == 1, "{item}");
+        }
+    }
+
+    #[test]
+    fn a_scenarios_routes_are_written_and_flown_again() -> Result<(), Box<dyn std::error::Error>> {
+        let lines = [[10.0, 10.0, 5.0], [10.0, 50.0, 5.0], [20.0, 50.0, 5.0], [20.0, 10.0, 5.0]];
+        let hold = item(16, 3, &format!("7, 0, 0, null, {}", at(&HOME, 5.0, 0.0, 5.0)));
+        let text = rally(&plan(&HOME, &[takeoff(5.0), hold, survey(&lines), home()]), &[[0.0, 130.0, 5.0]]);
+        let scenario = scenario(&text, 2, "")?;
+        for vehicle in &scenario.vehicles {
+            let mission = scenario.mission_of(vehicle);
+            assert_eq!(mission.ends, Ends::Return);
+            assert_eq!(mission.waypoints[0].hold_s, 7.0);
+            let again = MissionSet::read(
+                &to_plan(&mission, &scenario.surroundings())?,
+                "w.plan",
+                Some(*scenario.scene.datum()),
+            )?;
+            assert!(is_same(&mission, &again.missions[0]), "{mission:?} became {:?}", again.missions[0]);
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn the_samples_are_sound_and_flown() {
+    let samples = concat!(env!("CARGO_MANIFEST_DIR"), "/samples");
+    for (plan, vehicles, world) in [("inspection.plan", 2, Some("yard.csv")), ("field.plan", 3, None)] {
+        let missions = vec![PathBuf::from(format!("{samples}/{plan}"))];
+        let world = world.map(|world| PathBuf::from(format!("{samples}/{world}")));
+        let overrides = Overrides { vehicles: Some(vehicles), missions, world, ..Overrides::default() };
+        let scenario = Scenario::open("open", &overrides, 1).unwrap();
+        let summary = Trial::new(&scenario, Controller::Bp).fly(&mut |_, _| {}).unwrap().summary;
+        assert_eq!((summary.reason, summary.collisions.obstacle), (None, 0), "{plan}");
     }
 }

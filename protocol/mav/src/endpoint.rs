@@ -138,8 +138,10 @@ impl Endpoint {
                 self.handle(now, &frame);
             }
         }
-        while let Some(unparsed) = self.reader.next_unparsed() {
-            self.refuse(&unparsed);
+        while let Some(unread) = self.reader.next_unread() {
+            if let Some(unparsed) = Unparsed::read(&unread) {
+                self.refuse(&unparsed);
+            }
         }
     }
 

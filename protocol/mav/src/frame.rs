@@ -7,7 +7,6 @@ use mavlink::error::ParserError;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc, consts};
 
 use crate::ekf_status;
-use crate::unparsed::Unparsed;
 
 /// A sender or receiver: a MAVLink system and one component of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -73,12 +72,21 @@ pub struct FrameReader {
     start: usize,
     bad_bytes: u64,
     unknown_messages: u64,
-    /// Those that want an answer, until they are taken.
-    unparsed: VecDeque<Unparsed>,
+    /// The first of them, until they are taken.
+    unread: VecDeque<Unread>,
 }
 
-/// Messages kept that want an answer though their content is not known; more are dropped.
-const MAX_UNPARSED: usize = 64;
+/// Messages kept whose content is not known; more are dropped.
+const MAX_UNREAD: usize = 64;
+
+/// An intact frame whose content is not in the common dialect.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Unread {
+    pub(crate) sender: Address,
+    pub(crate) message_id: u32,
+    /// A MAVLink 2 frame leaves out the zeros at its end.
+    pub(crate) payload: Vec<u8>,
+}
 
 /// The front of the buffer.
 enum Candidate {
@@ -119,8 +127,9 @@ impl FrameReader {
                 Candidate::Intact(layout) => {
                     let payload = bytes.get(layout.payload).unwrap_or_default();
                     let parsed = parse(layout.version, layout.message_id, payload);
-                    if parsed.is_none() && self.unparsed.len() < MAX_UNPARSED {
-                        self.unparsed.extend(Unparsed::read(layout.sender, layout.message_id, payload));
+                    if parsed.is_none() && self.unread.len() < MAX_UNREAD {
+                        let Layout { sender, message_id, .. } = layout;
+                        self.unread.push_back(Unread { sender, message_id, payload: payload.to_vec() });
                     }
                     self.start += layout.frame_len;
                     let Layout { sender, sequence, version, .. } = layout;
@@ -143,9 +152,9 @@ impl FrameReader {
         self.unknown_messages
     }
 
-    /// The next message that wants an answer though its content is not known.
-    pub(crate) fn next_unparsed(&mut self) -> Option<Unparsed> {
-        self.unparsed.pop_front()
+    /// The next message whose content is not known.
+    pub(crate) fn next_unread(&mut self) -> Option<Unread> {
+        self.unread.pop_front()
     }
 
     fn skip_to_marker(&mut self) {

@@ -1,6 +1,6 @@
 //! Messages with a command that the common dialect does not know, and which want an answer all the same.
 
-use crate::frame::{Address, FrameWriter};
+use crate::frame::{Address, FrameWriter, Unread};
 
 const COMMAND_INT: u32 = 75;
 const COMMAND_LONG: u32 = 76;
@@ -31,19 +31,18 @@ pub(crate) struct Unparsed {
 }
 
 impl Unparsed {
-    /// Reads what can be read of a payload; `None` for messages that want no answer. A MAVLink 2 frame leaves out the
-    /// zeros at its end.
-    pub(crate) fn read(from: Address, message_id: u32, payload: &[u8]) -> Option<Self> {
+    /// Reads what can be read of a message; `None` for those that want no answer.
+    pub(crate) fn read(unread: &Unread) -> Option<Self> {
         let mut bytes = [0; LEN];
-        for (byte, sent) in bytes.iter_mut().zip(payload) {
+        for (byte, sent) in bytes.iter_mut().zip(&unread.payload) {
             *byte = *sent;
         }
-        let (want, to) = match message_id {
+        let (want, to) = match unread.message_id {
             COMMAND_LONG | COMMAND_INT => (Want::Command(u16::from_le_bytes([bytes[28], bytes[29]])), 30),
             MISSION_ITEM | MISSION_ITEM_INT => (Want::Item, 32),
             _ => return None,
         };
-        Some(Self { from, to: (bytes[to], bytes[to + 1]), want })
+        Some(Self { from: unread.sender, to: (bytes[to], bytes[to + 1]), want })
     }
 }
 
@@ -73,7 +72,8 @@ mod tests {
         reader.push(&writer.take());
         assert_eq!(reader.next_frame(), None);
         let unparsed = Unparsed { from: STATION, to: (3, 1), want: Want::Command(60_000) };
-        assert_eq!((reader.next_unparsed(), reader.next_unparsed()), (Some(unparsed), None));
+        assert_eq!(reader.next_unread().as_ref().and_then(Unparsed::read), Some(unparsed));
+        assert_eq!(reader.next_unread(), None);
     }
 
     #[test]

@@ -25,6 +25,16 @@ pub enum Kind {
 
 /// `MAV_CMD_NAV_WAYPOINT`.
 pub const WAYPOINT: u64 = 16;
+/// `MAV_CMD_NAV_RETURN_TO_LAUNCH`.
+pub const RETURN_TO_LAUNCH: u64 = 20;
+/// `MAV_CMD_NAV_LAND`.
+pub const LAND: u64 = 21;
+/// `MAV_CMD_NAV_TAKEOFF`.
+pub const TAKEOFF: u64 = 22;
+/// `MAV_CMD_NAV_DELAY`.
+pub const DELAY: u64 = 93;
+/// `MAV_CMD_DO_CHANGE_SPEED`.
+pub const CHANGE_SPEED: u64 = 178;
 
 /// Numbers, names and kinds.
 const COMMANDS: &[(u16, &str, Kind)] = &[

@@ -16,8 +16,8 @@ pub enum MissionError {
     #[error("{file}:{line}: field `{field}`: expected {expected}, found {found}")]
     Field { file: String, line: usize, field: String, expected: String, found: String },
     #[error(
-        "{file}: expected a QGroundControl plan (a member `mission`), a `QGC WPL 110` file or an LSC mission \
-         (a member `agents`)"
+        "{file}: expected a QGroundControl plan (a member `mission`), a `QGC WPL 110` file, KML, GeoJSON or \
+         an LSC mission (a member `agents`)"
     )]
     Unknown { file: String },
 }

@@ -79,6 +79,11 @@ impl<'a> Node<'a> {
         Ok(array.iter().enumerate().map(|(i, value)| self.below(value, Step::Element(i))).collect())
     }
 
+    /// The number of elements of an array.
+    pub fn count(&self) -> Result<usize, MissionError> {
+        self.value.as_array().map(Vec::len).ok_or_else(|| self.mismatch("an array"))
+    }
+
     /// An element of an array, where there is one.
     pub fn element(&self, index: usize) -> Option<Node<'a>> {
         let value = self.value.as_array()?.get(index)?;
@@ -182,6 +187,11 @@ impl<'a> Node<'a> {
             }
         }
         if field.is_empty() { "document".to_owned() } else { field }
+    }
+
+    /// The document's name in errors.
+    pub fn file(&self) -> &'a str {
+        self.document.file
     }
 
     /// Line from 1.

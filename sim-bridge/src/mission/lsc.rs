@@ -83,9 +83,10 @@ pub fn read(root: &Node<'_>) -> Result<MissionSet, MissionError> {
         return Err(agents.mismatch("at least one agent"));
     }
     let obstacles = root.optional("obstacles").filter(|o| !o.is_empty());
-    let warnings =
-        obstacles.iter().map(|o| o.warning("moving obstacles are not read; they are left out")).collect();
-    Ok(MissionSet { missions, warnings, ..MissionSet::default() })
+    match obstacles {
+        Some(obstacles) => Err(obstacles.mismatch("no moving obstacles, which are not flown around")),
+        None => Ok(MissionSet { missions, ..MissionSet::default() }),
+    }
 }
 
 fn agent(agent: &Node<'_>) -> Result<Mission, MissionError> {

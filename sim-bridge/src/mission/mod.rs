@@ -2,13 +2,17 @@
 
 mod command;
 mod error;
+mod features;
+mod geojson;
 mod item;
 mod json;
+mod kml;
 mod lsc;
 mod plan;
 mod route;
 mod structure_scan;
 mod waypoint_file;
+pub mod write;
 
 use std::path::{Path, PathBuf};
 
@@ -25,7 +29,7 @@ use self::route::Draft;
 use crate::element::Element;
 
 /// Largest mission file, in bytes.
-const LARGEST_BYTES: usize = 32 << 20;
+const LARGEST_BYTES: usize = 8 << 20;
 
 /// A route for one vehicle, in the world's frame.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -91,7 +95,8 @@ pub struct Allowances {
     /// Fly legs of more than 1000 m of a mission file.
     #[arg(long)]
     pub long_legs: bool,
-    /// Fly a mission file whose neighbouring heights, one above the sea and one above home, differ by more than 30 m.
+    /// Fly a mission file whose neighbouring heights, one above the sea and one above home, differ by more
+    /// than 30 m.
     #[arg(long)]
     pub mixed_heights: bool,
 }
@@ -143,8 +148,14 @@ impl Account {
         if text.trim_start_matches('\u{feff}').starts_with(waypoint_file::HEADING) {
             return waypoint_file::read(text, file, datum, allowances);
         }
+        if kml::is_markup(text) {
+            return kml::read(text, file, datum, allowances);
+        }
         let document = Document::parse(text, file)?;
         let root = document.root();
+        if geojson::is_geojson(&root) {
+            return geojson::read(&root, datum, allowances);
+        }
         if root.optional("mission").is_some() {
             plan::read(&root, datum, allowances)
         } else if root.optional("agents").is_some() {
@@ -156,10 +167,11 @@ impl Account {
 }
 
 impl MissionSet {
-    /// Reads a QGroundControl plan, a `QGC WPL 110` file or an LSC mission; `file` is what errors call it.
+    /// Reads a QGroundControl plan, a `QGC WPL 110` file, KML, GeoJSON or an LSC mission; `file` is what
+    /// errors call it.
     ///
-    /// `datum` is where the world's origin is on the earth, if the world says. A plan that was drawn elsewhere, or
-    /// flies in a world that does not say, has its planned home set on the origin.
+    /// `datum` is where the world's origin is on the earth, if the world says. A plan that was drawn
+    /// elsewhere, or flies in a world that does not say, has its planned home set on the origin.
     pub fn read(text: &str, file: &str, datum: Option<Datum>) -> Result<Self, MissionError> {
         Account::read(text, file, datum, Allowances::default())?.set
     }

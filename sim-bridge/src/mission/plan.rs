@@ -19,6 +19,8 @@ const WIDEST_M: f64 = 1e6;
 /// Reads the plan under `root`; see [`MissionSet::read`](super::MissionSet::read) for the `datum`.
 pub fn read(root: &Node<'_>, datum: Option<Datum>, allowances: Allowances) -> Result<Account, MissionError> {
     let mission = root.member("mission")?;
+    check_version(root, 1)?;
+    check_version(&mission, 2)?;
     let home = mission.member("plannedHomePosition")?;
     let mut draft = begin(&home, datum, allowances)?;
     let at_home = draft.element("mission.plannedHomePosition".to_owned(), home.line(), Verdict::Honoured, "");
@@ -36,6 +38,16 @@ pub fn read(root: &Node<'_>, datum: Option<Datum>, allowances: Allowances) -> Re
     estimates(&mut draft, &mission);
     let (draft, flown) = draft.finish(|| nodes.error("at least one waypoint (command 16)", "none"));
     Ok(Account::of(draft, vec![flown]))
+}
+
+/// A newer version may mean other things.
+fn check_version(node: &Node<'_>, newest: u64) -> Result<(), MissionError> {
+    match node.optional("version") {
+        Some(version) if version.whole_number()? > newest => {
+            Err(version.mismatch(format!("a version of at most {newest}")))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn begin(home: &Node<'_>, datum: Option<Datum>, allowances: Allowances) -> Result<Draft, MissionError> {
@@ -94,17 +106,18 @@ fn geofence(draft: &mut Draft, fence: &Node<'_>, every: bool) {
 
 fn zones(draft: &mut Draft, name: &str, list: &Node<'_>, inside: &mut Vec<Area>) {
     let lines = list.element_lines();
-    let nodes = match list.elements() {
-        Ok(nodes) => nodes,
+    let count = match list.count() {
+        Ok(count) => count,
         Err(error) => {
             let element = draft.element(format!("geoFence.{name}"), list.line(), Verdict::Refused, "");
             return draft.refuse(element, error);
         }
     };
-    for (index, (node, line)) in nodes.iter().zip(lines).enumerate() {
+    for (index, line) in lines.into_iter().enumerate().take(count) {
+        let Some(node) = list.element(index).filter(|_| !draft.is_hopeless()) else { break };
         zone(draft, format!("geoFence.{name}[{index}]"), line, |draft| {
             let includes = node.member("inclusion")?.truth()?;
-            let area = area(draft, node)?;
+            let area = area(draft, &node)?;
             match area {
                 area if includes => inside.push(area),
                 Area::Round(zone) => draft.airspace.no_fly.push(zone),
@@ -156,7 +169,8 @@ fn corner(draft: &Draft, node: &Node<'_>) -> Result<Vector2<f64>, MissionError> 
 /// Rally points: latitude, longitude, and height above home.
 fn rally_points(draft: &mut Draft, points: &Node<'_>) -> Result<(), MissionError> {
     let lines = points.element_lines();
-    for (index, (point, line)) in points.elements()?.iter().zip(lines).enumerate() {
+    for (index, line) in lines.into_iter().enumerate().take(points.count()?) {
+        let Some(point) = points.element(index).filter(|_| !draft.is_hopeless()) else { break };
         zone(draft, format!("rallyPoints.points[{index}]"), line, |draft| {
             let [latitude, longitude, height_m] = point.numbers::<3>()?;
             if latitude.abs() > 90.0 || longitude.abs() > 180.0 {
@@ -175,7 +189,8 @@ fn rally_points(draft: &mut Draft, points: &Node<'_>) -> Result<(), MissionError
 fn items<'a>(draft: &mut Draft, nodes: &Node<'a>) -> Result<Vec<Item<'a>>, MissionError> {
     let lines = nodes.element_lines();
     let (mut items, mut scans) = (Vec::new(), 0);
-    for (index, (node, line)) in nodes.elements()?.into_iter().zip(lines).enumerate() {
+    for (index, line) in lines.into_iter().enumerate().take(nodes.count()?) {
+        let Some(node) = nodes.element(index).filter(|_| !draft.is_hopeless()) else { break };
         let element = draft.element(format!("mission.items[{index}]"), line, Verdict::Harmless, "");
         let number = items.len() as u64 + 1;
         let kind = match node.member("type").and_then(|kind| kind.text().map(|text| (kind, text))) {

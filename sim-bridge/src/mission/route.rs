@@ -17,13 +17,17 @@ use crate::element::{Element, Verdict};
 const SAME_PLACE_M: f64 = 10_000.0;
 /// A take-off item this near to home takes off from home, in metres.
 const AT_HOME_M: f64 = 1.0;
+/// A landing this near to the last waypoint is there, in metres.
+const SAME_SPOT_M: f64 = 0.1;
 /// Longer legs are flown if that is meant, in metres.
 pub const LONG_LEG_M: f64 = 1000.0;
-/// Neighbours of which one height is above the sea and the other above home differ by no more, unless that is meant,
-/// in metres.
+/// Neighbours of which one height is above the sea and the other above home differ by no more, unless that is
+/// meant, in metres.
 const MIXED_HEIGHTS_M: f64 = 30.0;
 /// Warnings that are listed: to know the line of each takes a walk through the file.
 const MOST_WARNINGS: usize = 100;
+/// Refusals after which no more is looked at: to know the line of each takes a walk through the file.
+const MOST_REFUSALS: usize = 100;
 /// Items and waypoints that jumps and turns may add to those that are written.
 const MOST_ADDED: usize = 10_000;
 /// Corners of a circle that is flown.
@@ -64,13 +68,14 @@ pub struct Draft {
     pub above_terrain: Option<String>,
     pub warnings: Vec<Warning>,
     pub elements: Vec<Element>,
+    refusals: usize,
     /// The first thing that is wrong.
     pub fault: Option<MissionError>,
 }
 
 impl Draft {
-    /// A route from a home in degrees whose height may not be given. It is flown where it is drawn if that is near
-    /// the `known` datum, or else from the world's origin.
+    /// A route from a home in degrees whose height may not be given. It is flown where it is drawn if that is
+    /// near the `known` datum, or else from the world's origin.
     pub fn new(
         latitude: f64,
         longitude: f64,
@@ -100,6 +105,7 @@ impl Draft {
             above_terrain: None,
             warnings: Vec::new(),
             elements: Vec::new(),
+            refusals: 0,
             fault: None,
         }
     }
@@ -123,7 +129,13 @@ impl Draft {
         {
             (element.verdict, element.why) = (Verdict::Refused, error.to_string());
         }
+        self.refusals += 1;
         self.fault.get_or_insert(error);
+    }
+
+    /// So much is wrong that the rest is not looked at.
+    pub fn is_hopeless(&self) -> bool {
+        self.refusals >= MOST_REFUSALS
     }
 
     pub fn warn(&mut self, warning: impl FnOnce() -> Warning) {
@@ -144,9 +156,6 @@ impl Draft {
         if zones.room_m(&at) < 0.0 {
             return Err("a place where `geoFence` lets vehicles fly");
         }
-        if at.z <= 0.0 {
-            return Err("a height above home's ground");
-        }
         self.rally.push(at);
         Ok(())
     }
@@ -164,7 +173,7 @@ impl Draft {
         self.most_waypoints = items.len() + MOST_ADDED;
         let zones = KeepOut::new(self.airspace.clone(), 0.0, 0.0);
         for index in self.order(items) {
-            let Some(item) = items.get(index) else { continue };
+            let Some(item) = items.get(index).filter(|_| !self.is_hopeless()) else { break };
             let before = self.mission.waypoints.len();
             let flown = self.item(item).and_then(|outcome| {
                 self.check_zones(item, before, &zones)?;
@@ -207,6 +216,9 @@ impl Draft {
         let mut steps = 0;
         while let Some(item) = items.get(next) {
             steps += 1;
+            if self.is_hopeless() {
+                break;
+            }
             if steps > items.len() + MOST_ADDED {
                 let expected = format!("at most {MOST_ADDED} items that are flown again");
                 self.refuse(item.element, item.origin.error(Part::Whole, expected, "more"));
@@ -229,7 +241,8 @@ impl Draft {
         order
     }
 
-    /// Refuses an item that leads where the fence does not; `before` is how many waypoints there were before it.
+    /// Refuses an item that leads where the fence does not; `before` is how many waypoints there were before
+    /// it.
     fn check_zones(&self, item: &Item<'_>, before: usize, zones: &KeepOut) -> Result<(), MissionError> {
         let added = self.mission.waypoints.get(before..).unwrap_or_default();
         let Some(Waypoint { position: at, .. }) =
@@ -309,7 +322,8 @@ impl Draft {
         self.push(item, position, hold_s)
     }
 
-    /// The place of an item, at its height; 0, 0 is where the item before it ends, and so is none for a loiter.
+    /// The place of an item, at its height; 0, 0 is where the item before it ends, and so is none for a
+    /// loiter.
     fn position(&mut self, item: &Item<'_>, is_loiter: bool) -> Result<Vector3<f64>, MissionError> {
         let is_none = item.params[4].is_nan() || item.params[5].is_nan();
         let is_here = item.is_unset(4) && item.is_unset(5);
@@ -415,6 +429,10 @@ impl Draft {
                 "none",
             ));
         };
+        // It lands where it is then.
+        if last.is_some() && (self.here() - ground).xy().norm() < SAME_SPOT_M {
+            return Ok(());
+        }
         self.push(item, ground.xy().push(height), 0.0)
     }
 

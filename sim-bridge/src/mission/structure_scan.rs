@@ -1,5 +1,5 @@
-//! QGroundControl's structure scan: level rounds of a structure, one above another. Plans hold its sizes, and not the
-//! waypoints.
+//! QGroundControl's structure scan: level rounds of a structure, one above another. Plans hold its sizes, and
+//! not the waypoints.
 
 use nalgebra::{Vector2, Vector3};
 use skein_mav::Datum;

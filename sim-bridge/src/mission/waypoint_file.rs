@@ -1,4 +1,5 @@
-//! `QGC WPL 110`: the text files of Mission Planner and MAVProxy, a row for each item, of which the first is home.
+//! `QGC WPL 110`: the text files of Mission Planner and MAVProxy, a row for each item, of which the first is
+//! home.
 
 use skein_mav::Datum;
 
@@ -13,7 +14,8 @@ pub const HEADING: &str = "QGC WPL";
 const VERSION: &str = "110";
 const COLUMNS: usize = 12;
 
-/// Reads the rows of a file whose text begins with [`HEADING`]; see [`MissionSet::read`](super::MissionSet::read).
+/// Reads the rows of a file whose text begins with [`HEADING`]; see
+/// [`MissionSet::read`](super::MissionSet::read).
 pub fn read(
     text: &str,
     file: &str,
@@ -38,6 +40,9 @@ pub fn read(
     draft.element("row 0: home".to_owned(), index + 1, Verdict::Honoured, "");
     let mut items = Vec::new();
     for (index, row) in rows {
+        if draft.is_hopeless() {
+            break;
+        }
         let element = draft.element(format!("row {}", items.len() + 1), index + 1, Verdict::Harmless, "");
         match item(row, file, index + 1, element) {
             Ok(item) => {

@@ -58,6 +58,8 @@ pub enum ScenarioError {
         min: Vector3<f64>,
         max: Vector3<f64>,
     },
+    #[error("rally point {} is outside the world, which reaches from {} to {}", place(.position), place(.min), place(.max))]
+    RallyOutside { position: Vector3<f64>, min: Vector3<f64>, max: Vector3<f64> },
     #[error("vehicle {vehicle}: {what} {} is not above the ground: expected a height above 0 m", place(.position))]
     BelowGround { vehicle: usize, what: String, position: Vector3<f64> },
     #[error("vehicle {vehicle}: {what} {} is in a no-fly zone, in a threat or in terrain: no path leads there", place(.position))]

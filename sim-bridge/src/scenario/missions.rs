@@ -10,9 +10,11 @@ use super::layout::SPACING_M;
 use super::placement::{REACH_M, clear_place, is_clear, way_is_clear};
 use super::share::shared;
 use super::{HULL_ROOM_M, SAME_PLACE_M, Scenario, VehiclePlan};
-use crate::mission::{Ends, Mission, Payload};
+use crate::mission::write::Surroundings;
+use crate::mission::{Ends, Mission, Payload, Waypoint};
 
-/// Clearance of the straight line from a mission's own start or goal to the place a vehicle gets instead, in metres.
+/// Clearance of the straight line from a mission's own start or goal to the place a vehicle gets instead, in
+/// metres.
 const DETOUR_CLEARANCE_M: f64 = 1.0;
 /// Distance of starts and goals from closed places, in metres: paths keep off them by less.
 const OPEN_M: f64 = 1.5;
@@ -22,10 +24,11 @@ const REST_S: f64 = 120.0;
 
 /// Gives each vehicle its mission; a single one is flown by all in trail, and its surveys are shared.
 ///
-/// In trail the vehicles stand 3 m behind one another before take-off, against the first leg's direction, and land 3 m
-/// behind one another along the last leg, the first farthest. Places that are too near an obstacle, the bounds or
-/// another vehicle's are moved to the nearest that are not, unless the mission is [`exact`](Mission::exact), and noted.
-/// Bounds that nobody stated grow to hold the missions, and the time limit to last for them.
+/// In trail the vehicles stand 3 m behind one another before take-off, against the first leg's direction, and
+/// land 3 m behind one another along the last leg, the first farthest. Places that are too near an obstacle,
+/// the bounds or another vehicle's are moved to the nearest that are not, unless the mission is
+/// [`exact`](Mission::exact), and noted. Bounds that nobody stated grow to hold the missions, and the time
+/// limit to last for them.
 ///
 /// # Errors
 /// [`ScenarioError::MissionCount`] for several missions but fewer than vehicles; [`ScenarioError::NoRoom`].
@@ -92,7 +95,8 @@ fn keep_less(scenario: &mut Scenario) {
     scenario.separation_hulls = pairs().map(apart).fold(scenario.separation_hulls, f64::min);
 }
 
-/// Take-off height: the lowest that any mission asks for. Cruise speed: the fastest. Each leg has its own below that.
+/// Take-off height: the lowest that any mission asks for. Cruise speed: the fastest. Each leg has its own
+/// below that.
 fn tune(scenario: &mut Scenario, missions: &[&Mission]) {
     let lowest = missions.iter().filter_map(|m| m.takeoff_height_m).min_by(f64::total_cmp);
     scenario.takeoff_height_m = lowest.unwrap_or(scenario.takeoff_height_m);
@@ -154,14 +158,51 @@ fn lasts_s(mission: &Mission, usual_m_s: f64) -> f64 {
     legs.sum::<f64>() + back_s + mission.delay_s
 }
 
+impl Scenario {
+    /// The mission that a vehicle flies, as a plan says it.
+    pub fn mission_of(&self, vehicle: &VehiclePlan) -> Mission {
+        let errand = |before: usize| vehicle.errands.iter().find(|errand| errand.before == before);
+        let stay_s = |before: usize| errand(before).map_or(0.0, |errand| errand.stay_s);
+        let told = |before: usize| {
+            let commands = errand(before).map(|errand| &errand.payload[..]).unwrap_or_default();
+            commands.iter().map(|one| Payload { command: one.command.into(), params: one.params }).collect()
+        };
+        let cruise_m_s = self.cruise_speed_m_s.min(vehicle.model.max_speed_m_s) * vehicle.pace;
+        let waypoint = |(index, position): (usize, &Vector3<f64>)| Waypoint {
+            position: *position,
+            hold_s: stay_s(index + 1),
+            speed_m_s: Some(errand(index).and_then(|errand| errand.speed_m_s).unwrap_or(cruise_m_s)),
+            payload: told(index),
+            scan: None,
+        };
+        let returns = (vehicle.goal() - vehicle.start).xy().norm() < SAME_PLACE_M;
+        let count = vehicle.waypoints.len();
+        let flown = if returns { count.saturating_sub(1) } else { count };
+        Mission {
+            home: vehicle.start,
+            waypoints: vehicle.waypoints.iter().take(flown).enumerate().map(waypoint).collect(),
+            ends: if returns && flown > 0 { Ends::Return } else { Ends::Land },
+            takeoff_height_m: Some(self.takeoff_height_m),
+            delay_s: stay_s(0),
+            last_payload: told(flown),
+            ..Mission::default()
+        }
+    }
+
+    /// Where on earth it is flown, within what, and where else vehicles may land.
+    pub fn surroundings(&self) -> Surroundings<'_> {
+        Surroundings { datum: self.scene.datum(), airspace: &self.airspace, rally: &self.rally }
+    }
+}
+
 /// Whether the geofence and other zones leave a place free, with some room.
 fn is_open(scenario: &Scenario) -> impl Fn(&Vector3<f64>) -> bool + use<> {
     let zones = KeepOut::new(scenario.airspace.clone(), OPEN_M, 0.0);
     move |place| zones.room_m(place) >= 0.0
 }
 
-/// Where a vehicle whose mission ends with a return lands: the nearest of its start and the rally points that no
-/// other vehicle has.
+/// Where a vehicle whose mission ends with a return lands: the nearest of its start and the rally points that
+/// no other vehicle has.
 fn returns_to(start: Vector3<f64>, from: Vector3<f64>, free: &mut Vec<Vector3<f64>>) -> Vector3<f64> {
     let away_m = |place: &Vector3<f64>| (place - from).xy().norm();
     let nearest = free.iter().enumerate().min_by(|a, b| away_m(a.1).total_cmp(&away_m(b.1)));

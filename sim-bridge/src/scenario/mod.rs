@@ -215,7 +215,7 @@ pub struct Overrides {
     /// A Gazebo world (SDF) or a list of boxes (.csv) in place of the scenario's world.
     #[arg(long, value_name = "FILE")]
     pub world: Option<PathBuf>,
-    /// A QGroundControl plan, `QGC WPL 110` file or LSC mission; one that all fly in trail, or one for each vehicle.
+    /// A QGroundControl plan, `QGC WPL 110` file, KML, GeoJSON or LSC mission; one that all fly in trail, or one for each vehicle.
     #[arg(long = "mission", value_name = "FILE")]
     pub missions: Vec<PathBuf>,
     #[command(flatten)]
@@ -459,7 +459,13 @@ impl Scenario {
             self.check_start(i + 1, vehicle)?;
             self.check_waypoints(i + 1, vehicle, &zones)?;
         }
-        self.check_ends()
+        let bounds = self.scene.bounds();
+        match self.rally.iter().find(|point| !bounds.contains(point)) {
+            Some(&position) => {
+                Err(ScenarioError::RallyOutside { position, min: bounds.min, max: bounds.max })
+            }
+            None => self.check_ends(),
+        }
     }
 
     fn check_start(&self, number: usize, vehicle: &VehiclePlan) -> Result<(), ScenarioError> {
@@ -596,7 +602,8 @@ impl Scenario {
         if self.fixed_bounds {
             return;
         }
-        let places = self.vehicles.iter().flat_map(|v| v.waypoints.iter().chain([&v.start]));
+        let routes = self.vehicles.iter().flat_map(|v| v.waypoints.iter().chain([&v.start]));
+        let places = routes.chain(&self.rally);
         let around = |place: &Vector3<f64>| Aabb { min: *place, max: *place }.grown(ROUTE_MARGIN);
         let mut bounds = *self.scene.bounds();
         let floor = bounds.min.z;

@@ -1,4 +1,5 @@
-//! One mission for several vehicles: all fly its waypoints in trail, and each a piece of its surveys and scans.
+//! One mission for several vehicles: all fly its waypoints in trail, and each a piece of its surveys and
+//! scans.
 
 use crate::mission::{Mission, Waypoint};
 
@@ -114,6 +115,6 @@ mod tests {
             assert_eq!(mission.waypoints.first(), Some(&at(-10.0, 0.0, None)));
             assert_eq!(mission.waypoints.last().map(|w| w.position.y), Some(-9.0));
         }
-        assert_eq!(own[0].waypoints[2].position, own[1].waypoints[1].position);
+        assert_eq!(own[0].waypoints[3].position, own[1].waypoints[1].position);
     }
 }

@@ -1,5 +1,5 @@
-//! The mission protocol at the autopilot's end: it keeps a mission, a geofence and rally points, hands them out, and takes
-//! in new ones.
+//! The mission protocol at the autopilot's end: it keeps a mission, a geofence and rally points, hands them
+//! out, and takes in new ones.
 
 use std::time::Duration;
 
@@ -11,8 +11,8 @@ use mavlink::dialects::common::{
 use crate::frame::{Address, FrameWriter};
 use crate::mission::{MissionItem, MissionReceiver, is_mission, write_ack, write_count};
 
-/// The lists, and the transfer under way, if any: there is one at a time, so that nobody is told of a list that another
-/// station changes meanwhile.
+/// The lists, and the transfer under way, if any: there is one at a time, so that nobody is told of a list
+/// that another station changes meanwhile.
 #[derive(Debug, Clone)]
 pub(super) struct Missions {
     mission: Vec<MissionItem>,
@@ -176,8 +176,8 @@ impl Missions {
         self.upload.take_if(|upload| is_over && upload.from == from && upload.kind == message.mission_type);
     }
 
-    /// `MISSION_CLEAR_ALL`: denied while another station uploads. A station's own upload ends with it. Returns what has
-    /// changed.
+    /// `MISSION_CLEAR_ALL`: denied while another station uploads. A station's own upload ends with it.
+    /// Returns what has changed.
     pub(super) fn on_clear(
         &mut self,
         from: Address,

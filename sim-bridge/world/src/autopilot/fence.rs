@@ -23,7 +23,8 @@ enum Zone {
 }
 
 impl GeoFence {
-    /// The zones of uploaded items; `None` if these are none: polygons are as many corners in a row as each of them says.
+    /// The zones of uploaded items; `None` if these are none: polygons are as many corners in a row as each
+    /// of them says.
     pub(super) fn read(mut items: &[MissionItem], datum: &Datum) -> Option<Self> {
         let mut fence = Self::default();
         while let Some(first) = items.first() {
