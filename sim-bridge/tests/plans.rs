@@ -626,3 +626,14 @@ fn the_samples_are_sound_and_flown() {
         assert_eq!((summary.reason, summary.collisions.obstacle), (None, 0), "{plan}");
     }
 }
+
+#[test]
+fn a_plan_is_flown_high_above_where_it_takes_off_and_no_higher_than_maps_reach() {
+    let items = [takeoff(3.0), waypoint(20.0, 0.0, 60.0), waypoint(20.0, 20.0, 90.0), home()];
+    let flown = fly(&plan(&HOME, &items), 1, "");
+    assert_eq!(flown.summary.reason, None);
+    assert!(flown.ways[0].iter().any(|at| at.z > 89.0));
+    let error =
+        scenario(&plan(&HOME, &[takeoff(3.0), waypoint(20.0, 0.0, 200.0)]), 1, "").expect_err("too high");
+    assert!(error.to_string().starts_with("a mission goes 200 m above its home"), "{error}");
+}

@@ -58,6 +58,10 @@ pub enum ScenarioError {
         min: Vector3<f64>,
         max: Vector3<f64>,
     },
+    #[error(
+        "a mission goes {highest_m:.0} m above its home: expected at most {limit_m:.0} m, which a vehicle's map spans"
+    )]
+    TooHigh { highest_m: f64, limit_m: f64 },
     #[error("rally point {} is outside the world, which reaches from {} to {}", place(.position), place(.min), place(.max))]
     RallyOutside { position: Vector3<f64>, min: Vector3<f64>, max: Vector3<f64> },
     #[error("vehicle {vehicle}: {what} {} is not above the ground: expected a height above 0 m", place(.position))]

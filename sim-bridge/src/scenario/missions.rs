@@ -1,6 +1,7 @@
 //! Missions into a scenario: who flies what, from where, and where each lands.
 
 use nalgebra::Vector3;
+use skein_agent::pipeline::perception::TALLEST_WINDOW_M;
 use skein_agent::{Errand, PayloadCommand};
 use skein_planning::airspace::KeepOut;
 use skein_world::{Scene, VehicleModel};
@@ -43,6 +44,7 @@ pub fn apply_missions(scenario: &mut Scenario, missions: Vec<Mission>) -> Result
         _ => missions,
     };
     let assigned: Vec<&Mission> = own.iter().take(vehicles).collect();
+    check_heights(&assigned)?;
     tune(scenario, &assigned);
     for (rank, (vehicle, mission)) in scenario.vehicles.iter_mut().zip(&assigned).enumerate() {
         let behind = if trail { rank as f64 * SPACING_M } else { 0.0 };
@@ -93,6 +95,16 @@ fn keep_less(scenario: &mut Scenario) {
         least_m.max(hulls_m + HULL_ROOM_M) / one.model.hull_radius_m.max(two.model.hull_radius_m)
     };
     scenario.separation_hulls = pairs().map(apart).fold(scenario.separation_hulls, f64::min);
+}
+
+/// Refuses heights that no vehicle's map spans, from where it takes off.
+fn check_heights(missions: &[&Mission]) -> Result<(), ScenarioError> {
+    let highest = missions.iter().flat_map(|mission| &mission.waypoints).map(|w| w.position.z);
+    let highest_m = highest.fold(0.0, f64::max);
+    if highest_m > TALLEST_WINDOW_M {
+        return Err(ScenarioError::TooHigh { highest_m, limit_m: TALLEST_WINDOW_M });
+    }
+    Ok(())
 }
 
 /// Take-off height: the lowest that any mission asks for. Cruise speed: the fastest. Each leg has its own
