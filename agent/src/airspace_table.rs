@@ -2,7 +2,9 @@
 
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
-use skein_planning::airspace::{Airspace, HeightGrid, Mountain, NoFlyPrism, NoFlyZone, ThreatZone};
+use skein_planning::airspace::{
+    Airspace, Area, HeightGrid, Mountain, NoFlyPrism, NoFlyZone, StayInside, ThreatZone,
+};
 
 /// Terrain, threats and no-fly zones; metres east, north and up of the world's origin.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -14,6 +16,8 @@ pub struct AirspaceTable {
     pub threat: Vec<ThreatTable>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub no_fly: Vec<NoFlyTable>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stay_inside: Vec<StayInsideTable>,
     /// Heights of the ground.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub terrain: Option<TerrainTable>,
@@ -51,6 +55,13 @@ pub struct NoFlyTable {
     floor_m: f64,
     #[serde(default = "highest_m", skip_serializing_if = "is_infinite")]
     ceiling_m: f64,
+}
+
+/// Areas of which the vehicle stays inside one; each is described as a no-fly zone is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StayInsideTable {
+    any_of: Vec<NoFlyTable>,
 }
 
 /// Heights on a grid; see [`HeightGrid`].
@@ -113,7 +124,16 @@ impl AirspaceTable {
             airspace.threats.push(ThreatZone { centre: table.centre_m.into(), radius_m: table.radius_m });
         }
         for (index, table) in self.no_fly.iter().enumerate() {
-            table.add_to(&mut airspace, || format!("no_fly[{index}]"))?;
+            match table.area(|| format!("no_fly[{index}]"))? {
+                Area::Round(zone) => airspace.no_fly.push(zone),
+                Area::Cornered(zone) => airspace.prisms.push(zone),
+            }
+        }
+        for (index, table) in self.stay_inside.iter().enumerate() {
+            let field = || format!("stay_inside[{index}]");
+            require(!table.any_of.is_empty(), field, "expected at least one area in `any_of`")?;
+            let any_of = table.any_of.iter().map(|area| area.area(field)).collect::<Result<_, _>>()?;
+            airspace.stay_inside.push(StayInside { any_of });
         }
         if let Some(TerrainTable { corner_m, spacing_m, heights_m }) = &self.terrain {
             let grid = HeightGrid::new((*corner_m).into(), *spacing_m, heights_m);
@@ -128,20 +148,10 @@ impl AirspaceTable {
 
     /// The table that describes an airspace.
     pub fn of(airspace: &Airspace) -> AirspaceTable {
-        let round = airspace.no_fly.iter().map(|zone| NoFlyTable {
-            centre_m: Some(zone.centre.into()),
-            radius_m: Some(zone.radius_m),
-            corners_m: Vec::new(),
-            floor_m: zone.floor_m,
-            ceiling_m: zone.ceiling_m,
-        });
-        let cornered = airspace.prisms.iter().map(|zone| NoFlyTable {
-            centre_m: None,
-            radius_m: None,
-            corners_m: zone.corners.iter().map(|corner| (*corner).into()).collect(),
-            floor_m: zone.floor_m,
-            ceiling_m: zone.ceiling_m,
-        });
+        let round = airspace.no_fly.iter().map(NoFlyTable::round);
+        let cornered = airspace.prisms.iter().map(NoFlyTable::cornered);
+        let inside =
+            |zone: &StayInside| StayInsideTable { any_of: zone.any_of.iter().map(NoFlyTable::of).collect() };
         let mountain = |mountain: &Mountain| MountainTable {
             centre_m: mountain.centre.into(),
             height_m: mountain.height_m,
@@ -153,6 +163,7 @@ impl AirspaceTable {
             mountain: airspace.mountains.iter().map(mountain).collect(),
             threat: airspace.threats.iter().map(threat).collect(),
             no_fly: round.chain(cornered).collect(),
+            stay_inside: airspace.stay_inside.iter().map(inside).collect(),
             terrain: airspace.heights.as_ref().map(|heights| TerrainTable {
                 corner_m: heights.corner().into(),
                 spacing_m: heights.spacing_m(),
@@ -163,24 +174,45 @@ impl AirspaceTable {
 }
 
 impl NoFlyTable {
-    fn add_to(&self, airspace: &mut Airspace, field: impl Fn() -> String) -> Result<(), AirspaceError> {
+    fn round(zone: &NoFlyZone) -> Self {
+        let NoFlyZone { centre, radius_m, floor_m, ceiling_m } = *zone;
+        let corners_m = Vec::new();
+        Self { centre_m: Some(centre.into()), radius_m: Some(radius_m), corners_m, floor_m, ceiling_m }
+    }
+
+    fn cornered(zone: &NoFlyPrism) -> Self {
+        let corners_m = zone.corners.iter().map(|corner| (*corner).into()).collect();
+        let (floor_m, ceiling_m) = (zone.floor_m, zone.ceiling_m);
+        Self { centre_m: None, radius_m: None, corners_m, floor_m, ceiling_m }
+    }
+
+    fn of(area: &Area) -> Self {
+        match area {
+            Area::Round(zone) => Self::round(zone),
+            Area::Cornered(zone) => Self::cornered(zone),
+        }
+    }
+
+    fn area(&self, field: impl Fn() -> String) -> Result<Area, AirspaceError> {
         let (floor_m, ceiling_m) = (self.floor_m, self.ceiling_m);
         require(floor_m < ceiling_m, &field, "expected `floor_m` below `ceiling_m`")?;
         match (self.centre_m, self.radius_m, &self.corners_m[..]) {
             (Some(centre_m), Some(radius_m), []) => {
                 let is_sound = is_finite(&centre_m) && is_length(radius_m);
                 require(is_sound, &field, "expected a centre, and a radius above 0")?;
-                airspace.no_fly.push(NoFlyZone { centre: centre_m.into(), radius_m, floor_m, ceiling_m });
+                Ok(Area::Round(NoFlyZone { centre: centre_m.into(), radius_m, floor_m, ceiling_m }))
             }
             (None, None, corners_m) if !corners_m.is_empty() => {
                 let is_sound = corners_m.len() > 2 && corners_m.iter().all(is_finite);
                 require(is_sound, &field, "expected three corners or more")?;
                 let corners = corners_m.iter().map(|corner| Vector2::from(*corner)).collect();
-                airspace.prisms.push(NoFlyPrism { corners, floor_m, ceiling_m });
+                Ok(Area::Cornered(NoFlyPrism { corners, floor_m, ceiling_m }))
             }
-            _ => require(false, &field, "expected either `centre_m` and `radius_m` or `corners_m`")?,
+            _ => Err(AirspaceError {
+                field: field(),
+                problem: "expected either `centre_m` and `radius_m` or `corners_m`".to_owned(),
+            }),
         }
-        Ok(())
     }
 }
 
@@ -212,6 +244,8 @@ mod tests {
         table.no_fly.extend(no_fly(None, None, &[[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]]).no_fly);
         table.threat = vec![ThreatTable { centre_m: [7.0, 8.0], radius_m: 2.0 }];
         table.mountain = vec![MountainTable { centre_m: [5.0, 5.0], height_m: 6.0, slope_m: [1.0, 2.0] }];
+        table.stay_inside =
+            vec![StayInsideTable { any_of: no_fly(Some([0.0, 0.0]), Some(90.0), &[]).no_fly }];
         let heights_m = vec![vec![0.0, 1.0], vec![2.0, 3.0]];
         table.terrain = Some(TerrainTable { corner_m: [0.0, 0.0], spacing_m: 5.0, heights_m });
         let airspace = table.check().unwrap();
@@ -230,5 +264,8 @@ mod tests {
         ] {
             assert_eq!(wrong.check().unwrap_err().field, "no_fly[0]");
         }
+        let nowhere = vec![StayInsideTable { any_of: Vec::new() }];
+        let wrong = AirspaceTable { stay_inside: nowhere, ..AirspaceTable::default() };
+        assert_eq!(wrong.check().unwrap_err().field, "stay_inside[0]");
     }
 }

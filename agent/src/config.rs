@@ -12,6 +12,7 @@ use skein_planning::airspace::Airspace;
 use skein_wire::event::Catalogue;
 
 use crate::bthreads::LinkLossPolicy;
+use crate::errand::Errand;
 use crate::field::{number, optional_positive, positive, within};
 
 /// An axis-aligned box, metres ENU.
@@ -179,6 +180,10 @@ pub struct AgentConfig {
     pub home: [f64; 3],
     /// Waypoints, metres ENU; the vehicle lands at the last.
     pub waypoints: Vec<[f64; 3]>,
+    /// Stays, speeds and commands to what it carries, on the way.
+    pub errands: Vec<Errand>,
+    /// Where it may land instead of at home when it returns, metres ENU, at the height of the way there.
+    pub rally: Vec<[f64; 3]>,
     /// Height above home to climb to before the mission begins, m.
     pub takeoff_height_m: f64,
     /// Height in the world at which this vehicle returns, m; different for every vehicle.

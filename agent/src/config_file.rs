@@ -19,6 +19,7 @@ use crate::airspace_table::AirspaceTable;
 use crate::autopilot_link::Address;
 use crate::bthreads::LinkLossPolicy;
 use crate::config::{AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, Planners, PositionSource};
+use crate::errand::Errand;
 use crate::field;
 
 /// The file, field by field. What is never written keeps its default in files that are made.
@@ -98,12 +99,16 @@ pub struct DatumTable {
 pub struct Mission {
     pub home: [f64; 3],
     pub waypoints: Vec<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rally: Vec<[f64; 3]>,
     #[serde(default = "takeoff_height_m", deserialize_with = "field::positive")]
     pub takeoff_height_m: f64,
     #[serde(default = "return_altitude_m", deserialize_with = "field::positive")]
     pub return_altitude_m: f64,
     #[serde(default)]
     pub without_ground: LinkLossPolicy,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub errand: Vec<Errand>,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -211,9 +216,11 @@ impl AgentFile {
             mission: Mission {
                 home: agent.home,
                 waypoints: agent.waypoints.clone(),
+                rally: agent.rally.clone(),
                 takeoff_height_m: agent.takeoff_height_m,
                 return_altitude_m: agent.return_altitude_m,
                 without_ground: agent.link_loss,
+                errand: agent.errands.clone(),
             },
             script: Vec::new(),
             behaviours: agent.behaviours.settings(&agent.node),
@@ -254,6 +261,8 @@ impl AgentFile {
             datum: self.datum.into(),
             home: self.mission.home,
             waypoints: self.mission.waypoints,
+            errands: self.mission.errand,
+            rally: self.mission.rally,
             takeoff_height_m: self.mission.takeoff_height_m,
             return_altitude_m: self.mission.return_altitude_m,
             position: self.position,
@@ -321,6 +330,9 @@ impl Mission {
         );
         for (number, point) in (1..).zip(&self.waypoints) {
             ensure!(inside(*point), "`mission.waypoints`: number {number}, {point:?}, is outside the fence");
+        }
+        for (number, point) in (1..).zip(&self.rally) {
+            ensure!(inside(*point), "`mission.rally`: number {number}, {point:?}, is outside the fence");
         }
         ensure!(inside(self.home), "`mission.home`, {:?}, is outside the fence", self.home);
         let [x, y, z] = self.home;

@@ -33,7 +33,11 @@ use crate::{
     },
     positioning::{Estimate, Motion, Positioning, excess_m},
     preflight::{Failsafes, HandlingParameters, Others, Preflight, Situation, degrees},
+<<<<<<< HEAD
     rank::goes_before,
+=======
+    refuge::Refuge,
+>>>>>>> plans
     report::Report,
     scripts::Circumstances,
     watches::Watches,
@@ -84,6 +88,7 @@ pub struct Control {
     perception: Perception,
     neighbours: Neighbours,
     watches: Watches,
+    refuge: Refuge,
     energy: Energy,
     guidance: Guidance,
     heading: Heading,
@@ -127,6 +132,7 @@ impl Control {
             perception: Perception::of_mission(&config)?,
             neighbours: Neighbours::new(name.clone(), config.incarnation, config.roster.len()),
             watches: Watches::default(),
+            refuge: Refuge::new([config.home[0], config.home[1], config.return_altitude_m], &config.rally),
             energy: Energy::new(config.clone()),
             guidance: Guidance::new(config.envelope, layers),
             heading: Heading::new(config.planners.nose),
@@ -278,7 +284,7 @@ impl Control {
     fn watch(&mut self, now: Duration, reports: &mut Vec<Report>) {
         let charge = known_charge(now, self.companion.telemetry().battery);
         self.watch_energy(now, charge, reports);
-        let fence = &self.config.fence;
+        let AgentConfig { fence, airspace, .. } = &*self.config;
         let (telemetry, estimate) = (self.companion.telemetry(), self.estimate);
         let around = self.neighbours.around();
         reports.extend(self.preflight.update(&Situation {
@@ -305,8 +311,9 @@ impl Control {
             let position = motion.value.position;
             let sigma_m = motion.value.position_sigma_m();
             reports.extend(self.watches.doubt(self.doubt.as_deref(), sigma_m));
-            reports.extend(self.watches.fence(&motion.value, fence));
+            reports.extend(self.watches.fence(&motion.value, fence, &airspace.stay_inside));
             reports.extend(self.watches.separation(position, around));
+            reports.extend(self.refuge.look(&self.name, &position, around, self.guidance.goes_home()));
         } else {
             self.watches.stand();
         }

@@ -19,6 +19,7 @@ pub mod config_file;
 mod control;
 mod core;
 mod energy;
+mod errand;
 pub mod field;
 mod flight;
 mod instruction;
@@ -32,6 +33,7 @@ pub mod positioning;
 pub mod precedence;
 mod preflight;
 mod rank;
+mod refuge;
 mod report;
 mod safety;
 pub mod scripts;
@@ -50,6 +52,7 @@ pub use self::{
     },
     control::SetPointRecord,
     core::{AgentCore, Status},
+    errand::{Errand, LONGEST_STAY_S, PayloadCommand, SLOWEST_M_S},
     flight::FlightPhase,
     instruction::Waypoint,
     me::Me,

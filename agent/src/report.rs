@@ -2,14 +2,15 @@
 
 use std::time::Duration;
 
+use nalgebra::Vector3;
 use skein_bp::Event;
 use skein_dbp::NodeName;
 use skein_mav::FlightMode;
 use skein_wire::event::{
     Airborne, Arrived, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed, Cornered,
     FenceBreached, FoundAirborne, InTheWay, Landed, Leave, OrderTaken, OutOfTheWay, PathBlocked, PilotTook,
-    PlaceFree, PlaceTaken, Planned, PositionDoubted, PositionTrusted, Ready, Right, Slept, Stuck, TooClose,
-    Unplannable, Unready, What,
+    PlaceFree, PlaceTaken, Planned, PositionDoubted, PositionTrusted, Ready, Refuge, Right, Slept, Stuck,
+    TooClose, Unplannable, Unready, What,
 };
 
 use crate::energy::Changed;
@@ -82,6 +83,8 @@ pub enum Report {
     },
     /// Nobody does any more.
     PlaceFree,
+    /// A return would end here, in world ENU, m.
+    Refuge(Vector3<f64>),
     /// The path runs into something.
     PathBlocked,
     /// The vehicle makes no progress in spite of leave to move.
@@ -131,6 +134,7 @@ impl Report {
                 me.event(PlaceTaken { leg, by: by.as_str().into(), leaves })
             }
             Self::PlaceFree => me.event(PlaceFree),
+            Self::Refuge(at) => me.event(Refuge { x: at.x, y: at.y, z: at.z }),
             Self::PathBlocked => me.event(PathBlocked),
             Self::Stuck => me.event(Stuck),
             Self::Passage(stretch) => match stretch.passage() {

@@ -1,6 +1,7 @@
 //! Watches: conditions of the vehicle that are reported at the moment they change.
 
 use nalgebra::Vector3;
+use skein_planning::airspace::StayInside;
 
 use crate::config::Fence;
 use crate::neighbours::Neighbour;
@@ -86,13 +87,16 @@ impl Watches {
         self.doubted = Edge::default();
     }
 
-    /// Geofence: the vehicle is outside, by more than its position may be off.
-    pub fn fence(&mut self, motion: &Motion, fence: &Fence) -> Option<Report> {
-        let outside = (0..3).any(|axis| {
-            let tolerance_m = FENCE_TOLERANCE_M + excess_m(motion.axis_sigma_m(axis));
-            motion.position[axis] < fence.min[axis] - tolerance_m
-                || motion.position[axis] > fence.max[axis] + tolerance_m
-        });
+    /// Geofence: the vehicle is outside of its box, or of where it is to stay, by more than its position may be off.
+    pub fn fence(&mut self, motion: &Motion, fence: &Fence, stay_inside: &[StayInside]) -> Option<Report> {
+        let off_m = FENCE_TOLERANCE_M + excess_m(motion.position_sigma_m());
+        let has_left = stay_inside.iter().any(|area| area.room_m(&motion.position) < -off_m);
+        let outside = has_left
+            || (0..3).any(|axis| {
+                let tolerance_m = FENCE_TOLERANCE_M + excess_m(motion.axis_sigma_m(axis));
+                motion.position[axis] < fence.min[axis] - tolerance_m
+                    || motion.position[axis] > fence.max[axis] + tolerance_m
+            });
         self.outside.rises(outside).then_some(Report::FenceBreached)
     }
 

@@ -3,13 +3,14 @@
 use std::time::Duration;
 
 use skein_agent::{
-    AgentConfig, Envelope, Fence, Me, Planners,
+    AgentConfig, Envelope, Errand, Fence, Me, PayloadCommand, Planners,
     bthreads::{self, HOLDING_LASTS, Holder, LinkLossPolicy},
 };
 use skein_bp::{Bid, Event, EventSet, Program, ProgramConfig};
 use skein_dbp::NodeName;
 use skein_dbp::facts::{BlockLapsed, Confirmed, DuplicateName, PeerJoined, PeerLost, Stalled};
 use skein_mav::Datum;
+use skein_wire::Limits;
 use skein_wire::event::*;
 
 /// Its number follows 9 as a number, not as a text.
@@ -33,6 +34,8 @@ fn config() -> AgentConfig {
         datum: Datum::from_degrees(47.4, 8.5, 400.0),
         home: [1.0, 2.0, 0.0],
         waypoints: vec![[10.0, 0.0, 2.0], [10.0, 10.0, 2.0]],
+        errands: Vec::new(),
+        rally: Vec::new(),
         takeoff_height_m: 2.0,
         return_altitude_m: RETURN_ALTITUDE_M,
         position: Default::default(),
@@ -186,6 +189,46 @@ mod mission {
             assert_eq!(vehicle.reports(Landed::NAME), ["landed", "complete"]);
             assert_eq!(vehicle.after(10 * SECOND), NOTHING);
         }
+    }
+
+    #[test]
+    fn stays_tells_what_it_carries_and_slows_down_between_waypoints() {
+        let picture = |command| PayloadCommand { command, params: [5.0, f64::NAN, 1.0, 0.0, 0.0, 0.0, 0.0] };
+        let errands = vec![
+            Errand {
+                before: 1,
+                stay_s: 10.0,
+                speed_m_s: Some(1.5),
+                payload: vec![picture(206), picture(2000)],
+            },
+            Errand { before: 2, stay_s: 3.0, ..Errand::default() },
+        ];
+        let mut vehicle = Vehicle::in_the_air(&AgentConfig { errands, ..config() });
+        let limit = |vehicle: &Vehicle| Limits::of(ME, vehicle.program.stated()).speed_m_s();
+        vehicle.reports(Planned::NAME);
+        assert_eq!(limit(&vehicle), f64::INFINITY);
+        assert_eq!(vehicle.arrives(0), ["arrived 0"]);
+        assert_eq!(vehicle.after(9 * SECOND), NOTHING);
+        assert_eq!(vehicle.after(SECOND), ["payload", "payload", "goto 1", "plan: waypoint"]);
+        let told = Payload::read(vehicle.last(Payload::NAME)).unwrap();
+        assert_eq!((told.command, told.param1, told.param2, told.param3), (2000, Some(5.0), None, Some(1.0)));
+        assert_eq!(limit(&vehicle), 1.5);
+        vehicle.reports(Planned::NAME);
+        assert_eq!(vehicle.arrives(1), ["arrived 1"]);
+        assert_eq!(limit(&vehicle), f64::INFINITY);
+        assert_eq!(vehicle.after(3 * SECOND), ["land: mission complete"]);
+    }
+
+    #[test]
+    fn a_stay_ends_with_an_order_and_the_mission_goes_on_after_it() {
+        let errands = vec![Errand { before: 1, stay_s: 10.0, ..Errand::default() }];
+        let mut vehicle = Vehicle::in_the_air(&AgentConfig { errands, ..config() });
+        vehicle.reports(Planned::NAME);
+        vehicle.arrives(0);
+        vehicle.is_ordered(What::Return);
+        vehicle.reports(Planned::NAME);
+        assert_eq!(vehicle.after(20 * SECOND).iter().filter(|event| event.starts_with("goto")).count(), 0);
+        assert_eq!(vehicle.arrives(-1), ["arrived -1", "land: ordered by the operator"]);
     }
 
     #[test]
@@ -536,6 +579,30 @@ mod geofence {
         vehicle.reports(Planned::NAME);
         assert_eq!(vehicle.arrives(-1), ["arrived -1", "land: outside the geofence"]);
         assert_eq!(vehicle.reports(Landed::NAME), ["landed", "failed: outside the geofence"]);
+    }
+}
+
+mod rally {
+    use super::*;
+
+    fn told(vehicle: &mut Vehicle, x: f64) {
+        assert_eq!(vehicle.hears(Refuge { x, y: 1.0, z: 6.0 }.at(ME)), ["refuge"]);
+    }
+
+    #[test]
+    fn a_return_leads_to_the_place_that_was_told_last() {
+        let mut vehicle = Vehicle::on_its_way();
+        told(&mut vehicle, 15.0);
+        told(&mut vehicle, 17.0);
+        vehicle.is_ordered(What::Return);
+        let leads_to =
+            |vehicle: &Vehicle| Goto::read(vehicle.last(Goto::NAME)).map(|goto| (goto.leg, goto.x));
+        assert_eq!(leads_to(&vehicle), Some((-1, 17.0)));
+        vehicle.reports(Planned::NAME);
+        let elsewhere = Refuge { x: 15.0, y: 1.0, z: 6.0 }.at(ME);
+        assert_eq!(vehicle.hears(elsewhere), ["refuge", "goto -1", "plan: waypoint"]);
+        assert_eq!(leads_to(&vehicle), Some((-1, 15.0)));
+        assert_eq!(vehicle.arrives(-1), ["arrived -1", "land: ordered by the operator"]);
     }
 }
 

@@ -7,7 +7,8 @@ use serde::Serialize;
 use skein_bp::behaviour::Behaviours;
 use skein_world::Scene;
 
-use crate::mission::{self, MissionSet};
+use crate::element::Element;
+use crate::mission::{self, Allowances, MissionSet};
 use crate::scenario::{Overrides, Scenario, ScenarioError, read_world};
 
 /// The findings in a sound file.
@@ -21,6 +22,8 @@ pub struct Findings {
     pub holds: String,
     /// Parts that have no effect or give way.
     pub warnings: Vec<String>,
+    /// What becomes of each of its elements.
+    pub elements: Vec<Element>,
 }
 
 impl fmt::Display for Findings {
@@ -30,21 +33,26 @@ impl fmt::Display for Findings {
     }
 }
 
-/// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`), a mission (`.plan`, `.json`), or
-/// else a scenario; `thin_solids` may be in its way.
-pub fn check(file: &Path, thin_solids: bool, known: &Behaviours) -> Result<Findings, ScenarioError> {
-    let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase());
+/// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`), a mission (`.plan`, `.waypoints`,
+/// `.kml`, `.geojson`, `.json`), or else a scenario; `thin_solids` may be in its way.
+pub fn check(
+    file: &Path,
+    allowances: Allowances,
+    thin_solids: bool,
+    known: &Behaviours,
+) -> Result<Findings, ScenarioError> {
+    let extension = extension(file);
     let (kind, holds, warnings) = match extension.as_deref() {
         Some("sdf" | "world" | "csv") => {
             let (scene, warnings) = read_world(file)?;
             ("world", world(&scene), warnings)
         }
-        Some("plan" | "json") => {
-            let set = mission::read_files(&[file.to_owned()], None)?;
-            ("mission", missions(&set), set.warnings.iter().map(ToString::to_string).collect())
+        Some("plan" | "waypoints" | "mission" | "txt" | "json" | "geojson" | "kml") => {
+            let set = mission::read_files(&[file.to_owned()], None, allowances)?;
+            ("mission", missions(&set), notes(file, &set, allowances, known)?)
         }
         _ => {
-            let overrides = Overrides { thin_solids, ..Overrides::default() };
+            let overrides = Overrides { thin_solids, allowances, ..Overrides::default() };
             let scenario = Scenario::open_with(&file.to_string_lossy(), &overrides, 1, known)?;
             if !thin_solids {
                 scenario.check_thin_solids()?;
@@ -53,7 +61,44 @@ pub fn check(file: &Path, thin_solids: bool, known: &Behaviours) -> Result<Findi
             ("scenario", holds, scenario.notes)
         }
     };
-    Ok(Findings { file: file.display().to_string(), kind, holds, warnings })
+    Ok(Findings {
+        file: file.display().to_string(),
+        kind,
+        holds,
+        warnings,
+        elements: elements(file, allowances),
+    })
+}
+
+/// What becomes of each element of a file, sound or not; none of one that is too broken to have any.
+pub fn elements(file: &Path, allowances: Allowances) -> Vec<Element> {
+    if !matches!(
+        extension(file).as_deref(),
+        Some("plan" | "waypoints" | "mission" | "txt" | "json" | "geojson" | "kml")
+    ) {
+        return Vec::new();
+    }
+    mission::account_of(file, None, allowances).map(|account| account.elements).unwrap_or_default()
+}
+
+fn extension(file: &Path) -> Option<String> {
+    file.extension().map(|extension| extension.to_string_lossy().to_lowercase())
+}
+
+/// What `fly` says of a mission that is drawn on the earth, over open ground.
+fn notes(
+    file: &Path,
+    set: &MissionSet,
+    allowances: Allowances,
+    known: &Behaviours,
+) -> Result<Vec<String>, ScenarioError> {
+    if set.datum.is_none() {
+        return Ok(set.warnings.iter().map(ToString::to_string).collect());
+    }
+    let missions = vec![file.to_owned()];
+    let vehicles = (set.missions.len() == 1).then_some(1);
+    let overrides = Overrides { vehicles, missions, allowances, ..Overrides::default() };
+    Ok(Scenario::open_with("open", &overrides, 1, known)?.notes)
 }
 
 fn world(scene: &Scene) -> String {
@@ -64,9 +109,15 @@ fn world(scene: &Scene) -> String {
 
 fn missions(set: &MissionSet) -> String {
     let waypoints: usize = set.missions.iter().map(|m| m.waypoints.len()).sum();
-    let zones = set.airspace.no_fly.len() + set.airspace.prisms.len();
-    let zones = if zones == 0 { String::new() } else { format!(", {zones} no-fly zones") };
-    format!("{} routes with {waypoints} waypoints in all{zones}", set.missions.len())
+    let areas = set.airspace.stay_inside.iter().map(|zone| zone.any_of.len()).sum();
+    let more = [
+        (set.airspace.no_fly.len() + set.airspace.prisms.len(), "no-fly zones"),
+        (areas, "areas to stay inside of"),
+        (set.rally.len(), "rally points"),
+    ];
+    let more = more.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!(", {count} {what}"));
+    let more: String = more.collect();
+    format!("{} routes with {waypoints} waypoints in all{more}", set.missions.len())
 }
 
 #[cfg(test)]
@@ -74,7 +125,7 @@ mod tests {
     use super::*;
 
     fn check(file: &Path) -> Result<Findings, ScenarioError> {
-        super::check(file, false, &Behaviours::default())
+        super::check(file, Allowances::default(), false, &Behaviours::default())
     }
 
     #[test]
@@ -115,7 +166,7 @@ mod tests {
             error.contains("`bar` (0.100 m, from 4.15 to 4.25 m") && error.contains("--thin-solids"),
             "{error}"
         );
-        assert!(super::check(&path, true, &Behaviours::default()).is_ok());
+        assert!(super::check(&path, Allowances::default(), true, &Behaviours::default()).is_ok());
         for (height_m, thickness_m, model) in
             [(4.2, 0.1, "x500-vertical-scanner"), (4.2, 0.2, "x500"), (4.7, 0.1, "x500"), (0.05, 0.1, "x500")]
         {

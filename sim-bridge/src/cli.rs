@@ -10,6 +10,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use skein_bp::behaviour::Behaviours;
 
 use crate::autopilots::Autopilots;
+use crate::mission::Allowances;
 use crate::scenario::{Overrides, Scenario, ScenarioError};
 
 /// The end of a program.
@@ -64,12 +65,17 @@ pub enum Command {
     Serve(Serve),
     /// Write the configuration files of a scenario's swarm, one for each process.
     Configure(Configure),
+    /// Write the routes of a scenario's vehicles, with its zones and rally points, as plans of QGroundControl.
+    Plan(Plan),
     /// List the built-in scenarios.
     List,
     /// Check a scenario, world or mission file.
     Check {
-        /// A scenario (.toml), world (.sdf, .world, .csv) or mission (.plan, .json), or a built-in scenario's name.
+        /// A scenario (.toml), world (.sdf, .world, .csv) or mission (.plan, .waypoints, .kml, .geojson,
+        /// .json), or a built-in scenario's name.
         file: PathBuf,
+        #[command(flatten)]
+        allowances: Allowances,
         /// Find nothing wrong with solids near the heights of flight that are thinner than 0.2 m in height,
         /// which a planar lidar does not see.
         #[arg(long)]
@@ -135,6 +141,16 @@ pub struct Configure {
     pub autopilots: Autopilots,
     #[command(flatten)]
     pub setup: Setup,
+}
+
+/// Options of `plan`.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct Plan {
+    #[command(flatten)]
+    pub world: WorldArgs,
+    /// Folder for the plans, one for each vehicle; made if missing.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 /// The way in which the processes of a swarm are set up.

@@ -246,7 +246,12 @@ fn filled_in(example: &str, config: &impl Serialize) -> anyhow::Result<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use skein_agent::bthreads::LinkLossPolicy;
+    use skein_agent::config_file::Config;
+    use skein_agent::{Errand, PayloadCommand};
+    use skein_bp::behaviour::Behaviours;
 
     use super::*;
 
@@ -292,5 +297,24 @@ mod tests {
                 Network::Zenohd => assert_eq!(modes, ["client", "client", "client"]),
             }
         }
+    }
+
+    #[test]
+    fn errands_and_rally_points_are_written_and_read_again() {
+        let mut scenario = Scenario::built_in("window", None, 3).unwrap();
+        scenario.rally = vec![scenario.vehicles[0].goal()];
+        let mut params = [f64::NAN; 7];
+        params[0] = 5.0;
+        let payload = vec![PayloadCommand { command: 206, params }; 2];
+        scenario.vehicles[0].errands = vec![Errand { before: 0, stay_s: 3.0, speed_m_s: Some(1.5), payload }];
+        let agents = agent_configs(&scenario);
+        let setup = Setup { network: Network::Peer, port_offset: 100, launch_on_order: false, secure: false };
+        let text = filled_in(AGENT_EXAMPLE, &setup.agent(0, &agents[0])).unwrap();
+        let read = Config::parse(&text, Path::new(""), &Behaviours::default()).unwrap().agent;
+        let [errand] = &read.errands[..] else { panic!("one errand: {text}") };
+        assert_eq!((errand.before, errand.stay_s, errand.speed_m_s), (0, 3.0, Some(1.5)));
+        assert_eq!((errand.payload[1].command, errand.payload[1].params[0]), (206, 5.0));
+        assert!(errand.payload[1].params[6].is_nan());
+        assert_eq!(read.rally, agents[0].rally);
     }
 }

@@ -8,6 +8,7 @@ mod check;
 pub mod cli;
 #[cfg(feature = "zenoh")]
 pub mod configure;
+pub mod element;
 pub mod fly;
 #[cfg(feature = "zenoh")]
 mod mavlink_ports;

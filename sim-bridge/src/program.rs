@@ -3,11 +3,13 @@
 use std::path::Path;
 use std::process::ExitCode;
 
+use anyhow::Context as _;
 use clap::Parser as _;
 use serde_json::json;
 use skein_bp::behaviour::Behaviours;
 
-use crate::cli::{Cli, Command, Exit};
+use crate::cli::{self, Cli, Command, Exit};
+use crate::mission::{Allowances, write};
 use crate::scenario::{Scenario, ScenarioError};
 use crate::summary::Summary;
 use crate::{check, fly};
@@ -52,12 +54,34 @@ fn run(cli: &Cli, known: &Behaviours) -> anyhow::Result<Exit> {
         Command::Serve(_) | Command::Configure(_) => {
             anyhow::bail!("built without the cargo feature `zenoh`, which this needs")
         }
+        Command::Plan(args) => plan(args, known, cli.json).map(|()| Exit::Done),
         Command::List => {
             list(cli.json);
             Ok(Exit::Done)
         }
-        Command::Check { file, thin_solids } => check(file, *thin_solids, known, cli.json),
+        Command::Check { file, allowances, thin_solids } => {
+            check(file, *allowances, *thin_solids, known, cli.json)
+        }
     }
+}
+
+/// Writes a plan for each vehicle.
+fn plan(args: &cli::Plan, known: &Behaviours, as_json: bool) -> anyhow::Result<()> {
+    let scenario = args.world.open(known)?;
+    std::fs::create_dir_all(&args.out).with_context(|| format!("{}: cannot be made", args.out.display()))?;
+    let mut paths = Vec::new();
+    for (number, vehicle) in (1..).zip(&scenario.vehicles) {
+        let path = args.out.join(format!("uav-{number}.plan"));
+        let text = write::to_plan(&scenario.mission_of(vehicle), &scenario.surroundings())?;
+        std::fs::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
+        paths.push(path);
+    }
+    if as_json {
+        println!("{}", json!({ "plans": paths }));
+    } else {
+        paths.iter().for_each(|path| println!("{}", path.display()));
+    }
+    Ok(())
 }
 
 fn show(summary: &Summary, as_json: bool) -> anyhow::Result<()> {
@@ -70,8 +94,14 @@ fn show(summary: &Summary, as_json: bool) -> anyhow::Result<()> {
 }
 
 /// An unsound file is an answer, and the check has failed; a file that cannot be read is wrong input.
-fn check(file: &Path, thin_solids: bool, known: &Behaviours, as_json: bool) -> anyhow::Result<Exit> {
-    match check::check(file, thin_solids, known) {
+fn check(
+    file: &Path,
+    allowances: Allowances,
+    thin_solids: bool,
+    known: &Behaviours,
+    as_json: bool,
+) -> anyhow::Result<Exit> {
+    match check::check(file, allowances, thin_solids, known) {
         Ok(findings) => {
             if as_json {
                 println!("{}", serde_json::to_string(&findings)?);
@@ -83,7 +113,8 @@ fn check(file: &Path, thin_solids: bool, known: &Behaviours, as_json: bool) -> a
         Err(error @ ScenarioError::Unreadable { .. }) => Err(error.into()),
         Err(error) => {
             if as_json {
-                println!("{}", json!({ "file": file, "error": error.to_string() }));
+                let elements = check::elements(file, allowances);
+                println!("{}", json!({ "file": file, "error": error.to_string(), "elements": elements }));
             }
             eprintln!("skein-sim: {error}");
             Ok(Exit::Failed)

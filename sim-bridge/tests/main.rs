@@ -7,6 +7,7 @@ mod generators;
 mod missions;
 mod moving_obstacle;
 mod other_peoples_tools;
+mod plans;
 mod scenario_files;
 mod turn;
 mod zones;

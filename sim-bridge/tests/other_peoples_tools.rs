@@ -51,6 +51,16 @@ fn pymavlink_arms_takes_off_flies_offboard_and_lands() {
 }
 
 #[test]
+fn two_stations_with_pymavlink_are_told_the_truth() {
+    run_script("test_stations.py", "pymavlink");
+}
+
+#[test]
+fn mavsdk_uploads_and_reads_back_missions_fences_and_parameters() {
+    run_script("test_mavsdk_missions.py", "mavsdk");
+}
+
+#[test]
 fn mavsdk_attaches_to_a_flying_vehicle() {
     run_script("test_mavsdk.py", "mavsdk");
 }

@@ -75,6 +75,26 @@ at_s = 16.0
 order = \"return\"
 ";
 
+/// From one arm of an L to the other: the straight way leads over its notch.
+const NOTCH: &str = "
+[[vehicle]]
+start_m = [-15.0, -12.0]
+waypoints_m = [[15.0, -12.0, 3.0], [-15.0, 14.0, 3.0]]
+
+[[airspace.stay_inside]]
+any_of = [{ corners_m = [[-20, -18], [20, -18], [20, -6], [-9, -6], [-9, 18], [-20, 18]] }]
+";
+
+/// The vehicle takes off outside of where it is to stay.
+const OUTSIDE: &str = "
+[[vehicle]]
+start_m = [-12.0, 2.0]
+waypoints_m = [[15.0, 0.0, 3.0]]
+
+[[airspace.stay_inside]]
+any_of = [{ centre_m = [15.0, 0.0], radius_m = 9.0 }]
+";
+
 struct Flight {
     summary: Summary,
     /// Where the vehicle was in the air, tick by tick, and how far from the nearest zone, metres; negative inside.
@@ -184,4 +204,25 @@ fn who_follows_no_path_is_kept_out_by_the_filter() {
     );
     assert!(flight.least_room_m() > 0.25, "the hull stays out, {}", flight.least_room_m());
     assert!(flight.least_room_m() < 3.0, "it does come near: {}", flight.least_room_m());
+}
+
+#[test]
+fn a_leg_from_one_arm_of_a_fence_to_the_other_is_flown_round_inside() {
+    let gentle = Planners { local: LocalPlanner::Vfh, ..Planners::default() };
+    for planners in [Planners::default(), gentle] {
+        let flight = fly(NOTCH, planners, knowing);
+        assert_eq!(flight.summary.reason, None, "{planners:?}");
+        assert!(flight.least_room_m() > 0.25, "{planners:?}: {}", flight.least_room_m());
+    }
+    assert!(fly(NOTCH, Planners::default(), unknowing).least_room_m() < -4.0, "else the way leads across");
+}
+
+#[test]
+fn who_is_outside_of_where_it_is_to_stay_comes_back() {
+    let flight = fly(OUTSIDE, Planners::default(), knowing);
+    let why = flight.summary.reason.unwrap_or_default();
+    assert!(why.contains("outside the geofence"), "{why}");
+    let came_back = flight.track.iter().position(|(_, room_m)| *room_m > 1.0);
+    let stays = came_back.is_some_and(|at| flight.track[at..].iter().all(|(_, room_m)| *room_m > 0.0));
+    assert!(stays, "it lands where it may be: {:?}", flight.track.last());
 }

@@ -3,12 +3,14 @@
 mod height_grid;
 mod keep_out;
 mod prism;
+mod stay_inside;
 
 use nalgebra::{Vector2, Vector3};
 
 pub use height_grid::{HeightGrid, HeightGridError};
 pub use keep_out::{KeepOut, places_around};
 pub use prism::NoFlyPrism;
+pub use stay_inside::{Area, StayInside};
 
 /// Beyond this many slopes from its peak a mountain has ended: 2 mm are left there of 400 m.
 const FOOT_SLOPES: f64 = 3.5;
@@ -62,6 +64,8 @@ pub struct Airspace {
     pub no_fly: Vec<NoFlyZone>,
     /// No-fly zones over polygons.
     pub prisms: Vec<NoFlyPrism>,
+    /// Areas to stay inside of: in each of these.
+    pub stay_inside: Vec<StayInside>,
 }
 
 impl Mountain {
@@ -110,6 +114,7 @@ impl Airspace {
         self.threats.extend(other.threats);
         self.no_fly.extend(other.no_fly);
         self.prisms.extend(other.prisms);
+        self.stay_inside.extend(other.stay_inside);
         self.heights = other.heights.or(self.heights.take());
     }
 
@@ -138,7 +143,7 @@ impl Airspace {
     }
 
     /// How much of the straight way between two points lies in threat and no-fly zones, metres; where zones
-    /// overlap, it counts for each.
+    /// overlap, it counts for each. Areas to stay inside of count for nothing here.
     pub fn intrusion_m(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
         let threats: f64 = self.threats.iter().map(|zone| zone.share_inside(from, to)).sum();
         let no_fly: f64 = self.no_fly.iter().map(|zone| zone.share_inside(from, to)).sum();

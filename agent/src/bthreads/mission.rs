@@ -1,13 +1,17 @@
-//! Mission: take off when told, fly the waypoints in turn, land.
+//! Mission: take off when told, fly the waypoints in turn with the errands between them, land.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_wire::event::{
     self, Airborne, Arrived, CommandFailed, Complete, Declared as _, Failed, FoundAirborne, Goto, HandBack,
-    Land, Landed, OrderTaken, Return, Takeoff, What,
+    Land, Landed, OrderTaken, Payload, Return, Takeoff, What,
 };
 
 use crate::bthreads::OPERATOR_LEG;
+use crate::errand::Errand;
 use crate::{me::Me, precedence};
 
 /// Requests one `goto` after another, then `land`, and says how the mission ended.
@@ -16,7 +20,17 @@ pub struct Mission {
     me: Me,
     /// The `goto` events of the waypoints, in order.
     waypoints: Vec<Event>,
+    /// What comes before each leg, where something does.
+    errands: BTreeMap<usize, Steps>,
     phase: Phase,
+}
+
+/// An errand as its steps.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+struct Steps {
+    stay: Duration,
+    payload: Vec<Event>,
+    limit: Option<Event>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -25,6 +39,16 @@ enum Phase {
     /// In the air when the agent started: flies when an operator says so.
     Found,
     Climbing,
+    /// Stays before this leg.
+    Staying {
+        leg: usize,
+        until: Duration,
+    },
+    /// Tells what it carries, command by command, before this leg.
+    Telling {
+        leg: usize,
+        next: usize,
+    },
     Heading {
         leg: usize,
     },
@@ -50,7 +74,44 @@ enum Phase {
 impl Mission {
     /// A mission over `waypoints` in metres ENU, the last being where the vehicle lands.
     pub fn new(me: Me, waypoints: &[[f64; 3]]) -> Self {
-        Self { waypoints: gotos(&me, waypoints), me, phase: Phase::Grounded }
+        let errands = BTreeMap::new();
+        Self { waypoints: gotos(&me, waypoints), errands, me, phase: Phase::Grounded }
+    }
+
+    /// The same with these errands.
+    #[must_use]
+    pub fn with_errands(mut self, errands: &[Errand]) -> Self {
+        for errand in errands {
+            let payload = errand.payload.iter().map(|command| command.event(&self.me)).collect();
+            let steps = Steps { stay: errand.stay(), payload, limit: errand.limit(&self.me) };
+            self.errands.insert(errand.before, steps);
+        }
+        self
+    }
+
+    /// The phase that begins with the errand before waypoint `leg`.
+    fn before(&self, leg: usize, now: Duration) -> Phase {
+        match self.errands.get(&leg) {
+            Some(errand) if errand.stay > Duration::ZERO => Phase::Staying { leg, until: now + errand.stay },
+            _ => self.telling(leg, 0),
+        }
+    }
+
+    /// The phase that goes on with command `next` before waypoint `leg`.
+    fn telling(&self, leg: usize, next: usize) -> Phase {
+        match self.command(leg, next) {
+            Some(_) => Phase::Telling { leg, next },
+            None => self.towards(leg),
+        }
+    }
+
+    fn command(&self, leg: usize, index: usize) -> Option<&Event> {
+        self.errands.get(&leg)?.payload.get(index)
+    }
+
+    /// What is stated on the way to waypoint `leg`.
+    fn limit(&self, leg: usize) -> impl Iterator<Item = Event> + '_ {
+        self.errands.get(&leg).and_then(|errand| errand.limit.clone()).into_iter()
     }
 
     /// The phase that flies to waypoint `leg`, or lands after the last.
@@ -88,10 +149,15 @@ impl BThread for Mission {
             Phase::Grounded => bid.wait_for(me.any::<(Takeoff, FoundAirborne)>()),
             Phase::Found => bid.wait_for(me.any::<OrderTaken>()).wait_for(ended_by_others),
             Phase::Climbing => bid.wait_for(me.any::<(Airborne, CommandFailed)>()).wait_for(ended_by_others),
+            Phase::Staying { until, .. } => bid.deadline(*until).wait_for(diverted).wait_for(ended_by_others),
+            Phase::Telling { leg, next } => {
+                bid.request(self.command(*leg, *next)?.clone()).wait_for(diverted).wait_for(ended_by_others)
+            }
             Phase::Heading { leg } => {
                 bid.request(self.waypoints.get(*leg)?.clone()).wait_for(diverted).wait_for(ended_by_others)
             }
-            Phase::Flying { .. } => {
+            Phase::Flying { leg } => {
+                let bid = self.limit(*leg).fold(bid, Bid::state);
                 bid.wait_for(me.any::<Arrived>()).wait_for(diverted).wait_for(ended_by_others)
             }
             Phase::Diverted { .. } => bid.wait_for(me.any::<OrderTaken>()).wait_for(ended_by_others),
@@ -108,7 +174,8 @@ impl BThread for Mission {
         })
     }
 
-    fn resume(&mut self, event: &Event, _: &mut Context) {
+    fn resume(&mut self, event: &Event, cx: &mut Context) {
+        let now = cx.now();
         let verb = self.me.verb(event).unwrap_or_default();
         self.phase = match (&self.phase, verb) {
             (Phase::Down { .. }, _) => Phase::Over,
@@ -119,14 +186,18 @@ impl BThread for Mission {
             }
             (Phase::Grounded, Takeoff::NAME) => Phase::Climbing,
             (Phase::Grounded, FoundAirborne::NAME) => Phase::Found,
-            (Phase::Found, OrderTaken::NAME) if is_resume(event) => self.towards(0),
-            (Phase::Climbing, Airborne::NAME) => self.towards(0),
+            (Phase::Found, OrderTaken::NAME) if is_resume(event) => self.before(0, now),
+            (Phase::Climbing, Airborne::NAME) => self.before(0, now),
             (Phase::Climbing, CommandFailed::NAME) => Phase::Down { failure: Some(reason(event)) },
             (_, Land::NAME | Return::NAME) => Phase::Landing { failure: Some(reason(event)) },
             (_, Landed::NAME) => Phase::Down { failure: Some("the autopilot landed by itself".to_owned()) },
-            (Phase::Heading { leg } | Phase::Flying { leg }, Goto::NAME)
-                if Goto::read(event).is_some_and(|goto| goto.leg == OPERATOR_LEG) =>
-            {
+            (
+                Phase::Staying { leg, .. }
+                | Phase::Telling { leg, .. }
+                | Phase::Heading { leg }
+                | Phase::Flying { leg },
+                Goto::NAME,
+            ) if Goto::read(event).is_some_and(|goto| goto.leg == OPERATOR_LEG) => {
                 Phase::Diverted { leg: *leg }
             }
             (Phase::Diverted { leg }, OrderTaken::NAME) if is_resume(event) => self.towards(*leg),
@@ -134,8 +205,10 @@ impl BThread for Mission {
             (Phase::Flying { leg }, Arrived::NAME)
                 if Arrived::read(event).map(|arrived| arrived.leg) == i64::try_from(*leg).ok() =>
             {
-                self.towards(leg + 1)
+                self.before(leg + 1, now)
             }
+            (Phase::Staying { leg, until }, _) if now >= *until => self.telling(*leg, 0),
+            (Phase::Telling { leg, next }, Payload::NAME) => self.telling(*leg, next + 1),
             (phase, _) => phase.clone(),
         };
     }

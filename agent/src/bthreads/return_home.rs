@@ -1,10 +1,10 @@
-//! Return home: fly to where the vehicle took off, then land there.
+//! Return home: fly to where the vehicle took off, or to the nearest rally point, then land there.
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_wire::event::{
     self, Airborne, Arrived, CommandFailed, Declared as _, FoundAirborne, Goto, HandBack, Land, Landed,
-    Return, Takeoff,
+    Refuge, Return, Takeoff,
 };
 
 use crate::{me::Me, precedence};
@@ -16,6 +16,7 @@ pub const HOME_LEG: i64 = -1;
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct ReturnHome {
     me: Me,
+    /// The `goto` above the place where it lands.
     home: Event,
     phase: Phase,
 }
@@ -54,7 +55,7 @@ impl BThread for ReturnHome {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
         // Whatever was ordered on the ground is over then.
-        let bid = Bid::new().priority(precedence::BATTERY_LOW).wait_for(me.any::<Takeoff>());
+        let bid = Bid::new().priority(precedence::BATTERY_LOW).wait_for(me.any::<(Takeoff, Refuge)>());
         let grounded = me.any::<(Landed, CommandFailed)>();
         let over = grounded.clone().or(me.any::<Land>());
         Some(match &self.phase {
@@ -70,6 +71,13 @@ impl BThread for ReturnHome {
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
+        if let Some(Refuge { x, y, z }) = Refuge::read(event) {
+            self.home = goto(&self.me, [x, y, z]);
+            if let Phase::Returning { why } = &self.phase {
+                self.phase = Phase::Turning { why: why.clone() };
+            }
+            return;
+        }
         self.phase = match (self.phase.clone(), self.me.verb(event)) {
             (_, Some(Takeoff::NAME)) => Phase::Away,
             (_, Some(Land::NAME)) => Phase::Down,

@@ -112,8 +112,13 @@ impl Guidance {
 
     /// The limits that count now: none on the way home, nor for a vehicle that is held.
     fn allowed(&self) -> Allowed {
-        let goes_home = self.course.waypoint.is_some_and(|waypoint| waypoint.is_home);
+        let goes_home = self.goes_home();
         if goes_home || self.is_held { Allowed::ANYTHING } else { self.allowed }
+    }
+
+    /// Whether the way leads to where a return ends.
+    pub fn goes_home(&self) -> bool {
+        self.course.waypoint.is_some_and(|waypoint| waypoint.is_home)
     }
 
     /// Whether the limits leave a place to fly.

@@ -21,7 +21,9 @@ const CLEARANCE_RANGE_M: f64 = 2.5;
 /// The window is at most this wide, m.
 const WIDEST_WINDOW_M: f64 = 120.0;
 /// The window is at most this high, m.
-const TALLEST_WINDOW_M: f64 = 40.0;
+pub const TALLEST_WINDOW_M: f64 = 160.0;
+/// A higher one is narrower than the widest, so that it holds no more, m.
+const TALL_M: f64 = 40.0;
 /// A hit blocks this much of the column above and below it, m: the hull's height, and how well height is held.
 const VERTICAL_EXTENT_M: f64 = 0.4;
 /// Returns from lower than this above the take-off place are the ground.
@@ -113,8 +115,9 @@ impl Perception {
     pub fn new(fence: &Fence, home: Vector3<f64>, [floor_m, ceiling_m]: [f64; 2]) -> Result<Self, MapError> {
         let height_m = (ceiling_m.min(fence.max[2]) - floor_m).min(TALLEST_WINDOW_M);
         let width_m = [0, 1].map(|axis| fence.max[axis] - fence.min[axis] + 4.0 * RESOLUTION_M);
-        let rolls = width_m.iter().any(|width| *width > WIDEST_WINDOW_M);
-        let size = [width_m[0].min(WIDEST_WINDOW_M), width_m[1].min(WIDEST_WINDOW_M), height_m];
+        let widest_m = WIDEST_WINDOW_M * (TALL_M / height_m.max(TALL_M)).sqrt();
+        let rolls = width_m.iter().any(|width| *width > widest_m);
+        let size = [width_m[0].min(widest_m), width_m[1].min(widest_m), height_m];
         let middle = |axis: usize| (fence.min[axis] + fence.max[axis]) / 2.0;
         let middle_m = floor_m + height_m / 2.0;
         let centre = match rolls {
@@ -368,7 +371,7 @@ fn is_measured(range_m: f32) -> bool {
 /// The least and the greatest height in the world at which a mission may fly, metres.
 fn heights(config: &AgentConfig) -> [f64; 2] {
     let [_, _, home_m] = config.home;
-    let waypoints = config.waypoints.iter().map(|[_, _, z]| *z);
+    let waypoints = config.waypoints.iter().chain(&config.rally).map(|[_, _, z]| *z);
     let heights = || waypoints.clone().chain([config.return_altitude_m, home_m + config.takeoff_height_m]);
     let lowest_m = heights().fold(f64::INFINITY, f64::min) - BELOW_WAYPOINTS_M;
     [lowest_m.max(home_m + LEAST_HEIGHT_M), heights().fold(0.0, f64::max) + ABOVE_WAYPOINTS_M]

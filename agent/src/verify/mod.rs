@@ -290,6 +290,7 @@ fn reduced(config: &AgentConfig, left_out: &mut Vec<String>) -> AgentConfig {
     let waypoints = config.waypoints.len();
     if waypoints > MOST_WAYPOINTS {
         config.waypoints.drain(1..waypoints - 1);
+        config.errands.clear();
         left_out.push(format!(
             "waypoints 2 to {} of {waypoints}, which are flown to as the first",
             waypoints - 1

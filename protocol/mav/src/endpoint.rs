@@ -14,9 +14,10 @@ use std::time::Duration;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     AUTOPILOT_VERSION_DATA, COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, GPS_GLOBAL_ORIGIN_DATA,
-    HEARTBEAT_DATA, HOME_POSITION_DATA, MANUAL_CONTROL_DATA, MESSAGE_INTERVAL_DATA, MISSION_CURRENT_DATA,
-    MISSION_ITEM_REACHED_DATA, MISSION_REQUEST_DATA, MISSION_REQUEST_INT_DATA, MavCmd, MavMessage,
-    MavModeFlag, PARAM_SET_DATA, PROTOCOL_VERSION_DATA, SET_MODE_DATA, STATUSTEXT_DATA, TIMESYNC_DATA,
+    HEARTBEAT_DATA, HOME_POSITION_DATA, LOG_ENTRY_DATA, MANUAL_CONTROL_DATA, MESSAGE_INTERVAL_DATA,
+    MISSION_CURRENT_DATA, MISSION_ITEM_REACHED_DATA, MISSION_REQUEST_DATA, MISSION_REQUEST_INT_DATA, MavCmd,
+    MavMessage, MavModeFlag, PARAM_SET_DATA, PING_DATA, PROTOCOL_VERSION_DATA, SET_MODE_DATA,
+    STATUSTEXT_DATA, TIMESYNC_DATA,
 };
 use mavlink::types::CharArray;
 use nalgebra::Vector3;
@@ -29,8 +30,9 @@ use crate::mission::MissionItem;
 use crate::mode::FlightMode;
 use crate::set_point::SetPoint;
 use crate::telemetry::{Landed, Severity};
+use crate::unparsed::{Unparsed, Want, write_unsupported};
 use calls::{Call, Novelty, Remembered};
-use missions::Missions;
+use missions::{Changed, Missions, whole};
 pub use parameter_table::{Parameter, ParameterError, ParameterTable};
 use parameters::Parameters;
 use report::Report;
@@ -51,6 +53,10 @@ pub struct EndpointConfig {
     pub parameters: ParameterTable,
     /// Which mission items it can fly. An upload with another one is refused whole.
     pub accepts_item: fn(&MissionItem) -> bool,
+    /// Whether a list is a geofence that it keeps to.
+    pub accepts_fence: fn(&[MissionItem]) -> bool,
+    /// Whether a list is one of rally points.
+    pub accepts_rally: fn(&[MissionItem]) -> bool,
 }
 
 /// The autopilot's end of the link: several stations (a companion, a ground-control program) may talk to it
@@ -116,7 +122,7 @@ impl Endpoint {
             writer: FrameWriter::new(Address::autopilot(config.system_id)),
             streams: Streams::default(),
             parameters: Parameters::new(config.parameters),
-            missions: Missions::new(config.accepts_item),
+            missions: Missions::new(config.accepts_item, config.accepts_fence, config.accepts_rally),
             remembered: Remembered::default(),
             requests: VecDeque::new(),
             asked_once: Vec::new(),
@@ -131,6 +137,23 @@ impl Endpoint {
             if self.writer.sender().is_addressed_by(&frame.message) {
                 self.handle(now, &frame);
             }
+        }
+        while let Some(unread) = self.reader.next_unread() {
+            if let Some(unparsed) = Unparsed::read(&unread) {
+                self.refuse(&unparsed);
+            }
+        }
+    }
+
+    /// Answers what could not be read whole: the command is not known.
+    fn refuse(&mut self, unparsed: &Unparsed) {
+        let (system, component) = unparsed.to;
+        if !self.writer.sender().is_target(system, component) {
+            return;
+        }
+        match unparsed.want {
+            Want::Command(command) => write_unsupported(unparsed.from, command, &mut self.writer),
+            Want::Item => self.missions.refuse_item(unparsed.from, &mut self.writer),
         }
     }
 
@@ -208,6 +231,16 @@ impl Endpoint {
         self.missions.items()
     }
 
+    /// The zones to stay inside and outside of, as a station uploaded them.
+    pub fn fence(&self) -> &[MissionItem] {
+        self.missions.fence()
+    }
+
+    /// The places to return to.
+    pub fn rally_points(&self) -> &[MissionItem] {
+        self.missions.rally_points()
+    }
+
     /// Takes the bytes to be sent to every station. They are whole frames.
     pub fn take_output(&mut self) -> Vec<u8> {
         self.writer.take()
@@ -231,6 +264,12 @@ impl Endpoint {
                 }
             }
             MavMessage::MANUAL_CONTROL(message) => self.on_sticks(message),
+            MavMessage::PING(message) => output.write(&PING_DATA {
+                target_system: from.system_id,
+                target_component: from.component_id,
+                ..*message
+            }),
+            MavMessage::LOG_REQUEST_LIST(_) => output.write(&LOG_ENTRY_DATA::default()),
             MavMessage::TIMESYNC(message) if message.tc1 == 0 => {
                 let its = now.saturating_sub(self.booted);
                 output.write(&TIMESYNC_DATA { tc1: its.as_nanos() as i64, ..*message });
@@ -253,10 +292,15 @@ impl Endpoint {
                 let changed = self.missions.on_item(now, from, message, output);
                 self.push_mission_change(changed);
             }
+            MavMessage::MISSION_ITEM(message) => {
+                let changed = self.missions.on_item(now, from, &whole(message), output);
+                self.push_mission_change(changed);
+            }
             MavMessage::MISSION_CLEAR_ALL(message) => {
                 let changed = self.missions.on_clear(from, message.mission_type, output);
                 self.push_mission_change(changed);
             }
+            MavMessage::MISSION_ACK(message) => self.missions.on_ack(from, message),
             MavMessage::MISSION_SET_CURRENT(message) => {
                 self.push_unacknowledged(from, AutopilotCommand::SetMissionItem(message.seq));
             }
@@ -270,9 +314,15 @@ impl Endpoint {
         }
     }
 
-    fn push_mission_change(&mut self, changed: bool) {
-        if changed {
-            self.push(Request::MissionChanged);
+    fn push_mission_change(&mut self, changed: Option<Changed>) {
+        match changed {
+            None => {}
+            Some(Changed::Mission) => self.push(Request::MissionChanged),
+            Some(Changed::Places) => self.push(Request::PlacesChanged),
+            Some(Changed::All) => {
+                self.push(Request::MissionChanged);
+                self.push(Request::PlacesChanged);
+            }
         }
     }
 

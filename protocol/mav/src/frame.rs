@@ -1,5 +1,7 @@
 //! Frames: MAVLink 1 and 2 packets to and from bytes, whatever carries the bytes.
 
+use std::collections::VecDeque;
+
 use mavlink::dialects::common::MavMessage;
 use mavlink::error::ParserError;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc, consts};
@@ -70,6 +72,20 @@ pub struct FrameReader {
     start: usize,
     bad_bytes: u64,
     unknown_messages: u64,
+    /// The first of them, until they are taken.
+    unread: VecDeque<Unread>,
+}
+
+/// Messages kept whose content is not known; more are dropped.
+const MAX_UNREAD: usize = 64;
+
+/// An intact frame whose content is not in the common dialect.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Unread {
+    pub(crate) sender: Address,
+    pub(crate) message_id: u32,
+    /// A MAVLink 2 frame leaves out the zeros at its end.
+    pub(crate) payload: Vec<u8>,
 }
 
 /// The front of the buffer.
@@ -111,6 +127,10 @@ impl FrameReader {
                 Candidate::Intact(layout) => {
                     let payload = bytes.get(layout.payload).unwrap_or_default();
                     let parsed = parse(layout.version, layout.message_id, payload);
+                    if parsed.is_none() && self.unread.len() < MAX_UNREAD {
+                        let Layout { sender, message_id, .. } = layout;
+                        self.unread.push_back(Unread { sender, message_id, payload: payload.to_vec() });
+                    }
                     self.start += layout.frame_len;
                     let Layout { sender, sequence, version, .. } = layout;
                     match parsed {
@@ -130,6 +150,11 @@ impl FrameReader {
     /// Intact frames skipped so far because their content is not in the common dialect.
     pub fn unknown_messages(&self) -> u64 {
         self.unknown_messages
+    }
+
+    /// The next message whose content is not known.
+    pub(crate) fn next_unread(&mut self) -> Option<Unread> {
+        self.unread.pop_front()
     }
 
     fn skip_to_marker(&mut self) {
@@ -266,9 +291,14 @@ impl FrameWriter {
     pub fn write<D: MessageData>(&mut self, message: &D) {
         let mut payload = [0; consts::MAX_PAYLOAD_LEN];
         let payload_len = message.ser(self.version, &mut payload);
-        let [id0, id1, id2, _] = D::ID.to_le_bytes();
+        self.write_payload((D::ID, D::EXTRA_CRC), payload.get(..payload_len).unwrap_or_default());
+    }
+
+    /// The same of a message whose number and checksum's seed are these.
+    pub(crate) fn write_payload(&mut self, (message_id, extra_crc): (u32, u8), payload: &[u8]) {
+        let [id0, id1, id2, _] = message_id.to_le_bytes();
         let Address { system_id, component_id } = self.sender;
-        let (len, sequence) = (payload_len as u8, self.sequence);
+        let (len, sequence) = (payload.len() as u8, self.sequence);
         let frame_start = self.buffer.len();
         match (self.version, id1, id2) {
             (MavlinkVersion::V2, ..) => self.buffer.extend_from_slice(&[
@@ -295,9 +325,9 @@ impl FrameWriter {
             }
             (MavlinkVersion::V1, ..) => return,
         }
-        self.buffer.extend(payload.iter().take(payload_len));
+        self.buffer.extend_from_slice(payload);
         let covered = self.buffer.get(frame_start + 1..).unwrap_or_default();
-        let crc = calculate_crc(covered, D::EXTRA_CRC);
+        let crc = calculate_crc(covered, extra_crc);
         self.buffer.extend_from_slice(&crc.to_le_bytes());
         self.sequence = self.sequence.wrapping_add(1);
     }

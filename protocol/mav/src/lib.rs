@@ -49,6 +49,7 @@ mod set_point;
 pub mod simulator;
 mod station;
 mod telemetry;
+mod unparsed;
 
 pub use command::{Command, CommandResult};
 pub use companion::{Companion, CompanionConfig};

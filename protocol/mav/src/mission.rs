@@ -12,7 +12,7 @@ use mavlink::dialects::common::{
     MISSION_ACK_DATA, MISSION_COUNT_DATA, MISSION_ITEM_INT_DATA, MISSION_REQUEST_INT_DATA,
     MISSION_REQUEST_LIST_DATA, MavCmd, MavFrame, MavMissionResult, MavMissionType,
 };
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 use crate::frame::{Address, FrameWriter};
 use crate::geodesy::{Datum, Geodetic};
@@ -77,7 +77,25 @@ impl MissionItem {
         Some(datum.to_enu(&place))
     }
 
-    pub(crate) fn to_message(self, seq: u16, target: Address) -> MISSION_ITEM_INT_DATA {
+    /// The place on the ground (ENU, metres) of an item in a global frame; `None` for other frames.
+    pub fn ground(&self, datum: &Datum) -> Option<Vector2<f64>> {
+        use MavFrame::{
+            MAV_FRAME_GLOBAL, MAV_FRAME_GLOBAL_INT, MAV_FRAME_GLOBAL_RELATIVE_ALT,
+            MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+        };
+        let is_global = matches!(
+            self.frame,
+            MAV_FRAME_GLOBAL
+                | MAV_FRAME_GLOBAL_INT
+                | MAV_FRAME_GLOBAL_RELATIVE_ALT
+                | MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+        );
+        let mut place = Geodetic::from_e7(self.x, self.y, 0);
+        place.height_m = datum.height_m;
+        is_global.then(|| datum.to_enu(&place).xy())
+    }
+
+    pub(crate) fn to_message(self, seq: u16, target: Address, kind: MavMissionType) -> MISSION_ITEM_INT_DATA {
         let [param1, param2, param3, param4] = self.params;
         MISSION_ITEM_INT_DATA {
             param1,
@@ -94,7 +112,7 @@ impl MissionItem {
             frame: self.frame,
             current: 0,
             autocontinue: u8::from(self.autocontinue),
-            mission_type: MavMissionType::MAV_MISSION_TYPE_MISSION,
+            mission_type: kind,
         }
     }
 
@@ -169,7 +187,9 @@ impl SenderMessage {
     pub(crate) fn write(self, to: Address, output: &mut FrameWriter) {
         match self {
             Self::Count(count) => write_count(to, MavMissionType::MAV_MISSION_TYPE_MISSION, count, output),
-            Self::Item(seq, item) => output.write(&item.to_message(seq, to)),
+            Self::Item(seq, item) => {
+                output.write(&item.to_message(seq, to, MavMissionType::MAV_MISSION_TYPE_MISSION));
+            }
         }
     }
 }
@@ -225,20 +245,15 @@ pub(crate) enum ReceiverMessage {
 }
 
 impl ReceiverMessage {
-    pub(crate) fn write(self, to: Address, output: &mut FrameWriter) {
+    pub(crate) fn write(self, to: Address, mission_type: MavMissionType, output: &mut FrameWriter) {
         let (target_system, target_component) = (to.system_id, to.component_id);
         match self {
-            Self::List => output.write(&MISSION_REQUEST_LIST_DATA {
-                target_system,
-                target_component,
-                ..Default::default()
-            }),
-            Self::Item(seq) => output.write(&MISSION_REQUEST_INT_DATA {
-                seq,
-                target_system,
-                target_component,
-                ..Default::default()
-            }),
+            Self::List => {
+                output.write(&MISSION_REQUEST_LIST_DATA { target_system, target_component, mission_type });
+            }
+            Self::Item(seq) => {
+                output.write(&MISSION_REQUEST_INT_DATA { seq, target_system, target_component, mission_type })
+            }
         }
     }
 }

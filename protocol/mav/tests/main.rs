@@ -11,3 +11,4 @@ mod lossy_link;
 mod positions;
 mod protocols;
 mod simulator;
+mod stations;

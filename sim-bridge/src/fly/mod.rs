@@ -67,6 +67,12 @@ pub fn run(args: &cli::Fly, known: &Behaviours) -> anyhow::Result<Summary> {
         !args.processes || args.controller == cli::Controller::Bp,
         "--processes: an agent of its own runs its b-threads; leave out --controller"
     );
+    anyhow::ensure!(
+        args.controller == cli::Controller::Bp
+            || scenario.vehicles.iter().all(|plan| plan.errands.is_empty()),
+        "--controller: without b-threads no vehicle stays at a waypoint or keeps to the speed of a leg, as the mission \
+         asks; leave it out"
+    );
     let summary = match args.clock {
         Clock::Lockstep => {
             let table = (!args.headless).then_some(table);

@@ -80,6 +80,8 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             datum: *scenario.scene.datum(),
             home: plan.start.into(),
             waypoints: plan.waypoints.iter().map(|point| (*point).into()).collect(),
+            errands: plan.errands.clone(),
+            rally: scenario.rally.iter().map(|place| (*place).into()).collect(),
             takeoff_height_m: scenario.takeoff_height_m,
             return_altitude_m: (RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64)
                 .min(bounds.max.z - 1.0),

@@ -9,12 +9,15 @@ use thiserror::Error;
 pub enum MissionError {
     #[error("cannot read `{}`: {source}", path.display())]
     Unreadable { path: PathBuf, source: std::io::Error },
+    #[error("{file}: is larger than {limit} bytes: expected a mission, which is smaller")]
+    TooLarge { file: String, limit: usize },
     #[error("{file}:{line}:{column}: {message}")]
     Syntax { file: String, line: usize, column: usize, message: String },
     #[error("{file}:{line}: field `{field}`: expected {expected}, found {found}")]
     Field { file: String, line: usize, field: String, expected: String, found: String },
     #[error(
-        "{file}: expected a QGroundControl plan (a member `mission`) or an LSC mission (a member `agents`)"
+        "{file}: expected a QGroundControl plan (a member `mission`), a `QGC WPL 110` file, KML, GeoJSON or \
+         an LSC mission (a member `agents`)"
     )]
     Unknown { file: String },
 }

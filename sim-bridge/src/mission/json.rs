@@ -79,6 +79,29 @@ impl<'a> Node<'a> {
         Ok(array.iter().enumerate().map(|(i, value)| self.below(value, Step::Element(i))).collect())
     }
 
+    /// The number of elements of an array.
+    pub fn count(&self) -> Result<usize, MissionError> {
+        self.value.as_array().map(Vec::len).ok_or_else(|| self.mismatch("an array"))
+    }
+
+    /// An element of an array, where there is one.
+    pub fn element(&self, index: usize) -> Option<Node<'a>> {
+        let value = self.value.as_array()?.get(index)?;
+        Some(self.below(value, Step::Element(index)))
+    }
+
+    /// The lines of the elements of an array, in one walk through the text.
+    pub fn element_lines(&self) -> Vec<usize> {
+        let scanner = Scanner { rest: self.document.text.as_bytes(), line: 1 };
+        scanner.at(&self.path).map(Scanner::element_lines).unwrap_or_default()
+    }
+
+    /// The members of an object, in alphabetical order; nulls too.
+    pub fn members(&self) -> Vec<(&'a str, Node<'a>)> {
+        let members = self.value.as_object().into_iter().flatten();
+        members.map(|(name, value)| (name.as_str(), self.below(value, Step::Member(name)))).collect()
+    }
+
     /// A number. JSON knows no infinities, so it is finite.
     pub fn number(&self) -> Result<f64, MissionError> {
         self.value.as_f64().ok_or_else(|| self.mismatch("a number"))
@@ -166,7 +189,13 @@ impl<'a> Node<'a> {
         if field.is_empty() { "document".to_owned() } else { field }
     }
 
-    fn line(&self) -> usize {
+    /// The document's name in errors.
+    pub fn file(&self) -> &'a str {
+        self.document.file
+    }
+
+    /// Line from 1.
+    pub fn line(&self) -> usize {
         Scanner { rest: self.document.text.as_bytes(), line: 1 }.find(&self.path)
     }
 
@@ -207,9 +236,41 @@ struct Scanner<'t> {
 
 impl Scanner<'_> {
     /// The line of the value at `path`, or of the innermost value on the way that exists.
-    fn find(mut self, path: &[Step<'_>]) -> usize {
+    fn find(self, path: &[Step<'_>]) -> usize {
+        match self.walk(path) {
+            Ok(at) => at.line,
+            Err(line) => line,
+        }
+    }
+
+    /// A scanner at the value at `path`, if there is one.
+    fn at(self, path: &[Step<'_>]) -> Option<Self> {
+        self.walk(path).ok()
+    }
+
+    /// The line of each element of the array that begins here.
+    fn element_lines(mut self) -> Vec<usize> {
+        let mut lines = Vec::new();
+        self.take();
+        loop {
+            self.skip_blanks();
+            match self.rest.first() {
+                Some(b',') => {
+                    self.take();
+                }
+                None | Some(b']' | b'}') => return lines,
+                _ => {
+                    lines.push(self.line);
+                    self.skip_value();
+                }
+            }
+        }
+    }
+
+    /// Goes to the value at `path`; the line of the innermost value on the way if there is none.
+    fn walk(mut self, path: &[Step<'_>]) -> Result<Self, usize> {
         self.skip_blanks();
-        let Some((step, below)) = path.split_first() else { return self.line };
+        let Some((step, below)) = path.split_first() else { return Ok(self) };
         let line = self.line;
         let mut index = 0;
         self.take();
@@ -220,7 +281,7 @@ impl Scanner<'_> {
                     self.take();
                     continue;
                 }
-                None | Some(b']' | b'}') => return line,
+                None | Some(b']' | b'}') => return Err(line),
                 _ => {}
             }
             let found = match *step {
@@ -233,7 +294,7 @@ impl Scanner<'_> {
                 Step::Element(wanted) => wanted == index,
             };
             if found {
-                return self.find(below);
+                return self.walk(below);
             }
             index += 1;
             self.skip_value();

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use skein_world::{Aabb, VehicleModel};
 
 use super::json::{Document, Node};
-use super::{Ends, Mission, MissionError, MissionSet, Waypoint};
+use super::{Mission, MissionError, MissionSet, Waypoint};
 
 /// A mission as the experiment sets it: who flies from where to where, within which bounds and limits.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,9 +83,10 @@ pub fn read(root: &Node<'_>) -> Result<MissionSet, MissionError> {
         return Err(agents.mismatch("at least one agent"));
     }
     let obstacles = root.optional("obstacles").filter(|o| !o.is_empty());
-    let warnings =
-        obstacles.iter().map(|o| o.warning("moving obstacles are not read; they are left out")).collect();
-    Ok(MissionSet { missions, warnings, ..MissionSet::default() })
+    match obstacles {
+        Some(obstacles) => Err(obstacles.mismatch("no moving obstacles, which are not flown around")),
+        None => Ok(MissionSet { missions, ..MissionSet::default() }),
+    }
 }
 
 fn agent(agent: &Node<'_>) -> Result<Mission, MissionError> {
@@ -99,10 +100,10 @@ fn agent(agent: &Node<'_>) -> Result<Mission, MissionError> {
     let known = |kind: &&str| VehicleModel::built_in_names().any(|name| name == *kind);
     Ok(Mission {
         home: Vector3::new(start.x, start.y, 0.0),
-        waypoints: vec![Waypoint { position: goal, hold_s: 0.0, speed_m_s: None }],
-        ends: Ends::Land,
+        waypoints: vec![Waypoint { position: goal, ..Waypoint::default() }],
         takeoff_height_m: (start.z > 0.0).then_some(start.z),
         model: kind.filter(known).map(str::to_owned),
         exact: true,
+        ..Mission::default()
     })
 }

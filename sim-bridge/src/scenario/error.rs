@@ -40,6 +40,8 @@ pub enum ScenarioError {
     TooManyVehicles { vehicles: usize, limit: usize },
     #[error("scenario `{scenario}` describes {described} vehicles, {wanted} were asked for")]
     TooFewDescribed { scenario: String, wanted: usize, described: usize },
+    #[error("{place}, and the scenario's ground is not flat: expected heights above home or above the sea")]
+    AboveTerrain { place: String },
     #[error(
         "{missions} missions for {vehicles} vehicles: give one mission that all fly in trail, or one for each vehicle"
     )]
@@ -56,6 +58,12 @@ pub enum ScenarioError {
         min: Vector3<f64>,
         max: Vector3<f64>,
     },
+    #[error(
+        "a mission goes {highest_m:.0} m above its home: expected at most {limit_m:.0} m, which a vehicle's map spans"
+    )]
+    TooHigh { highest_m: f64, limit_m: f64 },
+    #[error("rally point {} is outside the world, which reaches from {} to {}", place(.position), place(.min), place(.max))]
+    RallyOutside { position: Vector3<f64>, min: Vector3<f64>, max: Vector3<f64> },
     #[error("vehicle {vehicle}: {what} {} is not above the ground: expected a height above 0 m", place(.position))]
     BelowGround { vehicle: usize, what: String, position: Vector3<f64> },
     #[error("vehicle {vehicle}: {what} {} is in a no-fly zone, in a threat or in terrain: no path leads there", place(.position))]

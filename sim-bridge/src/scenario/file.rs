@@ -34,7 +34,7 @@ use super::{
     VehicleScript, Who, check_count, read, read_world, stated_datum,
 };
 use crate::autopilots::make::Make;
-use crate::mission;
+use crate::mission::{self, Allowances};
 
 const DEFAULT_VEHICLES: usize = 4;
 const DEFAULT_MODEL: &str = "x500";
@@ -263,13 +263,14 @@ impl ScenarioFile {
         vehicles: Option<usize>,
         seed: u64,
         known: &Behaviours,
+        allowances: Allowances,
     ) -> Result<Scenario, ScenarioError> {
         self.check_tables()?;
         let name = self.name();
         let world = self.table.world.as_deref().map(|path| read_world(&self.beside(path))).transpose()?;
         let datum = world.as_ref().and_then(|(scene, _)| stated_datum(scene));
         let paths: Vec<_> = self.table.mission.iter().map(|path| self.beside(path)).collect();
-        let set = mission::read_files(&paths, datum)?;
+        let set = mission::read_files(&paths, datum, allowances)?;
         let count = self.count(vehicles, set.missions.len());
         check_count(&name, count)?;
         let layout = self.generate(count, seed);
@@ -314,6 +315,7 @@ impl ScenarioFile {
             scripts,
             behaviours,
             network: table.network,
+            rally: Vec::new(),
             notes,
         };
         if set.missions.is_empty() {
@@ -446,6 +448,7 @@ impl ScenarioFile {
                 start: route.start,
                 yaw: route.yaw(),
                 waypoints: vec![route.goal],
+                errands: Vec::new(),
                 pace: 1.0,
                 model: model.clone(),
                 autopilot: self.table.autopilot,
@@ -461,6 +464,7 @@ impl ScenarioFile {
             start: Vector3::zeros(),
             yaw: 0.0,
             waypoints: Vec::new(),
+            errands: Vec::new(),
             pace: 1.0,
             model,
             autopilot: self.table.autopilot,
@@ -503,6 +507,7 @@ impl ScenarioFile {
                 start,
                 yaw: table.yaw_rad.unwrap_or_else(|| ahead.y.atan2(ahead.x)),
                 waypoints: table.waypoints_m.clone(),
+                errands: Vec::new(),
                 pace: 1.0,
                 model: table.model.as_deref().map_or_else(|| Ok(model.clone()), |name| self.model(name))?,
                 autopilot: table.autopilot.or(self.table.autopilot),
@@ -680,6 +685,7 @@ fn from_under(PacedRoute { route, pace }: PacedRoute, model: &VehicleModel) -> V
         start: Vector3::new(first.x, first.y, 0.0),
         yaw: ahead.y.atan2(ahead.x),
         waypoints: route,
+        errands: Vec::new(),
         pace,
         model: model.clone(),
         autopilot: None,

@@ -18,6 +18,7 @@ mod moving;
 mod open;
 mod placement;
 mod position_error;
+mod share;
 mod targets;
 mod thin_solids;
 mod walker;
@@ -29,8 +30,8 @@ use clap::Args;
 use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::value::{Error as WordError, StrDeserializer};
-use skein_agent::Planners;
 use skein_agent::bthreads::LinkLossPolicy;
+use skein_agent::{Errand, Planners};
 use skein_bp::behaviour::{Behaviours, Chosen};
 use skein_bp::script::Assignment;
 use skein_mav::Datum;
@@ -45,7 +46,7 @@ pub use missions::apply_missions;
 
 use self::walker::Walker;
 use crate::autopilots::make::Make;
-use crate::mission::{self, MissionSet};
+use crate::mission::{self, Allowances, MissionSet};
 
 /// Largest swarm: MAVLink numbers systems from 1 to 255, and the ground takes the last.
 pub const MAX_VEHICLES: usize = 254;
@@ -120,6 +121,8 @@ pub struct Scenario {
     pub behaviours: Chosen,
     /// The treatment of messages by the network in memory.
     pub network: Network,
+    /// Places where a vehicle that returns may land instead of at home, at the height of the way there.
+    pub rally: Vec<Vector3<f64>>,
     /// Notes for the user: parameters that gave way, parts of files that were not understood.
     pub notes: Vec<String>,
 }
@@ -133,6 +136,8 @@ pub struct VehiclePlan {
     pub yaw: f64,
     /// ENU, metres. It lands under the last.
     pub waypoints: Vec<Vector3<f64>>,
+    /// Stays, speeds and commands to what it carries, on the way.
+    pub errands: Vec<Errand>,
     /// Its speed as a share of the scenario's cruise speed: above 0, at most 1.
     pub pace: f64,
     pub model: VehicleModel,
@@ -210,9 +215,11 @@ pub struct Overrides {
     /// A Gazebo world (SDF) or a list of boxes (.csv) in place of the scenario's world.
     #[arg(long, value_name = "FILE")]
     pub world: Option<PathBuf>,
-    /// A QGroundControl plan or LSC mission; one that all fly in trail, or one for each vehicle.
+    /// A QGroundControl plan, `QGC WPL 110` file, KML, GeoJSON or LSC mission; one that all fly in trail, or one for each vehicle.
     #[arg(long = "mission", value_name = "FILE")]
     pub missions: Vec<PathBuf>,
+    #[command(flatten)]
+    pub allowances: Allowances,
     /// Fly though there are solids on the way that are thinner than 0.2 m in height, which a planar lidar
     /// does not see.
     #[arg(long)]
@@ -254,7 +261,7 @@ impl Scenario {
         vehicles: Option<usize>,
         seed: u64,
     ) -> Result<Self, ScenarioError> {
-        Self::of_program(text, file, vehicles, seed, &Behaviours::default())
+        Self::of_program(text, file, vehicles, seed, &Behaviours::default(), Allowances::default())
     }
 
     /// The same for a program with these behaviours.
@@ -264,8 +271,10 @@ impl Scenario {
         vehicles: Option<usize>,
         seed: u64,
         known: &Behaviours,
+        allowances: Allowances,
     ) -> Result<Self, ScenarioError> {
-        let scenario = file::ScenarioFile::parse(text, file)?.build(vehicles, seed, known)?;
+        let file = file::ScenarioFile::parse(text, file)?;
+        let scenario = file.build(vehicles, seed, known, allowances)?;
         scenario.validate()?;
         Ok(scenario)
     }
@@ -284,11 +293,11 @@ impl Scenario {
     ) -> Result<Self, ScenarioError> {
         let world = overrides.world.as_deref().map(read_world).transpose()?;
         let datum = world.as_ref().and_then(|(scene, _)| stated_datum(scene));
-        let set = mission::read_files(&overrides.missions, datum)?;
+        let set = mission::read_files(&overrides.missions, datum, overrides.allowances)?;
         let own_number = || (set.missions.len() > 1).then_some(set.missions.len());
         let vehicles = overrides.vehicles.or_else(own_number);
         let mut scenario = match text_of(name)? {
-            Some(text) => Self::of_program(&text, name, vehicles, seed, known)?,
+            Some(text) => Self::of_program(&text, name, vehicles, seed, known, overrides.allowances)?,
             None => Self::built_in(name, vehicles, seed)?,
         };
         if let Some((scene, warnings)) = world {
@@ -321,6 +330,12 @@ impl Scenario {
             self.scene = self.scene.clone().with_datum(datum);
         }
         self.airspace.include(set.airspace);
+        if let Some(place) = set.above_terrain
+            && (self.airspace.heights.is_some() || !self.airspace.mountains.is_empty())
+        {
+            return Err(ScenarioError::AboveTerrain { place });
+        }
+        self.rally.extend(set.rally);
         if set.missions.is_empty() { Ok(()) } else { apply_missions(self, set.missions) }
     }
 
@@ -444,7 +459,13 @@ impl Scenario {
             self.check_start(i + 1, vehicle)?;
             self.check_waypoints(i + 1, vehicle, &zones)?;
         }
-        self.check_ends()
+        let bounds = self.scene.bounds();
+        match self.rally.iter().find(|point| !bounds.contains(point)) {
+            Some(&position) => {
+                Err(ScenarioError::RallyOutside { position, min: bounds.min, max: bounds.max })
+            }
+            None => self.check_ends(),
+        }
     }
 
     fn check_start(&self, number: usize, vehicle: &VehiclePlan) -> Result<(), ScenarioError> {
@@ -581,7 +602,8 @@ impl Scenario {
         if self.fixed_bounds {
             return;
         }
-        let places = self.vehicles.iter().flat_map(|v| v.waypoints.iter().chain([&v.start]));
+        let routes = self.vehicles.iter().flat_map(|v| v.waypoints.iter().chain([&v.start]));
+        let places = routes.chain(&self.rally);
         let around = |place: &Vector3<f64>| Aabb { min: *place, max: *place }.grown(ROUTE_MARGIN);
         let mut bounds = *self.scene.bounds();
         let floor = bounds.min.z;

@@ -42,7 +42,8 @@ pub enum TargetsError {
     #[error("expected at least one target")]
     NoTarget,
     #[error(
-        "routes are planned around circles: expected `centre_m` and `radius_m` for each of `airspace.no_fly`"
+        "routes are planned around circles: expected `centre_m` and `radius_m` for each of `airspace.no_fly`, and no \
+         `airspace.stay_inside`"
     )]
     Polygon,
     /// A start or a target is no place to plan from or to.
@@ -74,7 +75,7 @@ impl Targets {
         cruise_m_s: f64,
         seed: u64,
     ) -> Result<Vec<PacedRoute>, TargetsError> {
-        if !airspace.prisms.is_empty() {
+        if !airspace.prisms.is_empty() || !airspace.stay_inside.is_empty() {
             return Err(TargetsError::Polygon);
         }
         let airspace = keeping_off(airspace, bounds);

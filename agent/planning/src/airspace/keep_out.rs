@@ -13,7 +13,7 @@ const RING_M: f64 = 0.5;
 /// No further than this, metres.
 const FURTHEST_M: f64 = 100.0;
 
-/// An [`Airspace`]'s zones with a margin around them, and the air over its terrain up to a clearance.
+/// An [`Airspace`]'s zones, and what is outside of areas to stay inside of, with a margin around them, and the air over its terrain up to a clearance.
 ///
 /// Threats are closed as no-fly zones are, and not merely dear: being seen for a moment is enough, and no detour is
 /// so long that it is worth that. Below the ground a threat goes on, as a ball. The airspace's box counts for nothing
@@ -58,11 +58,12 @@ impl KeepOut {
     }
 
     fn off_zones_m(&self, point: &Vector3<f64>) -> f64 {
-        let Airspace { threats, no_fly, prisms, .. } = &self.airspace;
+        let Airspace { threats, no_fly, prisms, stay_inside, .. } = &self.airspace;
         let threats = threats.iter().map(|zone| zone.off_m(point));
         let no_fly = no_fly.iter().map(|zone| zone.off_m(point));
         let prisms = prisms.iter().map(|zone| zone.off_m(point));
-        threats.chain(no_fly).chain(prisms).fold(f64::INFINITY, f64::min)
+        let inside = stay_inside.iter().map(|zone| zone.room_m(point));
+        threats.chain(no_fly).chain(prisms).chain(inside).fold(f64::INFINITY, f64::min)
     }
 
     fn off_terrain_m(&self, point: &Vector3<f64>, clearance_m: f64) -> f64 {
@@ -90,14 +91,15 @@ impl KeepOut {
     /// for each zone, one for each edge of a polygon. What keeps clear of the points keeps clear of the zones. None
     /// from inside a zone, so that they do not hold back who leaves it.
     pub fn walls(&self, point: &Vector3<f64>, reach_m: f64) -> Vec<Vector3<f64>> {
-        let Airspace { threats, no_fly, prisms, .. } = &self.airspace;
+        let Airspace { threats, no_fly, prisms, stay_inside, .. } = &self.airspace;
         if !(0.0..reach_m).contains(&self.bare_room_m(point)) {
             return Vec::new();
         }
         let threats = threats.iter().filter_map(|zone| zone.nearest(point));
         let no_fly = no_fly.iter().map(|zone| zone.nearest(point));
         let prisms = prisms.iter().flat_map(|zone| zone.nearest(point));
-        let zones = threats.chain(no_fly).chain(prisms).chain(self.ground_near(point));
+        let borders = stay_inside.iter().flat_map(|zone| zone.border(point));
+        let zones = threats.chain(no_fly).chain(prisms).chain(borders).chain(self.ground_near(point));
         zones.filter(|wall| (wall - point).norm() < reach_m).collect()
     }
 
@@ -190,7 +192,7 @@ impl ThreatZone {
 }
 
 impl NoFlyZone {
-    fn off_m(&self, point: &Vector3<f64>) -> f64 {
+    pub(super) fn off_m(&self, point: &Vector3<f64>) -> f64 {
         let level_m = (point.xy() - self.centre).norm() - self.radius_m;
         upright(level_m, off_band_m(point.z, self.floor_m, self.ceiling_m))
     }
@@ -203,7 +205,7 @@ impl NoFlyZone {
 }
 
 impl NoFlyPrism {
-    fn off_m(&self, point: &Vector3<f64>) -> f64 {
+    pub(super) fn off_m(&self, point: &Vector3<f64>) -> f64 {
         upright(self.off_outline_m(point.xy()), off_band_m(point.z, self.floor_m, self.ceiling_m))
     }
 

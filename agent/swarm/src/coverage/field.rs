@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::Vector2;
-use skein_planning::airspace::{Airspace, KeepOut, NoFlyPrism};
+use skein_planning::airspace::{Airspace, Area, KeepOut, NoFlyPrism};
 
 /// Distance of lines from what is closed, metres: a vehicle's stray, its hull, and what it keeps itself.
 const CLOSED_MARGIN_M: f64 = 1.5;
@@ -104,11 +104,15 @@ impl<'a> Field<'a> {
 
     /// Open places where the shortest ways in the field turn: around its reflex corners, and around zones.
     pub fn turns(&self) -> Vec<Vector2<f64>> {
-        let Airspace { threats, no_fly, prisms, .. } = self.airspace;
+        let Airspace { threats, no_fly, prisms, stay_inside, .. } = self.airspace;
+        let bordered = stay_inside.iter().flat_map(|zone| &zone.any_of).filter_map(|area| match area {
+            Area::Cornered(zone) => Some(zone),
+            Area::Round(_) => None,
+        });
         let off_m = (self.margin_m * WIDER).max(STEP_M);
         let own = self.reflex_corners().into_iter().map(|corner| (corner, off_m));
-        let zones =
-            prisms.iter().flat_map(|zone| &zone.corners).map(|corner| (*corner, CLOSED_MARGIN_M * WIDER));
+        let cornered = prisms.iter().chain(bordered).flat_map(|zone| &zone.corners);
+        let zones = cornered.map(|corner| (*corner, CLOSED_MARGIN_M * WIDER));
         let round = no_fly.iter().map(|zone| (zone.centre, (zone.radius_m + CLOSED_MARGIN_M) * WIDER));
         let domes = threats.iter().map(|zone| {
             let reach_m = zone.radius_m + CLOSED_MARGIN_M;

@@ -12,6 +12,8 @@ use crate::mission::{
     MAX_ITEMS, MissionError, MissionItem, MissionReceiver, MissionSender, is_mission, write_ack,
 };
 
+const KIND: MavMissionType = MavMissionType::MAV_MISSION_TYPE_MISSION;
+
 /// The transfer under way, if any.
 #[derive(Debug, Clone, Default)]
 pub(super) enum Missions {
@@ -95,7 +97,7 @@ impl Missions {
             Self::Idle => Ok(()),
             Self::Wanted(Wanted::Download) => {
                 let receiver = MissionReceiver::new(now);
-                receiver.request().write(autopilot, output);
+                receiver.request().write(autopilot, KIND, output);
                 *self = Self::Downloading(receiver);
                 Ok(())
             }
@@ -105,9 +107,9 @@ impl Missions {
                 *self = Self::Uploading(sender);
                 Ok(())
             }
-            Self::Downloading(receiver) => {
-                receiver.tick(now).map(|again| again.into_iter().for_each(|it| it.write(autopilot, output)))
-            }
+            Self::Downloading(receiver) => receiver
+                .tick(now)
+                .map(|again| again.into_iter().for_each(|it| it.write(autopilot, KIND, output))),
             Self::Uploading(sender) => {
                 sender.tick(now).map(|again| again.into_iter().for_each(|it| it.write(autopilot, output)))
             }
@@ -124,12 +126,11 @@ impl Missions {
             return None;
         };
         if !receiver.is_complete() {
-            receiver.request().write(autopilot, output);
+            receiver.request().write(autopilot, KIND, output);
             *self = Self::Downloading(receiver);
             return None;
         }
-        let kind = MavMissionType::MAV_MISSION_TYPE_MISSION;
-        write_ack(autopilot, kind, MavMissionResult::MAV_MISSION_ACCEPTED, output);
+        write_ack(autopilot, KIND, MavMissionResult::MAV_MISSION_ACCEPTED, output);
         Some(MavEvent::MissionReceived { items: receiver.into_items() })
     }
 }

@@ -1,158 +1,281 @@
-//! The mission protocol at the autopilot's end: it keeps the mission, hands it out, and takes in a new one.
+//! The mission protocol at the autopilot's end: it keeps a mission, a geofence and rally points, hands them
+//! out, and takes in new ones.
 
 use std::time::Duration;
 
 use mavlink::dialects::common::{
-    MISSION_COUNT_DATA, MISSION_ITEM_INT_DATA, MavMissionResult, MavMissionType,
+    MISSION_ACK_DATA, MISSION_COUNT_DATA, MISSION_ITEM_DATA, MISSION_ITEM_INT_DATA, MavFrame,
+    MavMissionResult, MavMissionType,
 };
 
 use crate::frame::{Address, FrameWriter};
 use crate::mission::{MissionItem, MissionReceiver, is_mission, write_ack, write_count};
 
-/// The mission and the transfer under way, if any.
+/// The lists, and the transfer under way, if any: there is one at a time, so that nobody is told of a list
+/// that another station changes meanwhile.
 #[derive(Debug, Clone)]
 pub(super) struct Missions {
-    items: Vec<MissionItem>,
+    mission: Vec<MissionItem>,
+    fence: Vec<MissionItem>,
+    rally: Vec<MissionItem>,
     accepts: fn(&MissionItem) -> bool,
-    upload: Option<(Address, MissionReceiver)>,
-    /// The last station that uploaded a mission. It repeats its last item if the acknowledgement was lost.
-    last_uploader: Option<Address>,
+    accepts_fence: fn(&[MissionItem]) -> bool,
+    accepts_rally: fn(&[MissionItem]) -> bool,
+    upload: Option<Upload>,
+    /// The last station that uploaded, and what. It repeats its last item if the acknowledgement was lost.
+    last_uploader: Option<(Address, MavMissionType)>,
+}
+
+#[derive(Debug, Clone)]
+struct Upload {
+    from: Address,
+    kind: MavMissionType,
+    receiver: MissionReceiver,
+}
+
+/// What is another than before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Changed {
+    Mission,
+    /// The geofence or the rally points.
+    Places,
+    All,
 }
 
 impl Missions {
-    pub(super) fn new(accepts: fn(&MissionItem) -> bool) -> Self {
-        Self { items: Vec::new(), accepts, upload: None, last_uploader: None }
+    pub(super) fn new(
+        accepts: fn(&MissionItem) -> bool,
+        accepts_fence: fn(&[MissionItem]) -> bool,
+        accepts_rally: fn(&[MissionItem]) -> bool,
+    ) -> Self {
+        let [mission, fence, rally] = [const { Vec::new() }; 3];
+        let (upload, last_uploader) = (None, None);
+        Self { mission, fence, rally, accepts, accepts_fence, accepts_rally, upload, last_uploader }
     }
 
     pub(super) fn items(&self) -> &[MissionItem] {
-        &self.items
+        &self.mission
     }
 
-    /// `MISSION_REQUEST_LIST`. Fences and rally points are empty lists here.
+    pub(super) fn fence(&self) -> &[MissionItem] {
+        &self.fence
+    }
+
+    pub(super) fn rally_points(&self) -> &[MissionItem] {
+        &self.rally
+    }
+
+    fn list(&self, kind: MavMissionType) -> Option<&Vec<MissionItem>> {
+        match kind {
+            MavMissionType::MAV_MISSION_TYPE_MISSION => Some(&self.mission),
+            MavMissionType::MAV_MISSION_TYPE_FENCE => Some(&self.fence),
+            MavMissionType::MAV_MISSION_TYPE_RALLY => Some(&self.rally),
+            MavMissionType::MAV_MISSION_TYPE_ALL => None,
+        }
+    }
+
+    fn list_mut(&mut self, kind: MavMissionType) -> Option<&mut Vec<MissionItem>> {
+        match kind {
+            MavMissionType::MAV_MISSION_TYPE_MISSION => Some(&mut self.mission),
+            MavMissionType::MAV_MISSION_TYPE_FENCE => Some(&mut self.fence),
+            MavMissionType::MAV_MISSION_TYPE_RALLY => Some(&mut self.rally),
+            MavMissionType::MAV_MISSION_TYPE_ALL => None,
+        }
+    }
+
+    /// `MISSION_REQUEST_LIST`.
     pub(super) fn on_list(&self, from: Address, kind: MavMissionType, output: &mut FrameWriter) {
-        let count = if is_mission(kind) { self.items.len() } else { 0 };
-        write_count(from, kind, count as u16, output);
+        match self.list(kind) {
+            Some(items) => write_count(from, kind, items.len() as u16, output),
+            None => write_ack(from, kind, MavMissionResult::MAV_MISSION_UNSUPPORTED, output),
+        }
     }
 
     /// `MISSION_REQUEST_INT` or the older `MISSION_REQUEST`, answered alike.
     pub(super) fn on_request(&self, from: Address, kind: MavMissionType, seq: u16, output: &mut FrameWriter) {
-        match self.items.get(usize::from(seq)) {
-            Some(item) if is_mission(kind) => output.write(&item.to_message(seq, from)),
-            _ => write_ack(from, kind, MavMissionResult::MAV_MISSION_INVALID_SEQUENCE, output),
+        match self.list(kind).and_then(|items| items.get(usize::from(seq))) {
+            Some(item) => output.write(&item.to_message(seq, from, kind)),
+            None => write_ack(from, kind, MavMissionResult::MAV_MISSION_INVALID_SEQUENCE, output),
         }
     }
 
-    /// `MISSION_COUNT`: an upload begins, or begins anew. Returns whether the mission changed (to an empty
-    /// one).
+    /// `MISSION_COUNT`: an upload begins, or begins anew. Returns what has changed (to an empty list).
     pub(super) fn on_count(
         &mut self,
         now: Duration,
         from: Address,
         message: &MISSION_COUNT_DATA,
         output: &mut FrameWriter,
-    ) -> bool {
-        if !is_mission(message.mission_type) {
-            let result = if message.count == 0 {
-                MavMissionResult::MAV_MISSION_ACCEPTED
-            } else {
-                MavMissionResult::MAV_MISSION_UNSUPPORTED
-            };
-            write_ack(from, message.mission_type, result, output);
-            return false;
+    ) -> Option<Changed> {
+        let kind = message.mission_type;
+        if self.list(kind).is_none() {
+            write_ack(from, kind, MavMissionResult::MAV_MISSION_UNSUPPORTED, output);
+            return None;
         }
-        let receiver = match self.upload.take() {
-            Some((uploader, receiver)) if uploader != from => {
-                self.upload = Some((uploader, receiver));
-                write_ack(from, message.mission_type, MavMissionResult::MAV_MISSION_DENIED, output);
-                return false;
+        let mut upload = match self.upload.take() {
+            Some(upload) if upload.from != from => {
+                self.upload = Some(upload);
+                write_ack(from, kind, MavMissionResult::MAV_MISSION_DENIED, output);
+                return None;
             }
-            Some((_, receiver)) => receiver,
-            None => MissionReceiver::new(now),
+            Some(upload) if upload.kind == kind => upload,
+            _ => Upload { from, kind, receiver: MissionReceiver::new(now) },
         };
         self.last_uploader = None;
-        let (_, receiver) = self.upload.insert((from, receiver));
-        if receiver.on_count(now, message.count).is_err() {
-            self.abandon(from, MavMissionResult::MAV_MISSION_NO_SPACE, output);
-            return false;
+        if upload.receiver.on_count(now, message.count).is_err() {
+            write_ack(from, kind, MavMissionResult::MAV_MISSION_NO_SPACE, output);
+            return None;
         }
+        self.upload = Some(upload);
         self.ask_or_finish(output)
     }
 
-    /// `MISSION_ITEM_INT`. Returns whether the mission changed.
+    /// `MISSION_ITEM_INT`. Returns what has changed.
     pub(super) fn on_item(
         &mut self,
         now: Duration,
         from: Address,
         message: &MISSION_ITEM_INT_DATA,
         output: &mut FrameWriter,
-    ) -> bool {
-        if !is_mission(message.mission_type) {
-            return false;
-        }
-        let item = MissionItem::from_message(message);
+    ) -> Option<Changed> {
+        let (item, kind) = (MissionItem::from_message(message), message.mission_type);
         match &mut self.upload {
-            Some((uploader, _)) if *uploader == from && !(self.accepts)(&item) => {
-                self.abandon(from, MavMissionResult::MAV_MISSION_UNSUPPORTED, output);
-                false
-            }
-            Some((uploader, receiver)) if *uploader == from => {
-                receiver.on_item(now, message.seq, item) && self.ask_or_finish(output)
-            }
-            Some(_) => false,
-            None => {
-                if self.last_uploader == Some(from) && usize::from(message.seq) + 1 == self.items.len() {
-                    accept(from, output);
+            Some(upload) if upload.from == from && upload.kind == kind => {
+                if is_mission(kind) && !(self.accepts)(&item) {
+                    self.abandon(MavMissionResult::MAV_MISSION_UNSUPPORTED, output);
+                    return None;
                 }
-                false
+                if upload.receiver.on_item(now, message.seq, item) {
+                    self.ask_or_finish(output)
+                } else {
+                    None
+                }
+            }
+            Some(_) => None,
+            None => {
+                let is_last =
+                    self.list(kind).is_some_and(|items| usize::from(message.seq) + 1 == items.len());
+                if self.last_uploader == Some((from, kind)) && is_last {
+                    write_ack(from, kind, MavMissionResult::MAV_MISSION_ACCEPTED, output);
+                }
+                None
             }
         }
     }
 
-    /// `MISSION_CLEAR_ALL`. Returns whether the mission changed.
-    pub(super) fn on_clear(&mut self, from: Address, kind: MavMissionType, output: &mut FrameWriter) -> bool {
+    /// An item with a command that nobody knows: the upload that it belongs to is refused.
+    pub(super) fn refuse_item(&mut self, from: Address, output: &mut FrameWriter) {
+        if self.upload.as_ref().is_some_and(|upload| upload.from == from) {
+            self.abandon(MavMissionResult::MAV_MISSION_UNSUPPORTED, output);
+        }
+    }
+
+    /// `MISSION_ACK`: a station that gives its upload up says so.
+    pub(super) fn on_ack(&mut self, from: Address, message: &MISSION_ACK_DATA) {
+        let is_over = message.mavtype != MavMissionResult::MAV_MISSION_ACCEPTED;
+        self.upload.take_if(|upload| is_over && upload.from == from && upload.kind == message.mission_type);
+    }
+
+    /// `MISSION_CLEAR_ALL`: denied while another station uploads. A station's own upload ends with it.
+    /// Returns what has changed.
+    pub(super) fn on_clear(
+        &mut self,
+        from: Address,
+        kind: MavMissionType,
+        output: &mut FrameWriter,
+    ) -> Option<Changed> {
+        if self.upload.as_ref().is_some_and(|upload| upload.from != from) {
+            write_ack(from, kind, MavMissionResult::MAV_MISSION_DENIED, output);
+            return None;
+        }
+        if self.upload.is_some() {
+            self.abandon(MavMissionResult::MAV_MISSION_OPERATION_CANCELLED, output);
+        }
         write_ack(from, kind, MavMissionResult::MAV_MISSION_ACCEPTED, output);
-        let clears = is_mission(kind) || kind == MavMissionType::MAV_MISSION_TYPE_ALL;
-        clears && !std::mem::take(&mut self.items).is_empty()
+        self.last_uploader = None;
+        let Some(list) = self.list_mut(kind) else {
+            self.mission.clear();
+            self.fence.clear();
+            self.rally.clear();
+            return Some(Changed::All);
+        };
+        (!std::mem::take(list).is_empty()).then_some(changed(kind))
     }
 
     /// Asks again for what is overdue, and gives a dead upload up.
     pub(super) fn tick(&mut self, now: Duration, output: &mut FrameWriter) {
-        let Some((from, receiver)) = &mut self.upload else {
+        let Some(Upload { from, kind, receiver }) = &mut self.upload else {
             return;
         };
         match receiver.tick(now) {
             Ok(None) => {}
-            Ok(Some(request)) => request.write(*from, output),
-            Err(_) => {
-                let from = *from;
-                self.abandon(from, MavMissionResult::MAV_MISSION_OPERATION_CANCELLED, output);
-            }
+            Ok(Some(request)) => request.write(*from, *kind, output),
+            Err(_) => self.abandon(MavMissionResult::MAV_MISSION_OPERATION_CANCELLED, output),
         }
     }
 
-    fn abandon(&mut self, from: Address, result: MavMissionResult, output: &mut FrameWriter) {
-        self.upload = None;
-        write_ack(from, MavMissionType::MAV_MISSION_TYPE_MISSION, result, output);
+    fn abandon(&mut self, result: MavMissionResult, output: &mut FrameWriter) {
+        if let Some(Upload { from, kind, .. }) = self.upload.take() {
+            write_ack(from, kind, result, output);
+        }
     }
 
-    /// Asks for the next item, or takes the whole mission over: until then the old one stays in force.
-    fn ask_or_finish(&mut self, output: &mut FrameWriter) -> bool {
-        let Some((from, receiver)) = self.upload.take() else {
-            return false;
-        };
+    /// Asks for the next item, or takes the whole list over: until then the old one stays in force.
+    fn ask_or_finish(&mut self, output: &mut FrameWriter) -> Option<Changed> {
+        let Upload { from, kind, receiver } = self.upload.take()?;
         if !receiver.is_complete() {
-            receiver.request().write(from, output);
-            self.upload = Some((from, receiver));
-            return false;
+            receiver.request().write(from, kind, output);
+            self.upload = Some(Upload { from, kind, receiver });
+            return None;
         }
-        self.items = receiver.into_items();
-        self.last_uploader = Some(from);
-        accept(from, output);
-        true
+        let items = receiver.into_items();
+        if !self.is_sound(kind, &items) {
+            write_ack(from, kind, MavMissionResult::MAV_MISSION_UNSUPPORTED, output);
+            return None;
+        }
+        *self.list_mut(kind)? = items;
+        self.last_uploader = Some((from, kind));
+        write_ack(from, kind, MavMissionResult::MAV_MISSION_ACCEPTED, output);
+        Some(changed(kind))
+    }
+
+    fn is_sound(&self, kind: MavMissionType, items: &[MissionItem]) -> bool {
+        match kind {
+            MavMissionType::MAV_MISSION_TYPE_FENCE => (self.accepts_fence)(items),
+            MavMissionType::MAV_MISSION_TYPE_RALLY => (self.accepts_rally)(items),
+            _ => true,
+        }
     }
 }
 
-fn accept(target: Address, output: &mut FrameWriter) {
-    let kind = MavMissionType::MAV_MISSION_TYPE_MISSION;
-    write_ack(target, kind, MavMissionResult::MAV_MISSION_ACCEPTED, output);
+fn changed(kind: MavMissionType) -> Changed {
+    if is_mission(kind) { Changed::Mission } else { Changed::Places }
+}
+
+/// An item of the older message, whose latitude and longitude are in degrees where its frame is global.
+pub(super) fn whole(message: &MISSION_ITEM_DATA) -> MISSION_ITEM_INT_DATA {
+    use MavFrame::{MAV_FRAME_LOCAL_ENU, MAV_FRAME_LOCAL_NED, MAV_FRAME_MISSION};
+    let factor = match message.frame {
+        MAV_FRAME_LOCAL_NED | MAV_FRAME_LOCAL_ENU => 1e4,
+        MAV_FRAME_MISSION => 1.0,
+        _ => 1e7,
+    };
+    let scaled = |value: f32| (f64::from(value) * factor).round() as i32;
+    MISSION_ITEM_INT_DATA {
+        param1: message.param1,
+        param2: message.param2,
+        param3: message.param3,
+        param4: message.param4,
+        x: scaled(message.x),
+        y: scaled(message.y),
+        z: message.z,
+        seq: message.seq,
+        command: message.command,
+        target_system: message.target_system,
+        target_component: message.target_component,
+        frame: message.frame,
+        current: message.current,
+        autocontinue: message.autocontinue,
+        mission_type: message.mission_type,
+    }
 }

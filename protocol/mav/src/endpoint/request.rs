@@ -75,4 +75,6 @@ pub enum Request {
     ParameterChanged { name: &'static str },
     /// The mission was replaced or cleared.
     MissionChanged,
+    /// There is another geofence, or there are other rally points.
+    PlacesChanged,
 }

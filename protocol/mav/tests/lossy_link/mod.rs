@@ -54,6 +54,8 @@ impl Pair {
                 datum: datum(),
                 parameters: parameters(),
                 accepts_item: |item| item.z < 100.0,
+                accepts_fence: |items| items.len() != 2,
+                accepts_rally: |_| true,
             }),
             state: VehicleState {
                 measured: Duration::ZERO,

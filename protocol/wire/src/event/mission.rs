@@ -23,6 +23,18 @@ skein_bp::events! {
     Failed = "failed", Anyone {
         why: Text,
     }
+    /// A command to what the vehicle carries, as a MAVLink mission gives it: to a camera, a servo, a winch.
+    Payload = "payload", Own {
+        /// `MAV_CMD`.
+        command: i64,
+        param1: Option<f64>,
+        param2: Option<f64>,
+        param3: Option<f64>,
+        param4: Option<f64>,
+        param5: Option<f64>,
+        param6: Option<f64>,
+        param7: Option<f64>,
+    }
     /// Somebody else flies the vehicle.
     PilotTook = "pilot", Own {
         /// The flight mode.

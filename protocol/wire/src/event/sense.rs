@@ -59,6 +59,12 @@ skein_bp::events! {
     }
     /// Nobody else stays any more where the way ends.
     PlaceFree = "place_free", Own;
+    /// Where a return would end: the nearest of home and the rally points that no other vehicle has.
+    Refuge = "refuge", Own {
+        x: f64 ["m"],
+        y: f64 ["m"],
+        z: f64 ["m"],
+    }
     /// A narrow stretch of the way lies ahead, or goes on further, or less of it is left: its first place.
     Passage = "passage", Own {
         x: f64 ["m"],

@@ -7,6 +7,7 @@
 
 mod attitude_control;
 mod estimator;
+mod fence;
 mod mission;
 mod mixer;
 mod modes;
@@ -16,7 +17,7 @@ mod telling;
 
 use std::time::Duration;
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use skein_mav::{Datum, Endpoint, EndpointConfig, MissionItem, ParameterTable, Request, VehicleState};
 
 use crate::position_error::PositionErrors;
@@ -25,6 +26,7 @@ use crate::sensors::SensorReadings;
 use crate::vehicle::VehicleModel;
 use attitude_control::AttitudeControl;
 use estimator::{Estimate, Estimator};
+use fence::GeoFence;
 use mixer::Mixer;
 use modes::{Drive, Modes, Sticks};
 use parameters::Settings;
@@ -73,6 +75,8 @@ struct Situation<'a> {
     datum: &'a Datum,
     mission: &'a [MissionItem],
     home: Vector3<f64>,
+    fence: &'a GeoFence,
+    rally: &'a [Vector2<f64>],
 }
 
 /// The built-in autopilot of one vehicle.
@@ -112,6 +116,9 @@ pub struct Autopilot {
     attitude_control: AttitudeControl,
     mixer: Mixer,
     telling: Telling,
+    fence: GeoFence,
+    /// Places to return to, ENU, m.
+    rally: Vec<Vector2<f64>>,
     /// Time of the last step: bytes that arrive between two steps are stamped with it.
     now: Duration,
 }
@@ -136,7 +143,11 @@ impl Autopilot {
                 datum: config.datum,
                 parameters: config.parameters,
                 accepts_item: mission::accepts,
+                accepts_fence: fence::accepts_fence,
+                accepts_rally: fence::accepts_rally,
             }),
+            fence: GeoFence::default(),
+            rally: Vec::new(),
         }
     }
 
@@ -180,6 +191,8 @@ impl Autopilot {
             datum: &self.datum,
             mission: self.endpoint.mission(),
             home: self.modes.home().unwrap_or_else(Vector3::zeros),
+            fence: &self.fence,
+            rally: &self.rally,
         };
         (&mut self.modes, situation)
     }
@@ -199,6 +212,11 @@ impl Autopilot {
                 self.modes.on_sticks(now, sticks);
             }
             Request::ParameterChanged { .. } => self.read_settings(),
+            Request::PlacesChanged => {
+                self.fence = GeoFence::read(self.endpoint.fence(), &self.datum).unwrap_or_default();
+                self.rally =
+                    fence::rally_points(self.endpoint.rally_points(), &self.datum).unwrap_or_default();
+            }
             Request::MissionChanged => {
                 let (modes, situation) = self.decide(readings);
                 modes.on_mission_changed(&situation);

@@ -88,6 +88,8 @@ pub(super) struct Modes {
     armed: bool,
     airborne: bool,
     home: Option<Vector3<f64>>,
+    /// Where the return under way ends, ENU, m.
+    returns_to: Vector2<f64>,
     failsafe: Option<Failsafe>,
     charge: Charge,
     outside_fence: bool,

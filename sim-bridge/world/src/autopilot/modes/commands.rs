@@ -37,7 +37,7 @@ impl Modes {
             AutopilotCommand::Disarm { force } => self.disarm_on_command(force),
             AutopilotCommand::Takeoff { z_m } => self.take_off(situation, z_m),
             AutopilotCommand::SetMode(mode) => self.set_mode(situation, mode),
-            AutopilotCommand::GoTo { position } => self.go_to(position),
+            AutopilotCommand::GoTo { position } => self.go_to(situation, position),
             AutopilotCommand::SetSpeed { speed_m_s } => {
                 self.speed = Some(speed_m_s);
                 Ok(())
@@ -135,9 +135,12 @@ impl Modes {
         Ok(())
     }
 
-    fn go_to(&mut self, position: Vector3<f64>) -> Outcome {
+    fn go_to(&mut self, situation: &Situation<'_>, position: Vector3<f64>) -> Outcome {
         if !self.airborne {
             return refuse_for_now("Reposition denied: not flying");
+        }
+        if situation.fence.is_left_at(&position) {
+            return refuse_for_now("Reposition denied: off the fence");
         }
         self.begin(Task::Hold { position });
         Ok(())
@@ -159,6 +162,12 @@ impl Modes {
     fn start_mission(&mut self, situation: &Situation<'_>) -> Outcome {
         if situation.mission.is_empty() {
             return refuse_for_now("Mission denied: there is none");
+        }
+        let home_height_m = situation.datum.height_m + situation.home.z;
+        let places = situation.mission.iter().map(|item| item.position(situation.datum, home_height_m));
+        let leaves = |place: Option<Vector3<f64>>| place.is_some_and(|at| situation.fence.is_left_at(&at));
+        if let Some(item) = places.map(leaves).position(|leaves| leaves) {
+            return refuse_for_now(format!("Mission denied: item {item} is off the fence"));
         }
         let position = situation.estimate.position;
         let lift_off = (!self.airborne).then(|| {

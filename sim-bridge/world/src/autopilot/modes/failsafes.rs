@@ -67,8 +67,9 @@ impl Modes {
         let settings = situation.settings;
         let away = situation.estimate.position - situation.home;
         let beyond = |distance: f64, limit: f64| limit > 0.0 && distance > limit;
-        let outside =
-            beyond(away.xy().norm(), settings.fence_radius_m) || beyond(away.z, settings.fence_height_m);
+        let outside = beyond(away.xy().norm(), settings.fence_radius_m)
+            || beyond(away.z, settings.fence_height_m)
+            || situation.fence.is_left_at(&situation.estimate.position);
         let left = !std::mem::replace(&mut self.outside_fence, outside) && outside;
         if let Some(action) = settings.fence_action.filter(|_| left && self.airborne) {
             self.act(situation, action, "Geofence left");

@@ -48,7 +48,11 @@ impl Modes {
             return;
         }
         let position = situation.estimate.position;
-        let leg = if (position - situation.home).xy().norm() < AT_HOME_M {
+        let away_m = |place: &Vector2<f64>| (position.xy() - place).norm();
+        let places = situation.rally.iter().copied().chain([situation.home.xy()]);
+        let end = places.min_by(|a, b| away_m(a).total_cmp(&away_m(b))).unwrap_or(position.xy());
+        self.returns_to = end;
+        let leg = if away_m(&end) < AT_HOME_M {
             ReturnLeg::Descend
         } else {
             let way = stopping_way(&situation.estimate.velocity, situation.settings);
@@ -128,12 +132,12 @@ impl Modes {
                 stay_at(&Vector3::new(over.x, over.y, z), situation)
             }
             ReturnLeg::Home { z } => {
-                if (position - situation.home).xy().norm() < HEIGHT_REACHED_M {
+                if (position.xy() - self.returns_to).norm() < HEIGHT_REACHED_M {
                     self.task = Task::Return(ReturnLeg::Descend);
                 }
-                towards(&Vector3::new(situation.home.x, situation.home.y, z), situation)
+                towards(&self.returns_to.push(z), situation)
             }
-            ReturnLeg::Descend => self.descend(situation, situation.home.xy()),
+            ReturnLeg::Descend => self.descend(situation, self.returns_to),
         }
     }
 
