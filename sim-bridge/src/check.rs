@@ -5,7 +5,8 @@ use std::path::Path;
 
 use serde::Serialize;
 use skein_bp::behaviour::Behaviours;
-use skein_world::Scene;
+use skein_world::sdf::Entry;
+use skein_world::{Account, Scene, Verdict};
 
 use crate::mission::{self, MissionSet};
 use crate::scenario::{Overrides, Scenario, ScenarioError, read_world};
@@ -21,6 +22,22 @@ pub struct Findings {
     pub holds: String,
     /// Parts that have no effect or give way.
     pub warnings: Vec<String>,
+    /// What became of the elements of a world file.
+    pub elements: Vec<Element>,
+}
+
+/// Elements of a world file that have one name and one fate.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Element {
+    /// File, line and column of the first, with a colon between.
+    pub place: String,
+    /// Their name after that of what holds them, such as `link/collision`.
+    pub element: String,
+    /// `honoured`, `harmless` or `refused`.
+    pub verdict: &'static str,
+    /// What there is to say about them, if anything.
+    pub note: String,
+    pub count: usize,
 }
 
 impl fmt::Display for Findings {
@@ -31,29 +48,46 @@ impl fmt::Display for Findings {
 }
 
 /// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`), a mission (`.plan`, `.json`), or
-/// else a scenario; `thin_solids` may be in its way.
-pub fn check(file: &Path, thin_solids: bool, known: &Behaviours) -> Result<Findings, ScenarioError> {
+/// else a scenario, with what `allowed` lifts.
+pub fn check(file: &Path, allowed: &Overrides, known: &Behaviours) -> Result<Findings, ScenarioError> {
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let mut elements = Vec::new();
     let (kind, holds, warnings) = match extension.as_deref() {
         Some("sdf" | "world" | "csv") => {
-            let (scene, warnings) = read_world(file)?;
-            ("world", world(&scene), warnings)
+            let read = read_world(file, allowed.without_missing)?;
+            elements = list(&read.account);
+            ("world", world(&read.scene), read.notes())
         }
         Some("plan" | "json") => {
             let set = mission::read_files(&[file.to_owned()], None)?;
             ("mission", missions(&set), set.warnings.iter().map(ToString::to_string).collect())
         }
         _ => {
-            let overrides = Overrides { thin_solids, ..Overrides::default() };
-            let scenario = Scenario::open_with(&file.to_string_lossy(), &overrides, 1, known)?;
-            if !thin_solids {
+            let scenario = Scenario::open_with(&file.to_string_lossy(), allowed, 1, known)?;
+            if !allowed.thin_solids {
                 scenario.check_thin_solids()?;
             }
             let holds = format!("{} vehicles, {}", scenario.vehicles.len(), world(&scenario.scene));
             ("scenario", holds, scenario.notes)
         }
     };
-    Ok(Findings { file: file.display().to_string(), kind, holds, warnings })
+    Ok(Findings { file: file.display().to_string(), kind, holds, warnings, elements })
+}
+
+/// What became of the elements of a world.
+pub fn list(account: &Account) -> Vec<Element> {
+    let element = |entry: &Entry| Element {
+        place: entry.place.to_string(),
+        element: entry.element.clone(),
+        verdict: match entry.verdict {
+            Verdict::Honoured => "honoured",
+            Verdict::Harmless => "harmless",
+            Verdict::Refused => "refused",
+        },
+        note: entry.note.clone(),
+        count: entry.count,
+    };
+    account.entries.iter().map(element).collect()
 }
 
 fn world(scene: &Scene) -> String {
@@ -74,7 +108,7 @@ mod tests {
     use super::*;
 
     fn check(file: &Path) -> Result<Findings, ScenarioError> {
-        super::check(file, false, &Behaviours::default())
+        super::check(file, &Overrides::default(), &Behaviours::default())
     }
 
     #[test]
@@ -115,7 +149,8 @@ mod tests {
             error.contains("`bar` (0.100 m, from 4.15 to 4.25 m") && error.contains("--thin-solids"),
             "{error}"
         );
-        assert!(super::check(&path, true, &Behaviours::default()).is_ok());
+        let allowed = Overrides { thin_solids: true, ..Overrides::default() };
+        assert!(super::check(&path, &allowed, &Behaviours::default()).is_ok());
         for (height_m, thickness_m, model) in
             [(4.2, 0.1, "x500-vertical-scanner"), (4.2, 0.2, "x500"), (4.7, 0.1, "x500"), (0.05, 0.1, "x500")]
         {

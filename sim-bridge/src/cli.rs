@@ -74,6 +74,9 @@ pub enum Command {
         /// which a planar lidar does not see.
         #[arg(long)]
         thin_solids: bool,
+        /// Find nothing wrong with a world of which parts are missing or cannot be read.
+        #[arg(long)]
+        without_missing: bool,
     },
 }
 

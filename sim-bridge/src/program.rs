@@ -8,7 +8,7 @@ use serde_json::json;
 use skein_bp::behaviour::Behaviours;
 
 use crate::cli::{Cli, Command, Exit};
-use crate::scenario::{Scenario, ScenarioError};
+use crate::scenario::{Overrides, Scenario, ScenarioError};
 use crate::summary::Summary;
 use crate::{check, fly};
 
@@ -56,7 +56,14 @@ fn run(cli: &Cli, known: &Behaviours) -> anyhow::Result<Exit> {
             list(cli.json);
             Ok(Exit::Done)
         }
-        Command::Check { file, thin_solids } => check(file, *thin_solids, known, cli.json),
+        Command::Check { file, thin_solids, without_missing } => {
+            let allowed = Overrides {
+                thin_solids: *thin_solids,
+                without_missing: *without_missing,
+                ..Overrides::default()
+            };
+            check(file, &allowed, known, cli.json)
+        }
     }
 }
 
@@ -70,8 +77,8 @@ fn show(summary: &Summary, as_json: bool) -> anyhow::Result<()> {
 }
 
 /// An unsound file is an answer, and the check has failed; a file that cannot be read is wrong input.
-fn check(file: &Path, thin_solids: bool, known: &Behaviours, as_json: bool) -> anyhow::Result<Exit> {
-    match check::check(file, thin_solids, known) {
+fn check(file: &Path, allowed: &Overrides, known: &Behaviours, as_json: bool) -> anyhow::Result<Exit> {
+    match check::check(file, allowed, known) {
         Ok(findings) => {
             if as_json {
                 println!("{}", serde_json::to_string(&findings)?);
@@ -83,7 +90,11 @@ fn check(file: &Path, thin_solids: bool, known: &Behaviours, as_json: bool) -> a
         Err(error @ ScenarioError::Unreadable { .. }) => Err(error.into()),
         Err(error) => {
             if as_json {
-                println!("{}", json!({ "file": file, "error": error.to_string() }));
+                let elements = match &error {
+                    ScenarioError::Lacking(lacking) => check::list(&lacking.0),
+                    _ => Vec::new(),
+                };
+                println!("{}", json!({ "file": file, "error": error.to_string(), "elements": elements }));
             }
             eprintln!("skein-sim: {error}");
             Ok(Exit::Failed)

@@ -22,6 +22,7 @@ mod targets;
 mod thin_solids;
 mod walker;
 mod window;
+mod world;
 
 use std::path::{Path, PathBuf};
 
@@ -42,6 +43,7 @@ use skein_world::{Aabb, PositionErrors, Scene, VehicleModel, WindConfig};
 pub use error::ScenarioError;
 pub use layout::SPACING_M;
 pub use missions::apply_missions;
+pub use world::{ReadWorld, read_world};
 
 use self::walker::Walker;
 use crate::autopilots::make::Make;
@@ -217,6 +219,9 @@ pub struct Overrides {
     /// does not see.
     #[arg(long)]
     pub thin_solids: bool,
+    /// Fly though parts of the world are missing or cannot be read: they are left out.
+    #[arg(long)]
+    pub without_missing: bool,
     /// What a vehicle does once the ground station has been silent for 5 s: continue, return or land; the scenario's own
     /// if not given.
     #[arg(long, value_name = "POLICY", value_parser = policy)]
@@ -254,7 +259,7 @@ impl Scenario {
         vehicles: Option<usize>,
         seed: u64,
     ) -> Result<Self, ScenarioError> {
-        Self::of_program(text, file, vehicles, seed, &Behaviours::default())
+        Self::of_program(text, file, vehicles, seed, &Behaviours::default(), false)
     }
 
     /// The same for a program with these behaviours.
@@ -264,8 +269,10 @@ impl Scenario {
         vehicles: Option<usize>,
         seed: u64,
         known: &Behaviours,
+        without_missing: bool,
     ) -> Result<Self, ScenarioError> {
-        let scenario = file::ScenarioFile::parse(text, file)?.build(vehicles, seed, known)?;
+        let scenario =
+            file::ScenarioFile::parse(text, file)?.build(vehicles, seed, known, without_missing)?;
         scenario.validate()?;
         Ok(scenario)
     }
@@ -282,18 +289,19 @@ impl Scenario {
         seed: u64,
         known: &Behaviours,
     ) -> Result<Self, ScenarioError> {
-        let world = overrides.world.as_deref().map(read_world).transpose()?;
-        let datum = world.as_ref().and_then(|(scene, _)| stated_datum(scene));
+        let world = overrides.world.as_deref().map(|path| read_world(path, overrides.without_missing));
+        let world = world.transpose()?;
+        let datum = world.as_ref().and_then(|world| stated_datum(&world.scene));
         let set = mission::read_files(&overrides.missions, datum)?;
         let own_number = || (set.missions.len() > 1).then_some(set.missions.len());
         let vehicles = overrides.vehicles.or_else(own_number);
         let mut scenario = match text_of(name)? {
-            Some(text) => Self::of_program(&text, name, vehicles, seed, known)?,
+            Some(text) => Self::of_program(&text, name, vehicles, seed, known, overrides.without_missing)?,
             None => Self::built_in(name, vehicles, seed)?,
         };
-        if let Some((scene, warnings)) = world {
-            scenario.replace_world(scene);
-            scenario.notes.extend(warnings);
+        if let Some(world) = world {
+            scenario.notes.extend(world.notes());
+            scenario.replace_world(world.scene);
             if set.missions.is_empty() {
                 scenario.settle()?;
             }
@@ -309,6 +317,9 @@ impl Scenario {
 
     /// Puts another world in place of the scenario's own; the routes stay until [`Scenario::settle`] or a mission.
     pub fn replace_world(&mut self, scene: Scene) {
+        if scene.wind() != Vector3::zeros() {
+            self.wind.mean = scene.wind();
+        }
         self.scene = scene;
         self.fixed_bounds = false;
         self.include_routes();
@@ -622,17 +633,6 @@ fn text_of(name: &str) -> Result<Option<String>, ScenarioError> {
     let path = Path::new(name);
     let names_a_file = path.extension().is_some() || path.components().count() > 1;
     if names_a_file { read(path).map(Some) } else { Ok(None) }
-}
-
-/// Reads a Gazebo world, or a `.csv` of boxes; returns what of it could not be read as lines for people.
-pub fn read_world(path: &Path) -> Result<(Scene, Vec<String>), ScenarioError> {
-    let text = read(path)?;
-    let name = path.display().to_string();
-    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
-        return Ok((Scene::from_csv(&text, &name)?, Vec::new()));
-    }
-    let (scene, warnings) = Scene::from_sdf(&text, &name)?;
-    Ok((scene, warnings.iter().map(ToString::to_string).collect()))
 }
 
 fn read(path: &Path) -> Result<String, ScenarioError> {

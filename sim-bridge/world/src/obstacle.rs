@@ -6,10 +6,11 @@ use std::time::Duration;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use crate::aabb::Aabb;
+use crate::mesh::Mesh;
 use crate::way::Way;
 
-/// The form of an obstacle in its own frame, metres, centred on its origin.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The form of an obstacle in its own frame, metres, centred on its origin; but a mesh is where its corners are.
+#[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// A cuboid.
     Box {
@@ -25,6 +26,15 @@ pub enum Shape {
     },
     /// A ball.
     Sphere { radius: f64 },
+    /// A cylinder about z with half a ball on each end.
+    Capsule {
+        /// Radius of the round section and of the balls.
+        radius: f64,
+        /// Half of the length along z without the balls.
+        half_length: f64,
+    },
+    /// Many faces.
+    Mesh(Mesh),
     /// Everything below an infinite plane through the origin.
     Plane {
         /// Points out of the solid half.
@@ -36,6 +46,8 @@ impl Shape {
     /// Radius of the smallest ball about the origin that holds the shape; infinite for a plane.
     pub fn bounding_radius(&self) -> f64 {
         match *self {
+            Self::Capsule { radius, half_length } => radius + half_length,
+            Self::Mesh(ref mesh) => mesh.bounding_radius(),
             Self::Box { half_extents } => half_extents.norm(),
             Self::Cylinder { radius, half_height } => radius.hypot(half_height),
             Self::Sphere { radius } => radius,
@@ -44,10 +56,16 @@ impl Shape {
     }
 
     /// Length of the longest straight line inside along the unit vector `direction` (own frame), metres: that
-    /// through the middle, for every shape is the same on both sides of it. Infinite for a plane.
+    /// through the middle, for every shape is the same on both sides of it. Infinite for a plane; of a mesh that of the
+    /// box around it.
     pub fn thickness_m(&self, direction: &Vector3<f64>) -> f64 {
         let half = match *self {
             Self::Box { half_extents } => half_extents.component_div(&direction.abs()).min(),
+            Self::Capsule { radius, half_length } => half_of_capsule(radius, half_length, direction),
+            Self::Mesh(ref mesh) => {
+                let bounds = mesh.bounds();
+                ((bounds.max - bounds.min) / 2.0).component_div(&direction.abs()).min()
+            }
             Self::Cylinder { radius, half_height } => {
                 (radius / direction.xy().norm()).min(half_height / direction.z.abs())
             }
@@ -72,6 +90,11 @@ impl Shape {
                 outside + beyond_side.max(beyond_cap).min(0.0)
             }
             Self::Sphere { radius } => point.coords.norm() - radius,
+            Self::Capsule { radius, half_length } => {
+                let beyond_end = (point.z.abs() - half_length).max(0.0);
+                point.x.hypot(point.y).hypot(beyond_end) - radius
+            }
+            Self::Mesh(ref mesh) => mesh.signed_distance(point),
             Self::Plane { normal } => point.coords.dot(&normal),
         }
     }
@@ -100,12 +123,37 @@ impl Shape {
                 origin.coords.dot(direction),
                 origin.coords.norm_squared() - radius * radius,
             )?,
+            Self::Capsule { radius, half_length } => {
+                return cast_ray_on_capsule(radius, half_length, origin, direction);
+            }
+            Self::Mesh(ref mesh) => return mesh.cast_ray(origin, direction),
             Self::Plane { normal } => {
                 Interval::RAY.below(origin.coords.dot(&normal), direction.dot(&normal))?
             }
         };
         Some(inside.from)
     }
+}
+
+/// The distance from the middle of a capsule to its surface along a unit vector, metres.
+fn half_of_capsule(radius: f64, half_length: f64, direction: &Vector3<f64>) -> f64 {
+    let (aside, along) = (direction.xy().norm(), direction.z.abs());
+    if radius * along <= half_length * aside {
+        return radius / aside;
+    }
+    let off_axis = half_length * aside;
+    half_length * along + (radius * radius - off_axis * off_axis).max(0.0).sqrt()
+}
+
+fn cast_ray_on_capsule(
+    radius: f64,
+    half_length: f64,
+    origin: &Point3<f64>,
+    direction: &Vector3<f64>,
+) -> Option<f64> {
+    let side = Shape::Cylinder { radius, half_height: half_length }.cast_ray(origin, direction);
+    let end = |z: f64| Shape::Sphere { radius }.cast_ray(&(origin - Vector3::z() * z), direction);
+    [side, end(half_length), end(-half_length)].into_iter().flatten().reduce(f64::min)
 }
 
 /// The part of a ray that lies inside the bodies intersected so far, as distances along it.
@@ -234,6 +282,10 @@ impl Obstacle {
         let centre = self.pose.translation.vector;
         let rotation = self.pose.rotation.to_rotation_matrix();
         let reach = match self.shape {
+            Shape::Capsule { radius, half_length } => {
+                (rotation * Vector3::z()).map(|part| half_length * part.abs() + radius)
+            }
+            Shape::Mesh(ref mesh) => return Some(mesh.bounds().moved(&self.pose)),
             Shape::Box { half_extents } => rotation.matrix().abs() * half_extents,
             Shape::Cylinder { radius, half_height } => {
                 let axis = rotation * Vector3::z();
@@ -249,11 +301,18 @@ impl Obstacle {
     /// round shapes are drawn with 16 corners. Empty for a plane.
     pub fn footprint(&self) -> Vec<[f64; 2]> {
         let outline: Vec<Vector3<f64>> = match self.shape {
+            Shape::Mesh(ref mesh) => {
+                let Aabb { min, max } = mesh.bounds();
+                [(max.x, max.y), (min.x, max.y), (min.x, min.y), (max.x, min.y)]
+                    .map(|(x, y)| Vector3::new(x, y, 0.0))
+                    .to_vec()
+            }
             Shape::Box { half_extents: h } => [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]
                 .iter()
                 .map(|(x, y)| Vector3::new(x * h.x, y * h.y, 0.0))
                 .collect(),
-            Shape::Cylinder { radius, .. } | Shape::Sphere { radius } => (0..16)
+            Shape::Cylinder { radius, .. } | Shape::Sphere { radius } | Shape::Capsule { radius, .. } => (0
+                ..16)
                 .map(|corner| {
                     let (sin, cos) = (TAU * f64::from(corner) / 16.0).sin_cos();
                     Vector3::new(radius * cos, radius * sin, 0.0)

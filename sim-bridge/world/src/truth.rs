@@ -4,12 +4,13 @@
 //! those cannot hide a collision.
 
 use glamx::{DPose3, DVec3};
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::{Compound, SharedShape};
 
 use crate::aabb::Aabb;
 use crate::lidar::Hull;
+use crate::mesh::Mesh;
 use crate::obstacle::{Obstacle, Shape};
 use crate::scene::Scene;
 
@@ -179,26 +180,54 @@ impl Referee {
 /// The obstacles as parry shapes.
 #[derive(Clone)]
 struct Solids {
-    /// All that have an end, under one bounding volume hierarchy.
+    /// All simple ones that have an end, under one bounding volume hierarchy.
     bodies: Option<Compound>,
-    planes: Vec<(DPose3, SharedShape)>,
+    /// Planes; and meshes, which have hierarchies of their own.
+    others: Vec<Other>,
+}
+
+/// A solid that parry does not let into a compound.
+#[derive(Clone)]
+enum Other {
+    Plane(DPose3, SharedShape),
+    /// Hollow or filled is the mesh's own matter.
+    Mesh(Isometry3<f64>, Mesh),
+}
+
+impl Other {
+    fn distance(&self, point: DVec3) -> f64 {
+        match self {
+            Self::Plane(pose, plane) => plane.distance_to_point(pose, point, true),
+            Self::Mesh(pose, mesh) => {
+                let own = pose.inverse_transform_point(&Point3::new(point.x, point.y, point.z));
+                mesh.signed_distance(&own).max(0.0)
+            }
+        }
+    }
 }
 
 impl Solids {
     fn new<'a>(obstacles: impl Iterator<Item = &'a Obstacle>) -> Self {
-        let (planes, bodies): (Vec<_>, Vec<_>) =
-            obstacles.partition(|obstacle| matches!(obstacle.shape, Shape::Plane { .. }));
-        let parts = |obstacles: Vec<&Obstacle>| obstacles.into_iter().map(parry_shape).collect();
-        let bodies: Vec<_> = parts(bodies);
-        Self { bodies: (!bodies.is_empty()).then(|| Compound::new(bodies)), planes: parts(planes) }
+        let (mut bodies, mut others) = (Vec::new(), Vec::new());
+        for obstacle in obstacles {
+            match &obstacle.shape {
+                Shape::Mesh(mesh) => others.push(Other::Mesh(obstacle.pose, mesh.clone())),
+                Shape::Plane { .. } => {
+                    let (pose, plane) = parry_shape(obstacle);
+                    others.push(Other::Plane(pose, plane));
+                }
+                _ => bodies.push(parry_shape(obstacle)),
+            }
+        }
+        Self { bodies: (!bodies.is_empty()).then(|| Compound::new(bodies)), others }
     }
 
     /// Distance from a point to the nearest obstacle, 0 inside; `None` without obstacles.
     fn distance(&self, point: &Vector3<f64>) -> Option<f64> {
         let point = DVec3::new(point.x, point.y, point.z);
         let bodies = self.bodies.iter().map(|compound| compound.distance_to_local_point(point, true));
-        let planes = self.planes.iter().map(|(pose, plane)| plane.distance_to_point(pose, point, true));
-        bodies.chain(planes).reduce(f64::min)
+        let others = self.others.iter().map(|other| other.distance(point));
+        bodies.chain(others).reduce(f64::min)
     }
 }
 
@@ -214,6 +243,11 @@ fn parry_shape(obstacle: &Obstacle) -> (DPose3, SharedShape) {
             SharedShape::cylinder(half_height, radius)
         }
         Shape::Sphere { radius } => SharedShape::ball(radius),
+        Shape::Capsule { radius, half_length } => SharedShape::capsule_z(half_length, radius),
+        Shape::Mesh(ref mesh) => {
+            let (own, shape) = mesh.parry();
+            return (DPose3::from(pose) * own, shape.clone());
+        }
         Shape::Plane { normal } => SharedShape::halfspace(DVec3::new(normal.x, normal.y, normal.z)),
     };
     (pose.into(), shape)

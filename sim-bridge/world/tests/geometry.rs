@@ -24,6 +24,7 @@ fn shape() -> impl Strategy<Value = Shape> {
         [size(), size(), size()].prop_map(|half| Shape::Box { half_extents: half.into() }),
         (size(), size()).prop_map(|(radius, half_height)| Shape::Cylinder { radius, half_height }),
         size().prop_map(|radius| Shape::Sphere { radius }),
+        (size(), size()).prop_map(|(radius, half_length)| Shape::Capsule { radius, half_length }),
         direction().prop_map(|normal| Shape::Plane { normal }),
     ]
 }
@@ -45,6 +46,8 @@ fn in_parry(obstacle: &Obstacle) -> (DPose3, SharedShape) {
             SharedShape::cylinder(half_height, radius)
         }
         Shape::Sphere { radius } => SharedShape::ball(radius),
+        Shape::Capsule { radius, half_length } => SharedShape::capsule_z(half_length, radius),
+        Shape::Mesh(_) => unreachable!("meshes are parry's own"),
         Shape::Plane { normal } => SharedShape::halfspace(DVec3::new(normal.x, normal.y, normal.z)),
     };
     (pose.into(), shape)
@@ -193,10 +196,10 @@ fn a_solid_is_as_thick_as_it_is_high_over_one_place() {
     let cylinder = Shape::Cylinder { radius: 0.01, half_height: 10.0 };
     let plate = Shape::Box { half_extents: nalgebra::Vector3::new(4.0, 4.0, 0.05) };
     for (solid, thickness_m) in [
-        (turned(cylinder, 0.0), 20.0),
-        (turned(cylinder, quarter), 0.02),
+        (turned(cylinder.clone(), 0.0), 20.0),
+        (turned(cylinder.clone(), quarter), 0.02),
         (turned(cylinder, quarter - 0.5), 0.02 / 0.5_f64.cos()),
-        (turned(plate, 0.0), 0.1),
+        (turned(plate.clone(), 0.0), 0.1),
         (turned(plate, quarter / 2.0), 0.1 * 2.0_f64.sqrt()),
         (turned(Shape::Sphere { radius: 0.3 }, 0.0), 0.6),
     ] {
