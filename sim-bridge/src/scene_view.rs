@@ -9,6 +9,9 @@ use skein_world::{Aabb, Obstacle, Scene, Shape};
 /// A scene of which something moves is shown this often.
 pub const MOVING_PERIOD: Duration = Duration::from_millis(200);
 
+/// A cone is shown as a pile of so many cylinders.
+const CONE_STEPS: f64 = 8.0;
+
 /// The obstacles of `scene`; planes without end are left out, and of meshes their blocks are shown.
 pub fn view(scene: &Scene) -> skein_wire::Scene {
     let bounds = scene.bounds();
@@ -32,6 +35,15 @@ fn solids(obstacle: &Obstacle) -> Vec<Solid> {
             at(half_length, Form::Sphere { radius }),
             at(-half_length, Form::Sphere { radius }),
         ],
+        Shape::Ellipsoid { radii } => vec![at(0.0, Form::Box(2.0 * radii))],
+        Shape::Cone { radius, half_height } => {
+            let height = 2.0 * half_height / CONE_STEPS;
+            let step = |step: f64| {
+                let radius = radius * (1.0 - step / CONE_STEPS);
+                at((step + 0.5) * height - half_height, Form::Cylinder { radius, height })
+            };
+            (0..CONE_STEPS as u32).map(|number| step(f64::from(number))).collect()
+        }
         Shape::Mesh(ref mesh) => {
             let block = |block: &Aabb| {
                 let middle = Translation3::from((block.min + block.max) / 2.0);

@@ -52,6 +52,7 @@ pub mod obstacle;
 pub mod pilot;
 pub mod position_error;
 pub mod quadrotor;
+mod round;
 pub mod scene;
 pub mod sdf;
 pub mod sensors;

@@ -10,7 +10,6 @@ use parry3d_f64::shape::{Compound, SharedShape};
 
 use crate::aabb::Aabb;
 use crate::lidar::Hull;
-use crate::mesh::Mesh;
 use crate::obstacle::{Obstacle, Shape};
 use crate::scene::Scene;
 
@@ -190,17 +189,17 @@ struct Solids {
 #[derive(Clone)]
 enum Other {
     Plane(DPose3, SharedShape),
-    /// Hollow or filled is the mesh's own matter.
-    Mesh(Isometry3<f64>, Mesh),
+    /// A mesh, or a shape that parry lacks, which measures itself.
+    Own(Isometry3<f64>, Shape),
 }
 
 impl Other {
     fn distance(&self, point: DVec3) -> f64 {
         match self {
             Self::Plane(pose, plane) => plane.distance_to_point(pose, point, true),
-            Self::Mesh(pose, mesh) => {
+            Self::Own(pose, shape) => {
                 let own = pose.inverse_transform_point(&Point3::new(point.x, point.y, point.z));
-                mesh.signed_distance(&own).max(0.0)
+                shape.signed_distance(&own).max(0.0)
             }
         }
     }
@@ -211,12 +210,14 @@ impl Solids {
         let (mut bodies, mut others) = (Vec::new(), Vec::new());
         for obstacle in obstacles {
             match &obstacle.shape {
-                Shape::Mesh(mesh) => others.push(Other::Mesh(obstacle.pose, mesh.clone())),
-                Shape::Plane { .. } => {
-                    let (pose, plane) = parry_shape(obstacle);
-                    others.push(Other::Plane(pose, plane));
+                Shape::Plane { normal } => {
+                    let plane = SharedShape::halfspace(DVec3::new(normal.x, normal.y, normal.z));
+                    others.push(Other::Plane(obstacle.pose.into(), plane));
                 }
-                _ => bodies.push(parry_shape(obstacle)),
+                shape => match parry_shape(obstacle) {
+                    Some(body) => bodies.push(body),
+                    None => others.push(Other::Own(obstacle.pose, shape.clone())),
+                },
             }
         }
         Self { bodies: (!bodies.is_empty()).then(|| Compound::new(bodies)), others }
@@ -231,24 +232,24 @@ impl Solids {
     }
 }
 
-/// An obstacle as a parry shape and its pose.
-fn parry_shape(obstacle: &Obstacle) -> (DPose3, SharedShape) {
+/// An obstacle as a parry shape and its pose; `None` of one that is no simple shape of parry's.
+fn parry_shape(obstacle: &Obstacle) -> Option<(DPose3, SharedShape)> {
     let mut pose = obstacle.pose;
+    // Parry's cylinders and cones stand along y.
+    let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
     let shape = match obstacle.shape {
         Shape::Box { half_extents } => SharedShape::cuboid(half_extents.x, half_extents.y, half_extents.z),
         Shape::Cylinder { radius, half_height } => {
-            // Parry's cylinders stand along y.
-            let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
-            pose *= Isometry3::from_parts(nalgebra::Translation3::identity(), upright);
+            pose *= upright;
             SharedShape::cylinder(half_height, radius)
+        }
+        Shape::Cone { radius, half_height } => {
+            pose *= upright;
+            SharedShape::cone(half_height, radius)
         }
         Shape::Sphere { radius } => SharedShape::ball(radius),
         Shape::Capsule { radius, half_length } => SharedShape::capsule_z(half_length, radius),
-        Shape::Mesh(ref mesh) => {
-            let (own, shape) = mesh.parry();
-            return (DPose3::from(pose) * own, shape.clone());
-        }
-        Shape::Plane { normal } => SharedShape::halfspace(DVec3::new(normal.x, normal.y, normal.z)),
+        Shape::Ellipsoid { .. } | Shape::Mesh(_) | Shape::Plane { .. } => return None,
     };
-    (pose.into(), shape)
+    Some((pose.into(), shape))
 }

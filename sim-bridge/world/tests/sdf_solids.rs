@@ -137,7 +137,7 @@ fn what_cannot_be_solid_is_refused_by_name() {
         ("<heightmap><uri>roof.obj</uri><size>1 1 1</size></heightmap>", "the heightmap `roof.obj`"),
         (
             "<polyline><point>0 0</point><point>1 1</point><height>1</height></polyline>",
-            "at least three corners",
+            "expected 3 to 10000 corners",
         ),
     ] {
         let lacking = try_read("0 0 0 0 0 0", geometry).expect_err("no solid").to_string();

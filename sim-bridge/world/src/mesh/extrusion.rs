@@ -4,9 +4,15 @@ use earcut::Earcut;
 
 use super::{Faces, Mesh, MeshError};
 
+/// Outlines of more corners are refused.
+pub const MOST_CORNERS: usize = 10_000;
+
 impl Mesh {
     /// The solid between z = 0 and `height` over an outline, whose corners go round in either direction.
     pub fn extrusion(outline: &[[f64; 2]], height: f64) -> Result<Self, MeshError> {
+        if outline.len() > MOST_CORNERS {
+            return Err(MeshError::Outline);
+        }
         let mut outline = outline.to_vec();
         outline.dedup();
         if outline.len() > 1 && outline.first() == outline.last() {

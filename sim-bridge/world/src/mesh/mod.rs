@@ -1,10 +1,9 @@
-//! Solids of many faces: meshes, terrain, and round forms that parry lacks, each under a hierarchy of bounding boxes.
+//! Solids of many faces: meshes and terrain, each under a hierarchy of bounding boxes.
 
 mod blocks;
 mod dae;
 pub mod extrusion;
 mod obj;
-pub mod round;
 mod stl;
 pub mod terrain;
 
@@ -76,7 +75,7 @@ pub enum MeshError {
     Raw(usize),
     #[error("expected 2 to {most} heights along each side, found {rows} x {columns}", most = terrain::MOST_ALONG)]
     Heights { rows: usize, columns: usize },
-    #[error("expected at least three corners that do not lie in one line")]
+    #[error("expected 3 to {most} corners that do not lie in one line", most = extrusion::MOST_CORNERS)]
     Outline,
 }
 
@@ -178,11 +177,6 @@ impl Mesh {
     /// Radius of the smallest ball about the origin that holds that box, metres.
     pub fn bounding_radius(&self) -> f64 {
         self.bounds.min.abs().sup(&self.bounds.max.abs()).norm()
-    }
-
-    /// As parry has it, with its pose in the own frame.
-    pub(crate) fn parry(&self) -> (DPose3, &SharedShape) {
-        (self.pose, &self.shape)
     }
 
     /// The same, each own axis times a factor; it is as it was where parry cannot.

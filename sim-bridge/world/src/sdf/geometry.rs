@@ -41,10 +41,13 @@ impl Reader<'_> {
             })),
             "sphere" => Ok(at_origin(Shape::Sphere { radius: form.size("radius")? })),
             "plane" => Ok(at_origin(Shape::Plane { normal: read_normal(form)? })),
-            "ellipsoid" => {
-                Mesh::ellipsoid(&form.sizes::<3>("radii", "three sizes above 0")?.into()).map(solid)
-            }
-            "cone" => Mesh::cone(form.size("radius")?, form.size("length")?).map(solid),
+            "ellipsoid" => Ok(at_origin(Shape::Ellipsoid {
+                radii: form.sizes::<3>("radii", "three sizes above 0")?.into(),
+            })),
+            "cone" => Ok(at_origin(Shape::Cone {
+                radius: form.size("radius")?,
+                half_height: form.size("length")? / 2.0,
+            })),
             "polyline" => read_polylines(geometry)?,
             "mesh" => return self.read_mesh(form, owner),
             "heightmap" => return self.read_heightmap(form, owner),

@@ -105,6 +105,10 @@ fn scaled(shape: &Shape, scale: &Vector3<f64>) -> Shape {
         Shape::Capsule { radius, half_length } => {
             Shape::Capsule { radius: radius * wide, half_length: half_length * scale.z }
         }
+        Shape::Cone { radius, half_height } => {
+            Shape::Cone { radius: radius * wide, half_height: half_height * scale.z }
+        }
+        Shape::Ellipsoid { radii } => Shape::Ellipsoid { radii: radii.component_mul(scale) },
         Shape::Mesh(mesh) => Shape::Mesh(mesh.scaled(scale)),
         Shape::Plane { .. } => shape.clone(),
     }
