@@ -47,13 +47,13 @@ impl fmt::Display for Findings {
     }
 }
 
-/// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`), a mission (`.plan`, `.json`), or
+/// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`, `.obj`, `.pcd`, `.ply`), a mission (`.plan`, `.json`), or
 /// else a scenario, with what `allowed` lifts.
 pub fn check(file: &Path, allowed: &Overrides, known: &Behaviours) -> Result<Findings, ScenarioError> {
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase());
     let mut elements = Vec::new();
     let (kind, holds, warnings) = match extension.as_deref() {
-        Some("sdf" | "world" | "csv") => {
+        Some("sdf" | "world" | "csv" | "obj" | "pcd" | "ply") => {
             let read = read_world(file, allowed.without_missing)?;
             elements = list(&read.account);
             ("world", world(&read.scene), read.notes())

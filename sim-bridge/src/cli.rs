@@ -68,7 +68,7 @@ pub enum Command {
     List,
     /// Check a scenario, world or mission file.
     Check {
-        /// A scenario (.toml), world (.sdf, .world, .csv) or mission (.plan, .json), or a built-in scenario's name.
+        /// A scenario (.toml), world (.sdf, .world, .csv, .obj, .pcd, .ply) or mission (.plan, .json), or a built-in scenario's name.
         file: PathBuf,
         /// Find nothing wrong with solids near the heights of flight that are thinner than 0.2 m in height,
         /// which a planar lidar does not see.

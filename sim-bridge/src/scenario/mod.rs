@@ -209,7 +209,7 @@ pub struct Overrides {
     /// Size of the swarm; the scenario's own if not given.
     #[arg(long, value_name = "N")]
     pub vehicles: Option<usize>,
-    /// A Gazebo world (SDF) or a list of boxes (.csv) in place of the scenario's world.
+    /// A Gazebo world (SDF), list of boxes (.csv), mesh (.obj) or point cloud (.pcd, .ply) in place of the scenario's world.
     #[arg(long, value_name = "FILE")]
     pub world: Option<PathBuf>,
     /// A QGroundControl plan or LSC mission; one that all fly in trail, or one for each vehicle.

@@ -23,18 +23,30 @@ impl ReadWorld {
     }
 }
 
-/// Reads a Gazebo world, or a `.csv` of boxes; `without_missing` if it may lack what cannot be read.
+/// Reads a Gazebo world, a `.csv` of boxes, a mesh (`.obj`) or a point cloud (`.pcd`, `.ply`); `without_missing` if it
+/// may lack what cannot be read.
 ///
 /// # Errors
 /// The first fault in a file; all that is solid and cannot be read.
 pub fn read_world(path: &Path, without_missing: bool) -> Result<ReadWorld, ScenarioError> {
-    let text = read(path)?;
     let name = path.display().to_string();
-    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
-        return Ok(ReadWorld { scene: Scene::from_csv(&text, &name)?, account: Account::default() });
+    let kind = path.extension().map(|kind| kind.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let plain = |scene| ReadWorld { scene, account: Account::default() };
+    match kind.as_str() {
+        "csv" => Ok(plain(Scene::from_csv(&read(path)?, &name)?)),
+        "obj" | "pcd" | "ply" => {
+            let bytes = std::fs::read(path)
+                .map_err(|source| ScenarioError::Unreadable { path: path.to_owned(), source })?;
+            Ok(plain(Scene::from_measured(&bytes, &name)?))
+        }
+        _ => {
+            let reading = Scene::from_sdf(&read(path)?, &name, &ModelFolders::of(path))?;
+            let (scene, account) = if without_missing {
+                reading.without_missing()
+            } else {
+                reading.whole().map_err(Box::new)?
+            };
+            Ok(ReadWorld { scene, account })
+        }
     }
-    let reading = Scene::from_sdf(&text, &name, &ModelFolders::of(path))?;
-    let (scene, account) =
-        if without_missing { reading.without_missing() } else { reading.whole().map_err(Box::new)? };
-    Ok(ReadWorld { scene, account })
 }

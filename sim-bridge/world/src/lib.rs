@@ -43,6 +43,7 @@
 
 pub mod aabb;
 pub mod autopilot;
+pub mod cloud;
 pub mod csv;
 pub mod files;
 pub mod lidar;
@@ -63,6 +64,7 @@ pub mod way;
 pub mod wind;
 
 pub use aabb::Aabb;
+pub use cloud::CloudError;
 pub use csv::CsvError;
 pub use files::{Files, Found, NoFiles};
 pub use lidar::{Hull, Lidar, Surroundings};

@@ -1,6 +1,7 @@
 //! Solids of many faces: meshes and terrain, each under a hierarchy of bounding boxes.
 
 mod blocks;
+mod cubes;
 mod dae;
 pub mod extrusion;
 mod obj;
@@ -45,6 +46,8 @@ enum Inside {
     Filled,
     /// What is below its faces.
     Below,
+    /// Its cubes.
+    Cubes,
 }
 
 /// Corners and faces as a file gives them.
@@ -67,6 +70,10 @@ pub enum MeshError {
     NoPart(String),
     #[error("there is no face in it")]
     Empty,
+    #[error("there is no point above the ground in it")]
+    NoPoint,
+    #[error("its points are scattered over too wide a space")]
+    Wide,
     #[error("it has more than {MOST_TRIANGLES} triangles")]
     TooMany,
     #[error("a corner of face {face} lies beyond 1000 km or is not there")]
@@ -199,7 +206,7 @@ impl Mesh {
         let distance = (nearest.point - at).length();
         let is_inside = match self.inside {
             Inside::Hollow => false,
-            Inside::Filled => nearest.is_inside,
+            Inside::Filled | Inside::Cubes => nearest.is_inside,
             Inside::Below => self.is_below(at),
         };
         if is_inside { -distance } else { distance }
@@ -219,7 +226,7 @@ impl Mesh {
         let point = Vector3::new(at.x, at.y, at.z);
         match self.inside {
             Inside::Hollow => false,
-            Inside::Filled => {
+            Inside::Filled | Inside::Cubes => {
                 self.bounds.contains(&point) && self.shape.project_point(&self.pose, at, false).is_inside
             }
             Inside::Below => point.z <= self.bounds.max.z && self.is_below(at),
