@@ -208,6 +208,30 @@ fn sizes_that_no_solid_can_have_are_refused() {
     }
 }
 
+/// Gazebo's own worlds have both.
+#[test]
+fn prefixes_without_a_declaration_and_dashes_in_comments_are_taken() {
+    let content = format!(
+        "<!-- run: gz sim \n--verbose -->{}<gz:note gz:by='me'/><!-- b --><model name='x'><pose>a</pose></model>",
+        model("", "<sphere><radius>1</radius></sphere>")
+    );
+    let message = refuse(&world(&content));
+    assert!(message.starts_with("test.world:4:"), "{message}");
+    let (scene, _) = read(&content.replace("<pose>a</pose>", ""));
+    assert_eq!(scene.obstacles().len(), 1);
+}
+
+/// Classic Gazebo had x point west, unless it was told 180.
+#[test]
+fn a_heading_of_180_is_none_in_the_old_format_only() {
+    let turned = |version: &str| {
+        let content = "<spherical_coordinates><heading_deg>180</heading_deg></spherical_coordinates>";
+        let text = world(content).replace("version='1.6'", &format!("version='{version}'"));
+        Scene::from_sdf(&text, "test.world", &NoFiles).expect("a sound file").whole().is_err()
+    };
+    assert_eq!((turned("1.6"), turned("1.8"), turned("1.10")), (false, true, true));
+}
+
 #[test]
 fn broken_xml_is_refused_where_it_breaks() {
     let unclosed = refuse("<sdf>\n<world>\n  <!-- oops\n</world>\n</sdf>");

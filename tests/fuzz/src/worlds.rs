@@ -12,7 +12,7 @@ pub const TARGET: Target =
 
 fn read(input: &[u8]) -> Reached {
     let Ok(text) = std::str::from_utf8(input) else { return Reached::Refused };
-    let files: BTreeMap<String, Vec<u8>> = [("m/model.sdf", SDF), ("roof.stl", ROOF)]
+    let files: BTreeMap<String, Vec<u8>> = [("m/model.sdf", MODEL), ("roof.stl", ROOF)]
         .map(|(name, text)| (name.to_owned(), text.as_bytes().to_vec()))
         .into();
     let sdf = Scene::from_sdf(text, "fuzzed.sdf", &files).ok().map(|reading| reading.without_missing().0);
@@ -56,6 +56,9 @@ const GAZEBO: &str = "<sdf version='1.9'><world name='w'><wind><linear_velocity>
 <waypoint><time>2</time><pose>4 0 1 0 0 0</pose></waypoint></trajectory></script></actor>
 <state world_name='w'><model name='o'><pose>3 0 0 0 0 0</pose><scale>1 1 2</scale></model></state></world></sdf>
 ";
+const MODEL: &str =
+    "<sdf version='1.9'><model name='m'><static>1</static><link name='l'><collision name='c'><geometry>
+<sphere><radius>1</radius></sphere></geometry></collision></link></model></sdf>";
 const ROOF: &str = "solid r\nfacet normal 0 0 1\nouter loop\nvertex 0 0 2\nvertex 1 0 2\nvertex 0 1 2\nendloop\n\
     endfacet\nendsolid r\n";
 

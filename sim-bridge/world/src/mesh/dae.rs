@@ -12,6 +12,8 @@ use super::{Faces, MOST_TRIANGLES, MeshError};
 const DEPTH_LIMIT: usize = 64;
 /// Nodes of a scene, those that stand for others counted again each time.
 const MOST_NODES: usize = 100_000;
+/// Triangles that any file may place; a larger one may place as many more as it has bytes.
+const LEAST_TRIANGLES: usize = 10_000;
 
 pub(super) fn read(bytes: &[u8], part: Option<&str>) -> Result<Faces, MeshError> {
     let malformed = |error: &dyn std::fmt::Display| MeshError::Malformed(error.to_string());
@@ -23,6 +25,7 @@ pub(super) fn read(bytes: &[u8], part: Option<&str>) -> Result<Faces, MeshError>
         part,
         found: part.is_none(),
         nodes: 0,
+        most: MOST_TRIANGLES.min(LEAST_TRIANGLES + bytes.len()),
         faces: Faces::default(),
     };
     reader.read_scene(document.root_element())?;
@@ -39,6 +42,8 @@ struct Reader<'a> {
     part: Option<&'a str>,
     found: bool,
     nodes: usize,
+    /// Triangles, those of a geometry counted again each time that it is placed.
+    most: usize,
     faces: Faces,
 }
 
@@ -80,6 +85,11 @@ impl<'a> Reader<'a> {
         self.nodes += 1;
         if depth > DEPTH_LIMIT || self.nodes > MOST_NODES {
             return Err(MeshError::Malformed("its nodes nest without end, or are too many".to_owned()));
+        }
+        // What only lights or looks at the scene may stand anywhere.
+        let places = ["instance_geometry", "instance_controller", "instance_node"];
+        if !node.descendants().any(|inner| places.contains(&inner.tag_name().name())) {
+            return Ok(());
         }
         let mut pose = *above;
         for child in node.children().filter(Node::is_element) {
@@ -132,7 +142,7 @@ impl<'a> Reader<'a> {
             self.geometries.insert(key, faces);
         }
         let Some(own) = self.geometries.get(&key) else { return Ok(()) };
-        if self.faces.triangles.len() + own.triangles.len() > MOST_TRIANGLES {
+        if self.faces.triangles.len() + own.triangles.len() > self.most {
             return Err(MeshError::TooMany);
         }
         let first = u32::try_from(self.faces.corners.len()).map_err(|_| MeshError::TooMany)?;

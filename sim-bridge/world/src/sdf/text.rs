@@ -1,5 +1,6 @@
 //! An XML text and its elements, each of which knows where it stands.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
@@ -10,8 +11,8 @@ use super::place::Place;
 
 /// Numbers beyond this are taken for mistakes, m.
 const LIMIT_M: f64 = 1e6;
-/// Prefixes of names that a text may use without saying what they are.
-const MOST_PREFIXES: usize = 8;
+/// Times that a text which is not quite XML is mended.
+const MOST_MENDINGS: usize = 8;
 
 /// A text, and where its lines begin.
 pub(super) struct Source<'a> {
@@ -32,33 +33,23 @@ impl<'a> Source<'a> {
         &self,
         read: impl FnOnce(Element<'_>) -> Result<R, SdfError>,
     ) -> Result<R, SdfError> {
-        match Document::parse(self.text) {
-            Ok(document) => read(Element { node: document.root_element(), source: self }),
-            Err(roxmltree::Error::UnknownNamespace(prefix, _)) => self.read_with(&prefix, read),
-            Err(error) => Err(self.malformed(&error)),
-        }
-    }
-
-    /// The same once it is told of a prefix: Gazebo takes any.
-    fn read_with<R>(
-        &self,
-        prefix: &str,
-        read: impl FnOnce(Element<'_>) -> Result<R, SdfError>,
-    ) -> Result<R, SdfError> {
-        let mut told = tell_of(self.text, prefix);
-        for _ in 0..MOST_PREFIXES {
-            match Document::parse(&told) {
-                Err(roxmltree::Error::UnknownNamespace(prefix, _)) => told = tell_of(&told, &prefix),
-                Err(error) => return Err(self.malformed(&error)),
+        let mut text = Cow::Borrowed(self.text);
+        for _ in 0..MOST_MENDINGS {
+            let error = match Document::parse(&text) {
                 Ok(document) => {
-                    let source = Source { name: self.name.clone(), ..Source::new("", &told) };
+                    let source = Source { name: self.name.clone(), ..Source::new("", &text) };
                     return read(Element { node: document.root_element(), source: &source });
                 }
+                Err(error) => error,
+            };
+            match mended(&text, &error) {
+                Some(mended) => text = Cow::Owned(mended),
+                None => return Err(self.malformed(&error)),
             }
         }
         Err(SdfError::Malformed {
             place: self.place(0),
-            message: format!("more than {MOST_PREFIXES} prefixes are used without a word on what they are"),
+            message: format!("more than {MOST_MENDINGS} prefixes are used without a word on what they are"),
             advice: "declare them with xmlns:",
         })
     }
@@ -99,9 +90,41 @@ impl<'a> Source<'a> {
     }
 }
 
-/// The text with a prefix declared in its first element.
-fn tell_of(text: &str, prefix: &str) -> String {
-    text.replacen("<sdf", &format!("<sdf xmlns:{prefix}=\"{prefix}\""), 1)
+/// The text without what is no XML but what Gazebo takes: prefixes that nobody has declared, comments with `--` in them.
+fn mended(text: &str, error: &roxmltree::Error) -> Option<String> {
+    match error {
+        roxmltree::Error::UnknownNamespace(prefix, _) => {
+            Some(text.replacen("<sdf", &format!("<sdf xmlns:{prefix}=\"{prefix}\""), 1))
+        }
+        roxmltree::Error::InvalidComment(_) => Some(blank_comments(text)).filter(|blank| blank != text),
+        _ => None,
+    }
+}
+
+/// The text with nothing but space and ends of lines in its comments.
+fn blank_comments(text: &str) -> String {
+    let (mut blank, mut rest) = (String::with_capacity(text.len()), text);
+    while let Some(open) = rest.find("<!") {
+        let (before, from) = rest.split_at(open);
+        blank.push_str(before);
+        let (head, tail) = if from.starts_with("<!--") { ("<!--", "-->") } else { ("<!", ">") };
+        let tail = if from.starts_with("<![CDATA[") { "]]>" } else { tail };
+        let content = from.get(head.len()..).unwrap_or_default();
+        let Some(length) = content.find(tail) else {
+            rest = from;
+            break;
+        };
+        let (content, after) = content.split_at(length);
+        blank.push_str(head);
+        if head == "<!--" {
+            blank.extend(content.bytes().map(|byte| if byte == b'\n' { '\n' } else { ' ' }));
+        } else {
+            blank.push_str(content);
+        }
+        blank.push_str(tail);
+        rest = after.get(tail.len()..).unwrap_or_default();
+    }
+    blank + rest
 }
 
 /// Byte offset of a comment that is never closed.

@@ -39,6 +39,8 @@ struct World {
     actors: Vec<Obstacle>,
     datum: Option<Datum>,
     wind: Option<Vector3<f64>>,
+    /// The file is of the time before Gazebo turned headings the right way round.
+    is_classic: bool,
 }
 
 impl Reader<'_> {
@@ -52,7 +54,9 @@ impl Reader<'_> {
         for second in worlds {
             self.account.refuse(second, "only the first <world> of a file is read");
         }
-        let mut world = World::default();
+        let version = root.attribute("version").and_then(|version| version.split_once('.'));
+        let is_classic = version.is_none_or(|(_, minor)| minor.parse::<u32>().is_ok_and(|minor| minor < 8));
+        let mut world = World { is_classic, ..World::default() };
         self.account.honour(element);
         for child in element.elements() {
             self.read_thing(child, &mut world)?;
@@ -105,7 +109,7 @@ impl Reader<'_> {
                 world.models.frames.push(frame);
             }
             "actor" => world.actors.extend(self.read_actor(child)?),
-            "spherical_coordinates" => world.datum = Some(self.read_datum(child)?),
+            "spherical_coordinates" => world.datum = Some(self.read_datum(child, world.is_classic)?),
             "wind" => world.wind = self.read_wind(child)?,
             "population" => {
                 self.account.refuse(child, "the models that a <population> strews cannot be read")
@@ -136,7 +140,7 @@ impl Reader<'_> {
         Ok(world.wind.map_or(scene.clone(), |wind| scene.with_wind(wind)))
     }
 
-    fn read_datum(&mut self, coordinates: Element<'_>) -> Result<Datum, SdfError> {
+    fn read_datum(&mut self, coordinates: Element<'_>, is_classic: bool) -> Result<Datum, SdfError> {
         self.account.honour(coordinates);
         let number = |name, expected, limit: f64| -> Result<f64, SdfError> {
             let Some(node) = coordinates.child(name) else { return Ok(0.0) };
@@ -148,7 +152,9 @@ impl Reader<'_> {
         let height_m = number("elevation", "metres", 1e4)?;
         let heading_deg = number("heading_deg", "degrees of -360 to 360", 360.0)?;
         let frame = coordinates.child("world_frame_orientation").filter(|frame| frame.text() != "ENU");
-        let heading = coordinates.child("heading_deg").filter(|_| heading_deg.rem_euclid(360.0) != 0.0);
+        // A heading of 180 was how one had x point east.
+        let east = if is_classic { 180.0 } else { 360.0 };
+        let heading = coordinates.child("heading_deg").filter(|_| heading_deg.rem_euclid(east) != 0.0);
         for turned in heading.into_iter().chain(frame) {
             let why =
                 "the world is turned against east and north, which cannot be read; without it x is east";
