@@ -47,8 +47,8 @@ impl fmt::Display for Findings {
     }
 }
 
-/// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`, `.obj`, `.pcd`, `.ply`), a mission (`.plan`, `.json`), or
-/// else a scenario, with what `allowed` lifts.
+/// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`, `.obj`, `.pcd`, `.ply`),
+/// a mission (`.plan`, `.json`), or else a scenario, with what `allowed` lifts.
 pub fn check(file: &Path, allowed: &Overrides, known: &Behaviours) -> Result<Findings, ScenarioError> {
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase());
     let mut elements = Vec::new();
@@ -157,6 +157,27 @@ mod tests {
             bar(height_m, thickness_m, model)?;
             assert!(check(&path).is_ok(), "{height_m} m, {thickness_m} m, {model}");
         }
+        Ok(())
+    }
+
+    #[test]
+    fn a_world_that_lacks_a_model_is_unsound_unless_it_is_allowed_to()
+    -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("w.sdf");
+        let barn = "<include><uri>model://barn</uri></include><light name='l' type='point'/>";
+        std::fs::write(&path, format!("<sdf version='1.9'><world name='w'>\n{barn}</world></sdf>"))?;
+        let Err(ScenarioError::Lacking(lacking)) = check(&path) else { panic!("it lacks a barn") };
+        assert!(lacking.to_string().contains("w.sdf:2:1: included model `model://barn` is not there"));
+        let verdict = |elements: Vec<Element>, name: &str| {
+            elements.into_iter().find(|element| element.element == name).map(|element| element.verdict)
+        };
+        assert_eq!(verdict(list(&lacking.0), "world/include"), Some("refused"));
+        let allowed = Overrides { without_missing: true, ..Overrides::default() };
+        let findings = super::check(&path, &allowed, &Behaviours::default())?;
+        assert!(findings.warnings.iter().any(|warning| warning.contains("barn")), "{:?}", findings.warnings);
+        assert_eq!(verdict(findings.elements.clone(), "world/light"), Some("harmless"));
+        assert_eq!(verdict(findings.elements, "sdf/world"), Some("honoured"));
         Ok(())
     }
 

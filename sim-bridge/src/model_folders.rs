@@ -133,3 +133,52 @@ fn tidy(path: &Path) -> PathBuf {
     }
     tidy
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(folders: &ModelFolders, uri: &str, from: &Path) -> Option<PathBuf> {
+        match folders.open(uri, &from.display().to_string()) {
+            Found::File { name, .. } | Found::Folder { name } => Some(PathBuf::from(name)),
+            Found::Missing | Found::Unreadable(_) => None,
+        }
+    }
+
+    #[test]
+    fn models_are_found_beside_the_world_beside_one_another_and_in_the_caches() -> std::io::Result<()> {
+        let folder = tempfile::tempdir()?;
+        let root = std::fs::canonicalize(folder.path())?;
+        let put = |path: &str| -> std::io::Result<PathBuf> {
+            let path = root.join(path);
+            path.parent().map(std::fs::create_dir_all).transpose()?;
+            std::fs::write(&path, "x")?;
+            Ok(path)
+        };
+        let world = put("worlds/w.sdf")?;
+        let tree = put("models/tree/model.sdf")?;
+        let leaf = put("models/leaf/leaf.stl")?;
+        let rock = put("worlds/models/rock/rock.stl")?;
+        put("fuel/server.org/me/models/big barn/2/model.sdf")?;
+        let barn = put("fuel/server.org/me/models/big barn/11/model.sdf")?;
+        let old = root.join("fuel/server.org/me/models/big barn/2");
+        let folders = ModelFolders { caches: vec![root.join("fuel")], ..ModelFolders::of(&world) };
+        let barn = barn.parent().map(Path::to_owned);
+        for (uri, from, expected) in [
+            ("model://tree", &world, tree.parent().map(Path::to_owned)),
+            ("model://leaf/leaf.stl", &tree, Some(leaf.clone())),
+            ("models/rock/rock.stl", &world, Some(rock.clone())),
+            ("../leaf/leaf.stl", &tree, Some(leaf.clone())),
+            ("https://server.org/1.0/Me/models/Big%20Barn", &world, barn.clone()),
+            ("https://server.org/1.0/Me/models/Big Barn/2", &world, Some(old)),
+            ("https://server.org/1.0/Me/models/Big Barn/tip", &world, barn),
+            ("https://server.org/1.0/me/models/none", &world, None),
+            ("model://none", &world, None),
+        ] {
+            assert_eq!(found(&folders, uri, from), expected, "{uri}");
+        }
+        let absolute = format!("file://{}", leaf.display());
+        assert_eq!(found(&folders, &absolute, &world), Some(leaf));
+        Ok(())
+    }
+}

@@ -23,8 +23,8 @@ impl ReadWorld {
     }
 }
 
-/// Reads a Gazebo world, a `.csv` of boxes, a mesh (`.obj`) or a point cloud (`.pcd`, `.ply`); `without_missing` if it
-/// may lack what cannot be read.
+/// Reads a Gazebo world, a `.csv` of boxes, a mesh (`.obj`) or a point cloud (`.pcd`, `.ply`);
+/// `without_missing` if it may lack what cannot be read.
 ///
 /// # Errors
 /// The first fault in a file; all that is solid and cannot be read.

@@ -10,7 +10,8 @@ use crate::mesh::Mesh;
 use crate::round;
 use crate::way::Way;
 
-/// The form of an obstacle in its own frame, metres, centred on its origin; but a mesh is where its corners are.
+/// The form of an obstacle in its own frame, metres, centred on its origin; but a mesh is where its corners
+/// are.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// A cuboid.
@@ -68,8 +69,8 @@ impl Shape {
     }
 
     /// Length of the longest straight line inside along the unit vector `direction` (own frame), metres: that
-    /// through the middle, for every shape is the same on both sides of it. Infinite for a plane; of a cone that of the
-    /// cylinder around it, and of a mesh that of the box.
+    /// through the middle, for every shape is the same on both sides of it. Infinite for a plane; of a cone
+    /// that of the cylinder around it, and of a mesh that of the box.
     pub fn thickness_m(&self, direction: &Vector3<f64>) -> f64 {
         let half = match *self {
             Self::Box { half_extents } => half_extents.component_div(&direction.abs()).min(),

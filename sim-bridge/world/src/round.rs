@@ -5,9 +5,10 @@ use nalgebra::{Point3, Vector2, Vector3};
 /// Halvings until a distance is exact.
 const HALVINGS: usize = 100;
 
-/// Distance from a point to an ellipsoid about the origin, negative inside. The nearest place of its surface is where
-/// the normal leads to the point: with the point's part y along each axis and the radius e, at e^2 y / (t + e^2), of
-/// which the sum of squares of e y / (t + e^2) is 1 (D. Eberly, Distance from a Point to an Ellipse, an Ellipsoid).
+/// Distance from a point to an ellipsoid about the origin, negative inside. The nearest place of its surface
+/// is where the normal leads to the point: with the point's part y along each axis and the radius e, at e^2 y
+/// / (t + e^2), of which the sum of squares of e y / (t + e^2) is 1 (D. Eberly, Distance from a Point to an
+/// Ellipse, an Ellipsoid).
 pub(crate) fn distance_to_ellipsoid(radii: &Vector3<f64>, point: &Point3<f64>) -> f64 {
     let at = point.coords.abs();
     let thinnest = radii.imin();

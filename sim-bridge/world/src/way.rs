@@ -1,4 +1,5 @@
-//! The way of an obstacle that moves: where it is at any time, without a memory, so that equal runs have equal worlds.
+//! The way of an obstacle that moves: where it is at any time, without a memory, so that equal runs have
+//! equal worlds.
 
 use std::time::Duration;
 
@@ -41,7 +42,8 @@ impl Way {
         Self { legs: vec![endless], loops: false }
     }
 
-    /// From one place to the others in turn; from the last back to the first if it `loops`, else it ends there.
+    /// From one place to the others in turn; from the last back to the first if it `loops`, else it ends
+    /// there.
     pub fn through(from: Vector3<f64>, stops: &[Stop], loops: bool) -> Self {
         let back = stops.last().filter(|_| loops).map(|last| Stop { at: from, waits_s: 0.0, ..*last });
         let (mut from, mut begins_s) = (from, 0.0);
@@ -56,8 +58,8 @@ impl Way {
         Self { legs: stops.iter().copied().chain(back).map(leg).collect(), loops }
     }
 
-    /// By times since the run began, in order; before the first it stands for `delay` where that is. One that loops
-    /// is there again at once when its last time is over.
+    /// By times since the run began, in order; before the first it stands for `delay` where that is. One that
+    /// loops is there again at once when its last time is over.
     pub fn timed(stops: &[(Duration, Vector3<f64>)], delay: Duration, loops: bool) -> Self {
         let Some((first_time, first)) = stops.first().copied() else {
             return Self { legs: Vec::new(), loops };

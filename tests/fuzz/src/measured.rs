@@ -1,4 +1,5 @@
-//! Meshes, heights and point clouds: what others have drawn or measured. The first line of an input is its kind.
+//! Meshes, heights and point clouds: what others have drawn or measured. The first line of an input is its
+//! kind.
 
 use nalgebra::{Point3, Vector3};
 use skein_world::mesh::terrain::Heights;

@@ -1,11 +1,13 @@
-//! Vehicles keep from all that stands in a world made for Gazebo: models in models, meshes, round solids, one who walks.
+//! Vehicles keep from all that stands in a world made for Gazebo: models in models, meshes, round solids, one
+//! who walks.
 
 use std::fs;
 use std::path::Path;
 
 use skein_tests::{flight, fly};
 
-/// A mast with a sign, included by a gate that the world includes: two models deep, from folders beside the world.
+/// A mast with a sign, included by a gate that the world includes: two models deep, from folders beside the
+/// world.
 const MAST: &str = "<sdf version='1.9'><model name='mast'><static>1</static>
 <link name='pole'><pose>0 0 2.5 0 0 0</pose><collision name='c'><geometry><cylinder><radius>0.3</radius><length>5</length>
 </cylinder></geometry></collision></link></model></sdf>";

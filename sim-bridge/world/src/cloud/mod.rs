@@ -34,9 +34,9 @@ struct Cloud {
 }
 
 impl Scene {
-    /// Reads a whole world, metres, z up, from a mesh (`.obj`) or from a point cloud (`.pcd`, `.ply`; the latter may
-    /// have faces instead); `source_name` ends in the kind. The points of a cloud become cubes of 0.2 m; those no higher
-    /// than 0.1 m are ground.
+    /// Reads a whole world, metres, z up, from a mesh (`.obj`) or from a point cloud (`.pcd`, `.ply`; the
+    /// latter may have faces instead); `source_name` ends in the kind. The points of a cloud become cubes of
+    /// 0.2 m; those no higher than 0.1 m are ground.
     ///
     /// # Errors
     /// What is wrong with the file.
@@ -79,7 +79,8 @@ mod tests {
         Scene::from_measured(bytes, name).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// A point at (5.1, 0.1, 2.1) is in the cube from (5, 0, 2) on; ground and what was not seen count for nothing.
+    /// A point at (5.1, 0.1, 2.1) is in the cube from (5, 0, 2) on; ground and what was not seen count for
+    /// nothing.
     fn has_one_cube(scene: &Scene) {
         let met = |y: f64, z: f64| scene.cast_ray(&Point3::new(0.0, y, z), &Vector3::x(), 50.0);
         assert!(met(0.1, 2.1).is_some_and(|range| (range - 5.0).abs() < 1e-6), "{:?}", met(0.1, 2.1));

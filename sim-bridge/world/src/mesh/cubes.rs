@@ -10,7 +10,8 @@ use super::{Inside, LIMIT_M, Mesh, MeshError};
 const MOST_BLOCKS: usize = 200_000;
 
 impl Mesh {
-    /// The cubes of a grid, of this length, that have a point in them; points that are not numbers are left out.
+    /// The cubes of a grid, of this length, that have a point in them; points that are not numbers are left
+    /// out.
     pub fn cubes(points: impl Iterator<Item = Vector3<f64>>, side: f64) -> Result<Self, MeshError> {
         let is_sound = |point: &Vector3<f64>| point.iter().all(|part| part.abs() <= LIMIT_M);
         let cell = |point: Vector3<f64>| point.map(|part| (part / side).floor() as i64);

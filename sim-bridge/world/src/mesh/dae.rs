@@ -1,5 +1,5 @@
-//! COLLADA: the geometries of a scene, where its nodes put them, in its unit. Its `<up_axis>` counts for nothing, as in
-//! Gazebo, whose models are made so.
+//! COLLADA: the geometries of a scene, where its nodes put them, in its unit. Its `<up_axis>` counts for
+//! nothing, as in Gazebo, whose models are made so.
 
 use std::collections::BTreeMap;
 

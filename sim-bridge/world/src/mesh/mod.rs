@@ -86,7 +86,8 @@ pub enum MeshError {
     Outline,
 }
 
-/// The faces of a file that `name` ends in the kind of: of all of its parts, or of the one that is called `part`.
+/// The faces of a file that `name` ends in the kind of: of all of its parts, or of the one that is called
+/// `part`.
 pub fn read(name: &str, bytes: &[u8], part: Option<&str>) -> Result<Faces, MeshError> {
     let kind = name.rsplit('.').next().unwrap_or_default().to_lowercase();
     match kind.as_str() {
@@ -212,7 +213,8 @@ impl Mesh {
         if is_inside { -distance } else { distance }
     }
 
-    /// Distance along the unit vector `direction` from `origin` to the first face: 0 when the ray starts inside.
+    /// Distance along the unit vector `direction` from `origin` to the first face: 0 when the ray starts
+    /// inside.
     pub fn cast_ray(&self, origin: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
         let at = DVec3::new(origin.x, origin.y, origin.z);
         if self.inside != Inside::Hollow && self.holds(at) {

@@ -10,7 +10,8 @@ use super::{Inside, Mesh, MeshError};
 /// Grids of more heights than this along a side are refused.
 pub const MOST_ALONG: usize = 4097;
 
-/// Heights on a grid: shares of the whole, row by row, the first row in the north (y up), each from west to east.
+/// Heights on a grid: shares of the whole, row by row, the first row in the north (y up), each from west to
+/// east.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heights {
     pub rows: usize,
@@ -19,8 +20,8 @@ pub struct Heights {
 }
 
 impl Heights {
-    /// The heights of a picture (PNG, JPEG, BMP: white is high), or of a square of numbers of one or two bytes, the
-    /// lower first, where `name` ends in `.raw`.
+    /// The heights of a picture (PNG, JPEG, BMP: white is high), or of a square of numbers of one or two
+    /// bytes, the lower first, where `name` ends in `.raw`.
     pub fn read(name: &str, bytes: &[u8]) -> Result<Self, MeshError> {
         if name.to_lowercase().ends_with(".raw") { Self::of_numbers(bytes) } else { Self::of_picture(bytes) }
     }
@@ -65,8 +66,8 @@ impl Heights {
 }
 
 impl Mesh {
-    /// Terrain over a rectangle about the origin: `size` is its length along x and y, and its height where the share
-    /// is 1.
+    /// Terrain over a rectangle about the origin: `size` is its length along x and y, and its height where
+    /// the share is 1.
     pub fn terrain(heights: &Heights, size: &Vector3<f64>) -> Result<Self, MeshError> {
         let Heights { rows, columns, ref heights } = *heights;
         let fits = |along: usize| (2..=MOST_ALONG).contains(&along);

@@ -11,7 +11,8 @@ use super::text::Element;
 use crate::obstacle::{Obstacle, Shape};
 use crate::way::Way;
 
-/// A person, whether the origin is at the hip or at the feet: half of the height and the middle above the origin, m.
+/// A person, whether the origin is at the hip or at the feet: half of the height and the middle above the
+/// origin, m.
 const HALF_HEIGHT_M: f64 = 1.5;
 const MIDDLE_M: f64 = 0.5;
 const RADIUS_M: f64 = 0.4;

@@ -48,7 +48,8 @@ impl<'m> Frames<'m> {
         number
     }
 
-    /// Numbers a model, its frames and links in turn, and its models: whoever puts them up counts on that order.
+    /// Numbers a model, its frames and links in turn, and its models: whoever puts them up counts on that
+    /// order.
     fn add_model(&mut self, model: &'m Model, scope: usize) {
         let node = Node {
             scope,

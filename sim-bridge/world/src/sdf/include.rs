@@ -11,7 +11,8 @@ use crate::files::Found;
 const BUILT_IN_MODELS: [&str; 2] = ["sun", "ground_plane"];
 
 impl Reader<'_> {
-    /// Reads an included model under the name and at the pose that it is given; `None` if it is refused, or no model.
+    /// Reads an included model under the name and at the pose that it is given; `None` if it is refused, or
+    /// no model.
     pub(super) fn read_include(
         &mut self,
         include: Element<'_>,

@@ -1,9 +1,9 @@
 //! Gazebo worlds: the Simulation Description Format (SDF), as far as it matters to where it is safe to fly.
 //!
-//! Models, included ones too, their frames and solids stand where Gazebo has them, or where the `<state>` of a saved
-//! world has them; actors walk. What makes a file wrong is an error with its place. What is solid and cannot be read is
-//! refused, by name, in the [`Account`]: [`Reading::whole`] gives no scene then. Everything stands still but actors,
-//! whether static or not.
+//! Models, included ones too, their frames and solids stand where Gazebo has them, or where the `<state>` of
+//! a saved world has them; actors walk. What makes a file wrong is an error with its place. What is solid and
+//! cannot be read is refused, by name, in the [`Account`]: [`Reading::whole`] gives no scene then. Everything
+//! stands still but actors, whether static or not.
 
 mod account;
 mod actor;
@@ -89,8 +89,8 @@ impl Reading {
 }
 
 impl Scene {
-    /// Reads a Gazebo world (or a bare model) from the text of an SDF file; `source_name` is what messages call it and
-    /// where `files` begins to look for what it names.
+    /// Reads a Gazebo world (or a bare model) from the text of an SDF file; `source_name` is what messages
+    /// call it and where `files` begins to look for what it names.
     ///
     /// # Errors
     /// The first fault in a file.

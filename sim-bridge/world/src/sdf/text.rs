@@ -90,7 +90,8 @@ impl<'a> Source<'a> {
     }
 }
 
-/// The text without what is no XML but what Gazebo takes: prefixes that nobody has declared, comments with `--` in them.
+/// The text without what is no XML but what Gazebo takes: prefixes that nobody has declared, comments with
+/// `--` in them.
 fn mended(text: &str, error: &roxmltree::Error) -> Option<String> {
     match error {
         roxmltree::Error::UnknownNamespace(prefix, _) => {

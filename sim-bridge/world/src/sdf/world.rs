@@ -169,7 +169,8 @@ impl Reader<'_> {
     }
 }
 
-/// Whether it is the ground that every scene has, or lies so flat on it that a vehicle stands on it as on the ground.
+/// Whether it is the ground that every scene has, or lies so flat on it that a vehicle stands on it as on the
+/// ground.
 fn is_pavement(obstacle: &Obstacle) -> bool {
     let Shape::Plane { normal } = obstacle.shape else {
         return obstacle.aabb().is_some_and(|bounds| bounds.max.z <= PAVEMENT_M);

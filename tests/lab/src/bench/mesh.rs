@@ -1,4 +1,5 @@
-//! Meshes: rays and distances a second on one of 100,000 triangles, and a flight through the forest beside it.
+//! Meshes: rays and distances a second on one of 100,000 triangles, and a flight through the forest beside
+//! it.
 
 use std::hint::black_box;
 
