@@ -91,11 +91,17 @@ impl<'a> Source<'a> {
 }
 
 /// The text without what is no XML but what Gazebo takes: prefixes that nobody has declared, comments with
-/// `--` in them.
+/// `--` in them, a declaration that is not at the beginning.
 fn mended(text: &str, error: &roxmltree::Error) -> Option<String> {
     match error {
         roxmltree::Error::UnknownNamespace(prefix, _) => {
             Some(text.replacen("<sdf", &format!("<sdf xmlns:{prefix}=\"{prefix}\""), 1))
+        }
+        roxmltree::Error::UnexpectedDeclaration(_) => {
+            let open = text.find("<?xml")?;
+            let length = text.get(open..)?.find("?>")? + 2;
+            let (before, after) = (text.get(..open)?, text.get(open + length..)?);
+            Some(format!("{before}{}{after}", " ".repeat(length)))
         }
         roxmltree::Error::InvalidComment(_) => Some(blank_comments(text)).filter(|blank| blank != text),
         _ => None,
