@@ -1,10 +1,11 @@
 //! Meshes: rays and distances a second on one of 100,000 triangles, and a flight through the forest beside
 //! it.
 
+use std::f64::consts::FRAC_PI_2;
 use std::hint::black_box;
 
 use clap::Args;
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
@@ -60,7 +61,10 @@ impl Task for Meshes {
         let scenario = Scenario::built_in("forest", Some(self.vehicles), self.seed)?;
         let bare = real_time_factor(&scenario)?;
         let mut beside = scenario;
-        let hills = Obstacle::new("hills", Shape::Mesh(mesh), Isometry3::translation(0.0, 0.0, -HIGHEST_M));
+        // Upright, a wall along the forest, which the level scanners see.
+        let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), FRAC_PI_2);
+        let place = Translation3::new(0.0, beside.scene.bounds().max.y + HIGHEST_M, 0.0);
+        let hills = Obstacle::new("hills", Shape::Mesh(mesh), Isometry3::from_parts(place, upright));
         beside.scene = beside.scene.with_more([hills]);
         let with_mesh = real_time_factor(&beside)?;
         if as_json {
