@@ -122,6 +122,27 @@ fn a_heightmap_is_solid_below_its_surface() {
 }
 
 #[test]
+fn where_a_heightmap_lies_on_the_ground_it_is_the_ground() {
+    let mut files = files();
+    let mut heights = vec![0; 81];
+    heights[8] = 255;
+    files.insert("corner.raw".to_owned(), heights);
+    let clearance = |z: f64| {
+        let text = format!(
+            "<sdf version='1.9'><world name='w'><model name='m'><static>1</static><pose>0 0 {z} 0 0 0</pose>\
+             <link name='l'><collision name='c'><geometry><heightmap><uri>corner.raw</uri><size>80 80 9</size>\
+             </heightmap></geometry></collision></link></model></world></sdf>"
+        );
+        let reading = Scene::from_sdf(&text, "test.sdf", &files).expect("a sound file");
+        let (scene, _) = reading.whole().expect("a whole world");
+        (scene.clearance(&Vector3::new(-10.0, -10.0, 0.25)), scene.clearance(&Vector3::new(39.5, 39.5, 6.0)))
+    };
+    let (on_the_flat, in_the_corner) = clearance(0.0);
+    assert!(on_the_flat > 20.0 && in_the_corner < 0.0, "{on_the_flat} {in_the_corner}");
+    assert!(clearance(1.0).0 < 0.0);
+}
+
+#[test]
 fn what_cannot_be_solid_is_refused_by_name() {
     for (geometry, expected) in [
         ("<mesh><uri>gone.dae</uri></mesh>", "the mesh `gone.dae` of `l::c` is not there"),

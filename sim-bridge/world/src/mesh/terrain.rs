@@ -2,7 +2,7 @@
 
 use glamx::{DPose3, DQuat, DVec3};
 use nalgebra::Vector3;
-use parry3d_f64::shape::SharedShape;
+use parry3d_f64::shape::{HeightFieldCellStatus, SharedShape};
 use parry3d_f64::utils::Array2;
 
 use super::{Inside, Mesh, MeshError};
@@ -82,6 +82,23 @@ impl Mesh {
         let shape = SharedShape::heightfield(grid, DVec3::new(size.x, size.z, size.y));
         let pose = DPose3::from_parts(DVec3::ZERO, DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2));
         Ok(Self::new(shape, pose, Inside::Below))
+    }
+
+    /// The same terrain without the cells that are nowhere higher than this, metres; any other mesh as it is.
+    #[must_use]
+    pub fn higher_than(self, height_m: f64) -> Self {
+        let Some(field) = self.shape.as_heightfield() else { return self };
+        let mut field = field.clone();
+        let least = height_m / field.scale().y;
+        for row in 0..field.nrows() {
+            for column in 0..field.ncols() {
+                let corners = [(row, column), (row + 1, column), (row, column + 1), (row + 1, column + 1)];
+                if corners.iter().all(|corner| field.heights()[*corner] <= least) {
+                    field.set_cell_status(row, column, HeightFieldCellStatus::CELL_REMOVED);
+                }
+            }
+        }
+        Self::new(SharedShape::new(field), self.pose, self.inside)
     }
 }
 

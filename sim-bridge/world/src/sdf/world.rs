@@ -134,6 +134,7 @@ impl Reader<'_> {
         let before = obstacles.len();
         obstacles.retain(|obstacle| !is_pavement(obstacle));
         self.has_ground |= obstacles.len() < before;
+        obstacles.iter_mut().for_each(pave);
         obstacles.extend(world.actors);
         let scene = Scene::new(name, obstacles);
         let scene = world.datum.map_or(scene.clone(), |datum| scene.with_datum(datum));
@@ -177,4 +178,15 @@ fn is_pavement(obstacle: &Obstacle) -> bool {
     };
     let up = obstacle.pose.rotation * normal.into_inner();
     up.z > 1.0 - 1e-9 && obstacle.pose.translation.vector.dot(&up) <= PAVEMENT_M
+}
+
+/// Takes from terrain where it is so flat on the ground that a vehicle stands on it as on the ground.
+fn pave(obstacle: &mut Obstacle) {
+    let is_upright = (obstacle.pose.rotation * Vector3::z()).z > 1.0 - 1e-9;
+    if let Shape::Mesh(mesh) = &obstacle.shape
+        && is_upright
+    {
+        let height_m = PAVEMENT_M - obstacle.pose.translation.z;
+        obstacle.shape = Shape::Mesh(mesh.clone().higher_than(height_m));
+    }
 }
