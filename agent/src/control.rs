@@ -33,11 +33,8 @@ use crate::{
     },
     positioning::{Estimate, Motion, Positioning, excess_m},
     preflight::{Failsafes, HandlingParameters, Others, Preflight, Situation, degrees},
-<<<<<<< HEAD
     rank::goes_before,
-=======
     refuge::Refuge,
->>>>>>> plans
     report::Report,
     scripts::Circumstances,
     watches::Watches,

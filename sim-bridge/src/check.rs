@@ -5,10 +5,11 @@ use std::path::Path;
 
 use serde::Serialize;
 use skein_bp::behaviour::Behaviours;
-use skein_world::Scene;
+use skein_world::sdf::Entry;
+use skein_world::{Account, Scene};
 
-use crate::element::Element;
-use crate::mission::{self, Allowances, MissionSet};
+use crate::element::{Element, Verdict};
+use crate::mission::{self, MissionSet};
 use crate::scenario::{Overrides, Scenario, ScenarioError, read_world};
 
 /// The findings in a sound file.
@@ -22,7 +23,7 @@ pub struct Findings {
     pub holds: String,
     /// Parts that have no effect or give way.
     pub warnings: Vec<String>,
-    /// What becomes of each of its elements.
+    /// What becomes of each element of a world or mission file.
     pub elements: Vec<Element>,
 }
 
@@ -33,52 +34,48 @@ impl fmt::Display for Findings {
     }
 }
 
-/// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`), a mission (`.plan`, `.waypoints`,
-/// `.kml`, `.geojson`, `.json`), or else a scenario; `thin_solids` may be in its way.
-pub fn check(
-    file: &Path,
-    allowances: Allowances,
-    thin_solids: bool,
-    known: &Behaviours,
-) -> Result<Findings, ScenarioError> {
-    let extension = extension(file);
-    let (kind, holds, warnings) = match extension.as_deref() {
-        Some("sdf" | "world" | "csv") => {
-            let (scene, warnings) = read_world(file)?;
-            ("world", world(&scene), warnings)
+/// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`, `.obj`, `.pcd`, `.ply`),
+/// a mission (`.plan`, `.waypoints`, `.kml`, `.geojson`, `.json`), or else a scenario, with what `allowed` lifts.
+pub fn check(file: &Path, allowed: &Overrides, known: &Behaviours) -> Result<Findings, ScenarioError> {
+    let mut elements = mission_elements(file, allowed);
+    let (kind, holds, warnings) = match extension(file).as_deref() {
+        Some("sdf" | "world" | "csv" | "obj" | "pcd" | "ply") => {
+            let read = read_world(file, allowed.without_missing)?;
+            elements = world_elements(&read.account);
+            ("world", world(&read.scene), read.notes())
         }
         Some("plan" | "waypoints" | "mission" | "txt" | "json" | "geojson" | "kml") => {
-            let set = mission::read_files(&[file.to_owned()], None, allowances)?;
-            ("mission", missions(&set), notes(file, &set, allowances, known)?)
+            let set = mission::read_files(&[file.to_owned()], None, allowed.allowances)?;
+            ("mission", missions(&set), notes(file, &set, allowed, known)?)
         }
         _ => {
-            let overrides = Overrides { thin_solids, allowances, ..Overrides::default() };
-            let scenario = Scenario::open_with(&file.to_string_lossy(), &overrides, 1, known)?;
-            if !thin_solids {
+            let scenario = Scenario::open_with(&file.to_string_lossy(), allowed, 1, known)?;
+            if !allowed.thin_solids {
                 scenario.check_thin_solids()?;
             }
             let holds = format!("{} vehicles, {}", scenario.vehicles.len(), world(&scenario.scene));
             ("scenario", holds, scenario.notes)
         }
     };
-    Ok(Findings {
-        file: file.display().to_string(),
-        kind,
-        holds,
-        warnings,
-        elements: elements(file, allowances),
-    })
+    Ok(Findings { file: file.display().to_string(), kind, holds, warnings, elements })
 }
 
-/// What becomes of each element of a file, sound or not; none of one that is too broken to have any.
-pub fn elements(file: &Path, allowances: Allowances) -> Vec<Element> {
+/// What becomes of each element of a file that is not sound, for this reason; none of one that is too broken to have any.
+pub fn elements(file: &Path, allowed: &Overrides, error: &ScenarioError) -> Vec<Element> {
+    match error {
+        ScenarioError::Lacking(lacking) => world_elements(&lacking.0),
+        _ => mission_elements(file, allowed),
+    }
+}
+
+fn mission_elements(file: &Path, allowed: &Overrides) -> Vec<Element> {
     if !matches!(
         extension(file).as_deref(),
         Some("plan" | "waypoints" | "mission" | "txt" | "json" | "geojson" | "kml")
     ) {
         return Vec::new();
     }
-    mission::account_of(file, None, allowances).map(|account| account.elements).unwrap_or_default()
+    mission::account_of(file, None, allowed.allowances).map(|account| account.elements).unwrap_or_default()
 }
 
 fn extension(file: &Path) -> Option<String> {
@@ -89,7 +86,7 @@ fn extension(file: &Path) -> Option<String> {
 fn notes(
     file: &Path,
     set: &MissionSet,
-    allowances: Allowances,
+    allowed: &Overrides,
     known: &Behaviours,
 ) -> Result<Vec<String>, ScenarioError> {
     if set.datum.is_none() {
@@ -97,8 +94,25 @@ fn notes(
     }
     let missions = vec![file.to_owned()];
     let vehicles = (set.missions.len() == 1).then_some(1);
-    let overrides = Overrides { vehicles, missions, allowances, ..Overrides::default() };
+    let overrides = Overrides { vehicles, missions, ..allowed.clone() };
     Ok(Scenario::open_with("open", &overrides, 1, known)?.notes)
+}
+
+/// What became of the elements of a world file.
+fn world_elements(account: &Account) -> Vec<Element> {
+    let element = |entry: &Entry| Element {
+        what: entry.element.clone(),
+        file: Some(entry.place.source_name.to_string()),
+        line: entry.place.line as usize,
+        verdict: match entry.verdict {
+            skein_world::Verdict::Honoured => Verdict::Honoured,
+            skein_world::Verdict::Harmless => Verdict::Harmless,
+            skein_world::Verdict::Refused => Verdict::Refused,
+        },
+        why: entry.note.clone(),
+        count: entry.count,
+    };
+    account.entries.iter().map(element).collect()
 }
 
 fn world(scene: &Scene) -> String {
@@ -125,7 +139,7 @@ mod tests {
     use super::*;
 
     fn check(file: &Path) -> Result<Findings, ScenarioError> {
-        super::check(file, Allowances::default(), false, &Behaviours::default())
+        super::check(file, &Overrides::default(), &Behaviours::default())
     }
 
     #[test]
@@ -166,13 +180,35 @@ mod tests {
             error.contains("`bar` (0.100 m, from 4.15 to 4.25 m") && error.contains("--thin-solids"),
             "{error}"
         );
-        assert!(super::check(&path, Allowances::default(), true, &Behaviours::default()).is_ok());
+        let allowed = Overrides { thin_solids: true, ..Overrides::default() };
+        assert!(super::check(&path, &allowed, &Behaviours::default()).is_ok());
         for (height_m, thickness_m, model) in
             [(4.2, 0.1, "x500-vertical-scanner"), (4.2, 0.2, "x500"), (4.7, 0.1, "x500"), (0.05, 0.1, "x500")]
         {
             bar(height_m, thickness_m, model)?;
             assert!(check(&path).is_ok(), "{height_m} m, {thickness_m} m, {model}");
         }
+        Ok(())
+    }
+
+    #[test]
+    fn a_world_that_lacks_a_model_is_unsound_unless_it_is_allowed_to()
+    -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("w.sdf");
+        let barn = "<include><uri>model://barn</uri></include><light name='l' type='point'/>";
+        std::fs::write(&path, format!("<sdf version='1.9'><world name='w'>\n{barn}</world></sdf>"))?;
+        let Err(ScenarioError::Lacking(lacking)) = check(&path) else { panic!("it lacks a barn") };
+        assert!(lacking.to_string().contains("w.sdf:2:1: included model `model://barn` is not there"));
+        let verdict = |elements: Vec<Element>, name: &str| {
+            elements.into_iter().find(|element| element.element == name).map(|element| element.verdict)
+        };
+        assert_eq!(verdict(list(&lacking.0), "world/include"), Some("refused"));
+        let allowed = Overrides { without_missing: true, ..Overrides::default() };
+        let findings = super::check(&path, &allowed, &Behaviours::default())?;
+        assert!(findings.warnings.iter().any(|warning| warning.contains("barn")), "{:?}", findings.warnings);
+        assert_eq!(verdict(findings.elements.clone(), "world/light"), Some("harmless"));
+        assert_eq!(verdict(findings.elements, "sdf/world"), Some("honoured"));
         Ok(())
     }
 

@@ -71,8 +71,8 @@ pub enum Command {
     List,
     /// Check a scenario, world or mission file.
     Check {
-        /// A scenario (.toml), world (.sdf, .world, .csv) or mission (.plan, .waypoints, .kml, .geojson,
-        /// .json), or a built-in scenario's name.
+        /// A scenario (.toml), world (.sdf, .world, .csv, .obj, .pcd, .ply) or mission (.plan, .waypoints, .kml,
+        /// .geojson, .json), or a built-in scenario's name.
         file: PathBuf,
         #[command(flatten)]
         allowances: Allowances,
@@ -80,6 +80,9 @@ pub enum Command {
         /// which a planar lidar does not see.
         #[arg(long)]
         thin_solids: bool,
+        /// Find nothing wrong with a world of which parts are missing or cannot be read.
+        #[arg(long)]
+        without_missing: bool,
     },
 }
 

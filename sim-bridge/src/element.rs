@@ -7,11 +7,16 @@ use serde::Serialize;
 pub struct Element {
     /// Its place in the file and its kind, such as `mission.items[3]: 16 waypoint`.
     pub what: String,
-    /// Line from 1.
+    /// The file that it stands in, where that may be another one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Line from 1, of the first.
     pub line: usize,
     pub verdict: Verdict,
     /// What becomes of it, or what is wrong with it; empty where that is plain.
     pub why: String,
+    /// How many there are of one name and one fate.
+    pub count: usize,
 }
 
 /// What becomes of an element.

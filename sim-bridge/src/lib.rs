@@ -13,6 +13,7 @@ pub mod fly;
 #[cfg(feature = "zenoh")]
 mod mavlink_ports;
 pub mod mission;
+mod model_folders;
 #[cfg(feature = "zenoh")]
 pub mod processes;
 mod program;

@@ -9,8 +9,8 @@ use serde_json::json;
 use skein_bp::behaviour::Behaviours;
 
 use crate::cli::{self, Cli, Command, Exit};
-use crate::mission::{Allowances, write};
-use crate::scenario::{Scenario, ScenarioError};
+use crate::mission::write;
+use crate::scenario::{Overrides, Scenario, ScenarioError};
 use crate::summary::Summary;
 use crate::{check, fly};
 
@@ -59,8 +59,14 @@ fn run(cli: &Cli, known: &Behaviours) -> anyhow::Result<Exit> {
             list(cli.json);
             Ok(Exit::Done)
         }
-        Command::Check { file, allowances, thin_solids } => {
-            check(file, *allowances, *thin_solids, known, cli.json)
+        Command::Check { file, allowances, thin_solids, without_missing } => {
+            let allowed = Overrides {
+                allowances: *allowances,
+                thin_solids: *thin_solids,
+                without_missing: *without_missing,
+                ..Overrides::default()
+            };
+            check(file, &allowed, known, cli.json)
         }
     }
 }
@@ -94,14 +100,8 @@ fn show(summary: &Summary, as_json: bool) -> anyhow::Result<()> {
 }
 
 /// An unsound file is an answer, and the check has failed; a file that cannot be read is wrong input.
-fn check(
-    file: &Path,
-    allowances: Allowances,
-    thin_solids: bool,
-    known: &Behaviours,
-    as_json: bool,
-) -> anyhow::Result<Exit> {
-    match check::check(file, allowances, thin_solids, known) {
+fn check(file: &Path, allowed: &Overrides, known: &Behaviours, as_json: bool) -> anyhow::Result<Exit> {
+    match check::check(file, allowed, known) {
         Ok(findings) => {
             if as_json {
                 println!("{}", serde_json::to_string(&findings)?);
@@ -113,7 +113,7 @@ fn check(
         Err(error @ ScenarioError::Unreadable { .. }) => Err(error.into()),
         Err(error) => {
             if as_json {
-                let elements = check::elements(file, allowances);
+                let elements = check::elements(file, allowed, &error);
                 println!("{}", json!({ "file": file, "error": error.to_string(), "elements": elements }));
             }
             eprintln!("skein-sim: {error}");

@@ -67,14 +67,27 @@ fn an_unwritable_output_folder_is_named() {
 }
 
 #[test]
-fn missing_gazebo_models_are_warned_of_by_name() {
+fn missing_gazebo_models_are_refused_by_name_unless_a_flag_lifts_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let text = "<sdf version='1.6'><world name='w'>\n<include><uri>model://pine_tree</uri></include>\n</world></sdf>";
     let world = write(folder.path(), "trees.world", text);
-    let output = skein_sim(&["check", &world]);
+    let output = skein_sim(&["check", &world, "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    let place = format!("{world}:2:1");
+    let elements = said["elements"].as_array().expect("the elements");
+    assert!(
+        elements.iter().any(|element| element["verdict"] == "refused" && element["place"] == place.as_str()),
+        "{said}"
+    );
+    assert_refused(
+        &["fly", "open", "--clock", "lockstep", "--world", &world],
+        &["pine_tree", "--without-missing"],
+    );
+    let output = skein_sim(&["check", &world, "--without-missing"]);
     assert_eq!(output.status.code(), Some(0));
     let said = String::from_utf8_lossy(&output.stdout);
-    assert!(said.contains("pine_tree"), "{said}");
+    assert!(said.contains("pine_tree` is not there; left out"), "{said}");
 }
 
 #[test]

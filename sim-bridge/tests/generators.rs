@@ -72,7 +72,7 @@ fn the_forest_is_as_dense_as_promised_and_every_gap_can_be_flown() {
             .scene
             .obstacles()
             .iter()
-            .map(|o| match o.shape {
+            .map(|o| match o.shape.clone() {
                 Shape::Cylinder { radius, half_height } => (o.pose.translation.vector, radius, half_height),
                 other => panic!("a tree is a cylinder, not {other:?}"),
             })

@@ -82,7 +82,7 @@ impl Reader<'_> {
                 (Verdict::Refused, why)
             }
         };
-        self.elements.push(Element { what, line, verdict, why });
+        self.elements.push(Element { what, file: None, line, verdict, why, count: 1 });
     }
 
     fn zone(&mut self, line: usize, rings: &[Vec<[f64; 2]>], includes: bool) -> (Verdict, String) {
@@ -205,7 +205,7 @@ fn nowhere(feature: &Feature) -> Element {
         Shape::Wrong(expected, found) => (Verdict::Refused, format!("expected {expected}, found {found}")),
         _ => (Verdict::Harmless, String::new()),
     };
-    Element { what: feature.what.clone(), line: feature.line, verdict, why }
+    Element { what: feature.what.clone(), file: None, line: feature.line, verdict, why, count: 1 }
 }
 
 fn nothing(file: &str) -> MissionError {

@@ -118,7 +118,7 @@ impl Draft {
 
     /// Adds an element to the account; gives its number.
     pub fn element(&mut self, what: String, line: usize, verdict: Verdict, why: &str) -> usize {
-        self.elements.push(Element { what, line, verdict, why: why.to_owned() });
+        self.elements.push(Element { what, file: None, line, verdict, why: why.to_owned(), count: 1 });
         self.elements.len() - 1
     }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
-use skein_world::{CsvError, SdfError, VehicleError};
+use skein_world::{CloudError, CsvError, Lacking, SdfError, VehicleError};
 use thiserror::Error;
 
 use super::thin_solids::ThinSolids;
@@ -23,9 +23,15 @@ pub enum ScenarioError {
     /// A world file that cannot be read as SDF.
     #[error(transparent)]
     Sdf(#[from] SdfError),
+    /// A world of which something solid could not be read.
+    #[error(transparent)]
+    Lacking(#[from] Box<Lacking>),
     /// A world file that cannot be read as a list of boxes.
     #[error(transparent)]
     Csv(#[from] CsvError),
+    /// A world file that cannot be read as a mesh or a cloud of points.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
     /// A vehicle model that is unknown or malformed.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),

@@ -30,11 +30,11 @@ use super::targets::{PacedRoute, Targets};
 use super::walker::Walker;
 use super::window::Window;
 use super::{
-    DEFAULT_TIME_LIMIT_S, Network, Order, SEPARATION_HULLS, Scenario, ScenarioError, VehiclePlan,
-    VehicleScript, Who, check_count, read, read_world, stated_datum,
+    DEFAULT_TIME_LIMIT_S, Network, Order, Overrides, ReadWorld, SEPARATION_HULLS, Scenario, ScenarioError,
+    VehiclePlan, VehicleScript, Who, check_count, read, read_world, stated_datum,
 };
 use crate::autopilots::make::Make;
-use crate::mission::{self, Allowances};
+use crate::mission;
 
 const DEFAULT_VEHICLES: usize = 4;
 const DEFAULT_MODEL: &str = "x500";
@@ -263,14 +263,16 @@ impl ScenarioFile {
         vehicles: Option<usize>,
         seed: u64,
         known: &Behaviours,
-        allowances: Allowances,
+        allowed: &Overrides,
     ) -> Result<Scenario, ScenarioError> {
         self.check_tables()?;
         let name = self.name();
-        let world = self.table.world.as_deref().map(|path| read_world(&self.beside(path))).transpose()?;
-        let datum = world.as_ref().and_then(|(scene, _)| stated_datum(scene));
+        let world =
+            self.table.world.as_deref().map(|path| read_world(&self.beside(path), allowed.without_missing));
+        let world = world.transpose()?;
+        let datum = world.as_ref().and_then(|world| stated_datum(&world.scene));
         let paths: Vec<_> = self.table.mission.iter().map(|path| self.beside(path)).collect();
-        let set = mission::read_files(&paths, datum, allowances)?;
+        let set = mission::read_files(&paths, datum, allowed.allowances)?;
         let count = self.count(vehicles, set.missions.len());
         check_count(&name, count)?;
         let layout = self.generate(count, seed);
@@ -287,6 +289,7 @@ impl ScenarioFile {
         let airspace = self.airspace()?;
         let fixed_bounds = self.fixed_bounds();
         let time_limit_s = self.time_limit_s(count.saturating_sub(self.count(None, set.missions.len())));
+        let wind = WindConfig { mean: scene.wind(), ..WindConfig::default() };
         let (cruise_speed_m_s, takeoff_height_m) = (self.cruise_speed_m_s(), self.takeoff_height_m());
         let table = self.table;
         let walkers = table.walker;
@@ -310,7 +313,7 @@ impl ScenarioFile {
             takeoff_height_m,
             without_ground: table.without_ground,
             time_limit_s,
-            wind: table.wind.map(WindConfig::from).unwrap_or_default(),
+            wind: table.wind.map_or(wind, WindConfig::from),
             orders,
             scripts,
             behaviours,
@@ -569,13 +572,15 @@ impl ScenarioFile {
         &self,
         name: &str,
         layout: Option<Layout>,
-        world: Option<(Scene, Vec<String>)>,
+        world: Option<ReadWorld>,
     ) -> Result<(Scene, Vec<String>), ScenarioError> {
         let own = self.obstacles()?;
         let (scene, notes) = match (world, layout) {
-            (Some((scene, warnings)), _) => {
+            (Some(world), _) => {
+                let ReadWorld { scene, .. } = &world;
                 let obstacles = scene.obstacles().iter().cloned().chain(own).collect();
-                (Scene::new(name, obstacles).with_datum(*scene.datum()), warnings)
+                let own = Scene::new(name, obstacles).with_datum(*scene.datum()).with_wind(scene.wind());
+                (own, world.notes())
             }
             (None, Some(layout)) => {
                 let obstacles = layout.obstacles.into_iter().chain(own).collect();

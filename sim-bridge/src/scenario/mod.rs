@@ -23,6 +23,7 @@ mod targets;
 mod thin_solids;
 mod walker;
 mod window;
+mod world;
 
 use std::path::{Path, PathBuf};
 
@@ -43,6 +44,7 @@ use skein_world::{Aabb, PositionErrors, Scene, VehicleModel, WindConfig};
 pub use error::ScenarioError;
 pub use layout::SPACING_M;
 pub use missions::apply_missions;
+pub use world::{ReadWorld, read_world};
 
 use self::walker::Walker;
 use crate::autopilots::make::Make;
@@ -212,7 +214,7 @@ pub struct Overrides {
     /// Size of the swarm; the scenario's own if not given.
     #[arg(long, value_name = "N")]
     pub vehicles: Option<usize>,
-    /// A Gazebo world (SDF) or a list of boxes (.csv) in place of the scenario's world.
+    /// A Gazebo world (SDF), list of boxes (.csv), mesh (.obj) or point cloud (.pcd, .ply) in place of the scenario's world.
     #[arg(long, value_name = "FILE")]
     pub world: Option<PathBuf>,
     /// A QGroundControl plan, `QGC WPL 110` file, KML, GeoJSON or LSC mission; one that all fly in trail, or one for each vehicle.
@@ -224,6 +226,9 @@ pub struct Overrides {
     /// does not see.
     #[arg(long)]
     pub thin_solids: bool,
+    /// Fly though parts of the world are missing or cannot be read: they are left out.
+    #[arg(long)]
+    pub without_missing: bool,
     /// What a vehicle does once the ground station has been silent for 5 s: continue, return or land; the scenario's own
     /// if not given.
     #[arg(long, value_name = "POLICY", value_parser = policy)]
@@ -261,7 +266,7 @@ impl Scenario {
         vehicles: Option<usize>,
         seed: u64,
     ) -> Result<Self, ScenarioError> {
-        Self::of_program(text, file, vehicles, seed, &Behaviours::default(), Allowances::default())
+        Self::of_program(text, file, vehicles, seed, &Behaviours::default(), &Overrides::default())
     }
 
     /// The same for a program with these behaviours.
@@ -271,10 +276,9 @@ impl Scenario {
         vehicles: Option<usize>,
         seed: u64,
         known: &Behaviours,
-        allowances: Allowances,
+        allowed: &Overrides,
     ) -> Result<Self, ScenarioError> {
-        let file = file::ScenarioFile::parse(text, file)?;
-        let scenario = file.build(vehicles, seed, known, allowances)?;
+        let scenario = file::ScenarioFile::parse(text, file)?.build(vehicles, seed, known, allowed)?;
         scenario.validate()?;
         Ok(scenario)
     }
@@ -291,18 +295,19 @@ impl Scenario {
         seed: u64,
         known: &Behaviours,
     ) -> Result<Self, ScenarioError> {
-        let world = overrides.world.as_deref().map(read_world).transpose()?;
-        let datum = world.as_ref().and_then(|(scene, _)| stated_datum(scene));
+        let world = overrides.world.as_deref().map(|path| read_world(path, overrides.without_missing));
+        let world = world.transpose()?;
+        let datum = world.as_ref().and_then(|world| stated_datum(&world.scene));
         let set = mission::read_files(&overrides.missions, datum, overrides.allowances)?;
         let own_number = || (set.missions.len() > 1).then_some(set.missions.len());
         let vehicles = overrides.vehicles.or_else(own_number);
         let mut scenario = match text_of(name)? {
-            Some(text) => Self::of_program(&text, name, vehicles, seed, known, overrides.allowances)?,
+            Some(text) => Self::of_program(&text, name, vehicles, seed, known, overrides)?,
             None => Self::built_in(name, vehicles, seed)?,
         };
-        if let Some((scene, warnings)) = world {
-            scenario.replace_world(scene);
-            scenario.notes.extend(warnings);
+        if let Some(world) = world {
+            scenario.notes.extend(world.notes());
+            scenario.replace_world(world.scene);
             if set.missions.is_empty() {
                 scenario.settle()?;
             }
@@ -318,6 +323,9 @@ impl Scenario {
 
     /// Puts another world in place of the scenario's own; the routes stay until [`Scenario::settle`] or a mission.
     pub fn replace_world(&mut self, scene: Scene) {
+        if scene.wind() != Vector3::zeros() {
+            self.wind.mean = scene.wind();
+        }
         self.scene = scene;
         self.fixed_bounds = false;
         self.include_routes();
@@ -644,17 +652,6 @@ fn text_of(name: &str) -> Result<Option<String>, ScenarioError> {
     let path = Path::new(name);
     let names_a_file = path.extension().is_some() || path.components().count() > 1;
     if names_a_file { read(path).map(Some) } else { Ok(None) }
-}
-
-/// Reads a Gazebo world, or a `.csv` of boxes; returns what of it could not be read as lines for people.
-pub fn read_world(path: &Path) -> Result<(Scene, Vec<String>), ScenarioError> {
-    let text = read(path)?;
-    let name = path.display().to_string();
-    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
-        return Ok((Scene::from_csv(&text, &name)?, Vec::new()));
-    }
-    let (scene, warnings) = Scene::from_sdf(&text, &name)?;
-    Ok((scene, warnings.iter().map(ToString::to_string).collect()))
 }
 
 fn read(path: &Path) -> Result<String, ScenarioError> {

@@ -1,6 +1,6 @@
 //! Boxes along the world axes.
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Point3, Vector3};
 
 /// A box along the world axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,5 +25,12 @@ impl Aabb {
     /// Grown by `margin` metres on every side.
     pub fn grown(&self, margin: Vector3<f64>) -> Self {
         Self { min: self.min - margin, max: self.max + margin }
+    }
+
+    /// The smallest box along the axes of another frame that holds this one, which stands there at `pose`.
+    pub fn moved(&self, pose: &Isometry3<f64>) -> Self {
+        let middle = (pose * Point3::from((self.min + self.max) / 2.0)).coords;
+        let reach = pose.rotation.to_rotation_matrix().matrix().abs() * (self.max - self.min) / 2.0;
+        Self { min: middle - reach, max: middle + reach }
     }
 }

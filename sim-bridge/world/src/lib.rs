@@ -43,13 +43,17 @@
 
 pub mod aabb;
 pub mod autopilot;
+pub mod cloud;
 pub mod csv;
+pub mod files;
 pub mod lidar;
+pub mod mesh;
 mod noise;
 pub mod obstacle;
 pub mod pilot;
 pub mod position_error;
 pub mod quadrotor;
+mod round;
 pub mod scene;
 pub mod sdf;
 pub mod sensors;
@@ -60,14 +64,17 @@ pub mod way;
 pub mod wind;
 
 pub use aabb::Aabb;
+pub use cloud::CloudError;
 pub use csv::CsvError;
+pub use files::{Files, Found, NoFiles};
 pub use lidar::{Hull, Lidar, Surroundings};
+pub use mesh::Mesh;
 pub use obstacle::{Obstacle, Shape};
 pub use pilot::Pilot;
 pub use position_error::{Drift, PositionErrors, PositionFault, PositionFaultKind};
 pub use quadrotor::{MotorCommands, Quadrotor, RigidState, STEP};
 pub use scene::{Nearest, Scene};
-pub use sdf::{SdfError, Warning};
+pub use sdf::{Account, Lacking, Reading, SdfError, Verdict};
 pub use sensors::{Gps, Imu, SensorReadings};
 pub use simulation::{Simulation, SimulationConfig, VehicleSetup, VehicleState};
 pub use skein_mav::Battery;

@@ -260,7 +260,11 @@ impl ScanPlane {
             // A ray of the plane meets an upright body only where its projection along the body's
             // z axis meets the outline; the projection must not squeeze the plane to a line.
             _ if self.turn().abs() < LEAST_COSINE => self.span_of_ball(shape.bounding_radius(), reach),
-            Shape::Cylinder { radius, .. } => self.span_of_disc(radius, reach),
+            Shape::Cylinder { radius, .. } | Shape::Capsule { radius, .. } | Shape::Cone { radius, .. } => {
+                self.span_of_disc(radius, reach)
+            }
+            Shape::Ellipsoid { radii } => self.span_of_rectangle(&radii, reach),
+            Shape::Mesh(ref mesh) => self.span_of_ball(mesh.bounding_radius(), reach),
             Shape::Box { half_extents } => self.span_of_rectangle(&half_extents, reach),
         }
     }

@@ -6,10 +6,13 @@ use std::time::Duration;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use crate::aabb::Aabb;
+use crate::mesh::Mesh;
+use crate::round;
 use crate::way::Way;
 
-/// The form of an obstacle in its own frame, metres, centred on its origin.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The form of an obstacle in its own frame, metres, centred on its origin; but a mesh is where its corners
+/// are.
+#[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// A cuboid.
     Box {
@@ -25,6 +28,24 @@ pub enum Shape {
     },
     /// A ball.
     Sphere { radius: f64 },
+    /// A cylinder about z with half a ball on each end.
+    Capsule {
+        /// Radius of the round section and of the balls.
+        radius: f64,
+        /// Half of the length along z without the balls.
+        half_length: f64,
+    },
+    /// A ball, stretched along each axis.
+    Ellipsoid { radii: Vector3<f64> },
+    /// A solid cone about z whose point is up, half of it above the origin.
+    Cone {
+        /// Radius of the round face below.
+        radius: f64,
+        /// Half of the length along z.
+        half_height: f64,
+    },
+    /// Many faces.
+    Mesh(Mesh),
     /// Everything below an infinite plane through the origin.
     Plane {
         /// Points out of the solid half.
@@ -36,6 +57,10 @@ impl Shape {
     /// Radius of the smallest ball about the origin that holds the shape; infinite for a plane.
     pub fn bounding_radius(&self) -> f64 {
         match *self {
+            Self::Capsule { radius, half_length } => radius + half_length,
+            Self::Ellipsoid { radii } => radii.max(),
+            Self::Cone { radius, half_height } => radius.hypot(half_height),
+            Self::Mesh(ref mesh) => mesh.bounding_radius(),
             Self::Box { half_extents } => half_extents.norm(),
             Self::Cylinder { radius, half_height } => radius.hypot(half_height),
             Self::Sphere { radius } => radius,
@@ -44,11 +69,18 @@ impl Shape {
     }
 
     /// Length of the longest straight line inside along the unit vector `direction` (own frame), metres: that
-    /// through the middle, for every shape is the same on both sides of it. Infinite for a plane.
+    /// through the middle, for every shape is the same on both sides of it. Infinite for a plane; of a cone
+    /// that of the cylinder around it, and of a mesh that of the box.
     pub fn thickness_m(&self, direction: &Vector3<f64>) -> f64 {
         let half = match *self {
             Self::Box { half_extents } => half_extents.component_div(&direction.abs()).min(),
-            Self::Cylinder { radius, half_height } => {
+            Self::Capsule { radius, half_length } => half_of_capsule(radius, half_length, direction),
+            Self::Mesh(ref mesh) => {
+                let bounds = mesh.bounds();
+                ((bounds.max - bounds.min) / 2.0).component_div(&direction.abs()).min()
+            }
+            Self::Ellipsoid { radii } => 1.0 / direction.component_div(&radii).norm(),
+            Self::Cylinder { radius, half_height } | Self::Cone { radius, half_height } => {
                 (radius / direction.xy().norm()).min(half_height / direction.z.abs())
             }
             Self::Sphere { radius } => radius,
@@ -72,6 +104,13 @@ impl Shape {
                 outside + beyond_side.max(beyond_cap).min(0.0)
             }
             Self::Sphere { radius } => point.coords.norm() - radius,
+            Self::Capsule { radius, half_length } => {
+                let beyond_end = (point.z.abs() - half_length).max(0.0);
+                point.x.hypot(point.y).hypot(beyond_end) - radius
+            }
+            Self::Ellipsoid { radii } => round::distance_to_ellipsoid(&radii, point),
+            Self::Cone { radius, half_height } => round::distance_to_cone(radius, half_height, point),
+            Self::Mesh(ref mesh) => mesh.signed_distance(point),
             Self::Plane { normal } => point.coords.dot(&normal),
         }
     }
@@ -100,12 +139,50 @@ impl Shape {
                 origin.coords.dot(direction),
                 origin.coords.norm_squared() - radius * radius,
             )?,
+            Self::Capsule { radius, half_length } => {
+                return cast_ray_on_capsule(radius, half_length, origin, direction);
+            }
+            // Stretched to a ball of radius 1, the ray has the same parameters.
+            Self::Ellipsoid { radii } => {
+                let (origin, direction) =
+                    (origin.coords.component_div(&radii), direction.component_div(&radii));
+                Interval::RAY.within_roots(
+                    direction.norm_squared(),
+                    origin.dot(&direction),
+                    origin.norm_squared() - 1.0,
+                )?
+            }
+            Self::Cone { radius, half_height } => {
+                return round::cast_ray_on_cone(radius, half_height, origin, direction);
+            }
+            Self::Mesh(ref mesh) => return mesh.cast_ray(origin, direction),
             Self::Plane { normal } => {
                 Interval::RAY.below(origin.coords.dot(&normal), direction.dot(&normal))?
             }
         };
         Some(inside.from)
     }
+}
+
+/// The distance from the middle of a capsule to its surface along a unit vector, metres.
+fn half_of_capsule(radius: f64, half_length: f64, direction: &Vector3<f64>) -> f64 {
+    let (aside, along) = (direction.xy().norm(), direction.z.abs());
+    if radius * along <= half_length * aside {
+        return radius / aside;
+    }
+    let off_axis = half_length * aside;
+    half_length * along + (radius * radius - off_axis * off_axis).max(0.0).sqrt()
+}
+
+fn cast_ray_on_capsule(
+    radius: f64,
+    half_length: f64,
+    origin: &Point3<f64>,
+    direction: &Vector3<f64>,
+) -> Option<f64> {
+    let side = Shape::Cylinder { radius, half_height: half_length }.cast_ray(origin, direction);
+    let end = |z: f64| Shape::Sphere { radius }.cast_ray(&(origin - Vector3::z() * z), direction);
+    [side, end(half_length), end(-half_length)].into_iter().flatten().reduce(f64::min)
 }
 
 /// The part of a ray that lies inside the bodies intersected so far, as distances along it.
@@ -233,9 +310,17 @@ impl Obstacle {
     pub fn aabb(&self) -> Option<Aabb> {
         let centre = self.pose.translation.vector;
         let rotation = self.pose.rotation.to_rotation_matrix();
-        let reach = match self.shape {
+        let reach: Vector3<f64> = match self.shape {
+            Shape::Capsule { radius, half_length } => {
+                (rotation * Vector3::z()).map(|part| half_length * part.abs() + radius)
+            }
+            Shape::Ellipsoid { radii } => {
+                let axes = rotation.matrix() * nalgebra::Matrix3::from_diagonal(&radii);
+                Vector3::from_iterator(axes.row_iter().map(|row| row.norm()))
+            }
+            Shape::Mesh(ref mesh) => return Some(mesh.bounds().moved(&self.pose)),
             Shape::Box { half_extents } => rotation.matrix().abs() * half_extents,
-            Shape::Cylinder { radius, half_height } => {
+            Shape::Cylinder { radius, half_height } | Shape::Cone { radius, half_height } => {
                 let axis = rotation * Vector3::z();
                 axis.map(|part| half_height * part.abs() + radius * (1.0 - part * part).max(0.0).sqrt())
             }
@@ -248,17 +333,29 @@ impl Obstacle {
     /// Outline of the upright projection on the ground, counter-clockwise, for maps and pictures;
     /// round shapes are drawn with 16 corners. Empty for a plane.
     pub fn footprint(&self) -> Vec<[f64; 2]> {
+        let round = |along_x: f64, along_y: f64| {
+            let corner = |corner: u32| {
+                let (sin, cos) = (TAU * f64::from(corner) / 16.0).sin_cos();
+                Vector3::new(along_x * cos, along_y * sin, 0.0)
+            };
+            (0..16).map(corner).collect()
+        };
         let outline: Vec<Vector3<f64>> = match self.shape {
+            Shape::Mesh(ref mesh) => {
+                let Aabb { min, max } = mesh.bounds();
+                [(max.x, max.y), (min.x, max.y), (min.x, min.y), (max.x, min.y)]
+                    .map(|(x, y)| Vector3::new(x, y, 0.0))
+                    .to_vec()
+            }
             Shape::Box { half_extents: h } => [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]
                 .iter()
                 .map(|(x, y)| Vector3::new(x * h.x, y * h.y, 0.0))
                 .collect(),
-            Shape::Cylinder { radius, .. } | Shape::Sphere { radius } => (0..16)
-                .map(|corner| {
-                    let (sin, cos) = (TAU * f64::from(corner) / 16.0).sin_cos();
-                    Vector3::new(radius * cos, radius * sin, 0.0)
-                })
-                .collect(),
+            Shape::Cylinder { radius, .. }
+            | Shape::Sphere { radius }
+            | Shape::Capsule { radius, .. }
+            | Shape::Cone { radius, .. } => round(radius, radius),
+            Shape::Ellipsoid { radii } => round(radii.x, radii.y),
             Shape::Plane { .. } => Vec::new(),
         };
         outline

@@ -26,6 +26,7 @@ pub struct Scene {
     reaches: Vec<f64>,
     bounds: Aabb,
     datum: Datum,
+    wind: Vector3<f64>,
 }
 
 /// The obstacle next to a point.
@@ -47,6 +48,7 @@ impl Scene {
             reaches: obstacles.iter().map(|obstacle| obstacle.shape.bounding_radius()).collect(),
             obstacles,
             datum: Datum::from_degrees(47.397_742, 8.545_594, 488.0),
+            wind: Vector3::zeros(),
         }
     }
 
@@ -66,6 +68,12 @@ impl Scene {
     /// The same scene at another place on Earth.
     pub fn with_datum(mut self, datum: Datum) -> Self {
         self.datum = datum;
+        self
+    }
+
+    /// The same scene in a steady wind: ENU, m/s.
+    pub fn with_wind(mut self, wind: Vector3<f64>) -> Self {
+        self.wind = wind;
         self
     }
 
@@ -96,6 +104,11 @@ impl Scene {
     /// The world's origin on Earth.
     pub fn datum(&self) -> &Datum {
         &self.datum
+    }
+
+    /// The wind that the world states: ENU, m/s.
+    pub fn wind(&self) -> Vector3<f64> {
+        self.wind
     }
 
     /// Distance from `point` to the nearest obstacle, m: negative inside of one, infinite where

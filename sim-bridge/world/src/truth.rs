@@ -4,7 +4,7 @@
 //! those cannot hide a collision.
 
 use glamx::{DPose3, DVec3};
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::{Compound, SharedShape};
 
@@ -179,42 +179,77 @@ impl Referee {
 /// The obstacles as parry shapes.
 #[derive(Clone)]
 struct Solids {
-    /// All that have an end, under one bounding volume hierarchy.
+    /// All simple ones that have an end, under one bounding volume hierarchy.
     bodies: Option<Compound>,
-    planes: Vec<(DPose3, SharedShape)>,
+    /// Planes; and meshes, which have hierarchies of their own.
+    others: Vec<Other>,
+}
+
+/// A solid that parry does not let into a compound.
+#[derive(Clone)]
+enum Other {
+    Plane(DPose3, SharedShape),
+    /// A mesh, or a shape that parry lacks, which measures itself.
+    Own(Isometry3<f64>, Shape),
+}
+
+impl Other {
+    fn distance(&self, point: DVec3) -> f64 {
+        match self {
+            Self::Plane(pose, plane) => plane.distance_to_point(pose, point, true),
+            Self::Own(pose, shape) => {
+                let own = pose.inverse_transform_point(&Point3::new(point.x, point.y, point.z));
+                shape.signed_distance(&own).max(0.0)
+            }
+        }
+    }
 }
 
 impl Solids {
     fn new<'a>(obstacles: impl Iterator<Item = &'a Obstacle>) -> Self {
-        let (planes, bodies): (Vec<_>, Vec<_>) =
-            obstacles.partition(|obstacle| matches!(obstacle.shape, Shape::Plane { .. }));
-        let parts = |obstacles: Vec<&Obstacle>| obstacles.into_iter().map(parry_shape).collect();
-        let bodies: Vec<_> = parts(bodies);
-        Self { bodies: (!bodies.is_empty()).then(|| Compound::new(bodies)), planes: parts(planes) }
+        let (mut bodies, mut others) = (Vec::new(), Vec::new());
+        for obstacle in obstacles {
+            match &obstacle.shape {
+                Shape::Plane { normal } => {
+                    let plane = SharedShape::halfspace(DVec3::new(normal.x, normal.y, normal.z));
+                    others.push(Other::Plane(obstacle.pose.into(), plane));
+                }
+                shape => match parry_shape(obstacle) {
+                    Some(body) => bodies.push(body),
+                    None => others.push(Other::Own(obstacle.pose, shape.clone())),
+                },
+            }
+        }
+        Self { bodies: (!bodies.is_empty()).then(|| Compound::new(bodies)), others }
     }
 
     /// Distance from a point to the nearest obstacle, 0 inside; `None` without obstacles.
     fn distance(&self, point: &Vector3<f64>) -> Option<f64> {
         let point = DVec3::new(point.x, point.y, point.z);
         let bodies = self.bodies.iter().map(|compound| compound.distance_to_local_point(point, true));
-        let planes = self.planes.iter().map(|(pose, plane)| plane.distance_to_point(pose, point, true));
-        bodies.chain(planes).reduce(f64::min)
+        let others = self.others.iter().map(|other| other.distance(point));
+        bodies.chain(others).reduce(f64::min)
     }
 }
 
-/// An obstacle as a parry shape and its pose.
-fn parry_shape(obstacle: &Obstacle) -> (DPose3, SharedShape) {
+/// An obstacle as a parry shape and its pose; `None` of one that is no simple shape of parry's.
+fn parry_shape(obstacle: &Obstacle) -> Option<(DPose3, SharedShape)> {
     let mut pose = obstacle.pose;
+    // Parry's cylinders and cones stand along y.
+    let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
     let shape = match obstacle.shape {
         Shape::Box { half_extents } => SharedShape::cuboid(half_extents.x, half_extents.y, half_extents.z),
         Shape::Cylinder { radius, half_height } => {
-            // Parry's cylinders stand along y.
-            let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
-            pose *= Isometry3::from_parts(nalgebra::Translation3::identity(), upright);
+            pose *= upright;
             SharedShape::cylinder(half_height, radius)
         }
+        Shape::Cone { radius, half_height } => {
+            pose *= upright;
+            SharedShape::cone(half_height, radius)
+        }
         Shape::Sphere { radius } => SharedShape::ball(radius),
-        Shape::Plane { normal } => SharedShape::halfspace(DVec3::new(normal.x, normal.y, normal.z)),
+        Shape::Capsule { radius, half_length } => SharedShape::capsule_z(half_length, radius),
+        Shape::Ellipsoid { .. } | Shape::Mesh(_) | Shape::Plane { .. } => return None,
     };
-    (pose.into(), shape)
+    Some((pose.into(), shape))
 }

@@ -1,4 +1,5 @@
-//! The way of an obstacle that moves: where it is at any time, without a memory, so that equal runs have equal worlds.
+//! The way of an obstacle that moves: where it is at any time, without a memory, so that equal runs have
+//! equal worlds.
 
 use std::time::Duration;
 
@@ -41,7 +42,8 @@ impl Way {
         Self { legs: vec![endless], loops: false }
     }
 
-    /// From one place to the others in turn; from the last back to the first if it `loops`, else it ends there.
+    /// From one place to the others in turn; from the last back to the first if it `loops`, else it ends
+    /// there.
     pub fn through(from: Vector3<f64>, stops: &[Stop], loops: bool) -> Self {
         let back = stops.last().filter(|_| loops).map(|last| Stop { at: from, waits_s: 0.0, ..*last });
         let (mut from, mut begins_s) = (from, 0.0);
@@ -54,6 +56,25 @@ impl Way {
             leg
         };
         Self { legs: stops.iter().copied().chain(back).map(leg).collect(), loops }
+    }
+
+    /// By times since the run began, in order; before the first it stands for `delay` where that is. One that
+    /// loops is there again at once when its last time is over.
+    pub fn timed(stops: &[(Duration, Vector3<f64>)], delay: Duration, loops: bool) -> Self {
+        let Some((first_time, first)) = stops.first().copied() else {
+            return Self { legs: Vec::new(), loops };
+        };
+        let first_s = (delay + first_time).as_secs_f64();
+        let stand =
+            Leg { from: first, velocity: Vector3::zeros(), begins_s: 0.0, moves_s: 0.0, ends_s: first_s };
+        let legs = stops.windows(2).map(|pair| {
+            let ((from_time, from), (to_time, to)) = (pair[0], pair[1]);
+            let (begins_s, moves_s) =
+                ((delay + from_time).as_secs_f64(), (to_time - from_time).as_secs_f64());
+            let velocity = if moves_s > 0.0 { (to - from) / moves_s } else { Vector3::zeros() };
+            Leg { from, velocity, begins_s, moves_s, ends_s: begins_s + moves_s }
+        });
+        Self { legs: std::iter::once(stand).chain(legs).collect(), loops }
     }
 
     /// Where it is so long after the run began; world ENU, m.
@@ -110,6 +131,21 @@ mod tests {
             let later = way.at(at_s(round_s + seconds));
             assert!((later - way.at(at_s(seconds))).norm() < 1e-6, "at {seconds} s: {later:?}");
         }
+    }
+
+    #[test]
+    fn a_timed_way_is_at_its_places_at_their_times_and_begins_again_at_once() {
+        let stops = [(2.0, 0.0), (4.0, 6.0), (5.0, 6.0)].map(|(s, x)| (at_s(s), Vector3::new(x, 0.0, 1.0)));
+        let way = Way::timed(&stops, at_s(1.0), true);
+        for (seconds, x) in [(0.0, 0.0), (3.0, 0.0), (4.0, 3.0), (5.5, 6.0), (6.5, 0.0), (10.0, 3.0)] {
+            assert!(
+                (way.at(at_s(seconds)).x - x).abs() < 1e-9,
+                "at {seconds} s: {:?}",
+                way.at(at_s(seconds))
+            );
+        }
+        let once = Way::timed(&stops, at_s(0.0), false);
+        assert_eq!((once.at(at_s(99.0)).x, once.velocity(at_s(3.0)).x), (6.0, 3.0));
     }
 
     #[test]

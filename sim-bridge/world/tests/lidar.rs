@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use skein_wire::Scan;
 use skein_world::vehicle::LidarModel;
-use skein_world::{Hull, Lidar, Obstacle, Scene, Shape, Surroundings};
+use skein_world::{Hull, Lidar, Mesh, Obstacle, Scene, Shape, Surroundings};
 
 const MODEL: LidarModel = LidarModel {
     rays: 720,
@@ -147,6 +147,14 @@ fn obstacle() -> impl Strategy<Value = Obstacle> {
             .prop_map(|(x, y, z)| Shape::Box { half_extents: Vector3::new(x, y, z) }),
         (0.1..1.0, 0.2..6.0).prop_map(|(radius, half_height)| Shape::Cylinder { radius, half_height }),
         (0.1..2.0).prop_map(|radius| Shape::Sphere { radius }),
+        (0.1..1.0, 0.2..3.0).prop_map(|(radius, half_length)| Shape::Capsule { radius, half_length }),
+        (0.1..2.0, 0.2..3.0).prop_map(|(radius, half_height)| Shape::Cone { radius, half_height }),
+        (0.1..2.0, 0.1..2.0, 0.1..2.0)
+            .prop_map(|(x, y, z)| Shape::Ellipsoid { radii: Vector3::new(x, y, z) }),
+        (0.1..2.0, 0.2..6.0).prop_map(|(side, height)| {
+            let outline = [[0.0, 0.0], [side, 0.0], [0.0, side]];
+            Shape::Mesh(Mesh::extrusion(&outline, height).unwrap())
+        }),
     ];
     let turn = prop_oneof![
         // Upright, tilted by any angle, and upside down.

@@ -12,5 +12,8 @@ mod lidar;
 mod position_error;
 mod quadrotor;
 mod sdf;
+mod sdf_frames;
+mod sdf_includes;
+mod sdf_solids;
 mod simulation;
 mod vehicle;

@@ -4,18 +4,24 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use skein_world::{Scene, SdfError, Shape, Warning};
+use skein_world::{NoFiles, Reading, Scene, SdfError, Shape};
 
 fn world(content: &str) -> String {
     format!("<sdf version='1.6'>\n<world name='w'>\n{content}\n</world>\n</sdf>")
 }
 
-fn read(content: &str) -> (Scene, Vec<Warning>) {
-    Scene::from_sdf(&world(content), "test.world").expect("a sound world")
+fn read(content: &str) -> (Scene, Vec<String>) {
+    noted(Scene::from_sdf(&world(content), "test.world", &NoFiles).expect("a sound world"))
+}
+
+/// A scene of which nothing is missing, and what is said about it.
+fn noted(reading: Reading) -> (Scene, Vec<String>) {
+    let (scene, account) = reading.whole().expect("a whole world");
+    (scene, account.notes().map(ToString::to_string).collect())
 }
 
 fn refuse(text: &str) -> String {
-    Scene::from_sdf(text, "test.world").expect_err("an unsound world").to_string()
+    Scene::from_sdf(text, "test.world", &NoFiles).expect_err("an unsound world").to_string()
 }
 
 fn model(pose: &str, geometry: &str) -> String {
@@ -41,8 +47,8 @@ fn reads_every_supported_shape() {
     ]
     .concat();
     let (scene, warnings) = read(&content);
-    assert_eq!(warnings, []);
-    let shapes: Vec<Shape> = scene.obstacles().iter().map(|o| o.shape).collect();
+    assert_eq!(warnings, Vec::<String>::new());
+    let shapes: Vec<Shape> = scene.obstacles().iter().map(|o| o.shape.clone()).collect();
     assert_eq!(
         shapes,
         [
@@ -75,7 +81,7 @@ fn poses_of_nested_models_links_and_collisions_compose() {
 fn a_level_plane_at_zero_is_the_ground_and_no_obstacle() {
     let (scene, warnings) = read(&model("", "<plane><normal>0 0 1</normal></plane>"));
     assert!(scene.obstacles().is_empty());
-    assert_eq!(warnings, []);
+    assert_eq!(warnings, Vec::<String>::new());
 }
 
 #[test]
@@ -93,16 +99,18 @@ fn rotations_in_degrees_and_quaternions_are_read() {
 
 #[test]
 fn the_datum_is_read() {
-    let (scene, warnings) = read(
+    let (scene, _) = read(
         "<spherical_coordinates><latitude_deg>47</latitude_deg><longitude_deg>-8</longitude_deg>\
-         <elevation>400</elevation><heading_deg>90</heading_deg></spherical_coordinates>",
+         <elevation>400</elevation><heading_deg>0</heading_deg></spherical_coordinates>",
     );
     let datum = scene.datum();
     assert_eq!(
         (datum.latitude_rad, datum.longitude_rad, datum.height_m),
         (47_f64.to_radians(), -8_f64.to_radians(), 400.0)
     );
-    assert!(warnings.iter().any(|warning| warning.message.contains("<heading_deg>")));
+    let turned = "<spherical_coordinates><heading_deg>90</heading_deg></spherical_coordinates>";
+    let turned = Scene::from_sdf(&world(turned), "test.world", &NoFiles).expect("a sound file");
+    assert!(turned.whole().is_err_and(|lacking| lacking.to_string().contains("turned against east")));
 }
 
 /// Everything that is not read is named, once, with how often.
@@ -115,43 +123,53 @@ fn what_is_left_out_is_named() {
         oak,
         oak,
         &model("", "<mesh><uri>rock.dae</uri></mesh>"),
-        "<actor name='walker'/>",
+        &model("", "<image><uri>maze.png</uri></image>"),
+        "<population/>",
+        "<actor name='crowd'><skin/><plugin name='p' filename='libWalk.so'/></actor>",
         "<model name='ball'><link name='l'><collision name='c'><geometry>\
          <sphere><radius>1</radius></sphere></geometry></collision></link></model>",
         "<model name='ghost'><static>1</static><link name='l'><visual name='v'/></link></model>",
-        &model("<pose relative_to='elsewhere'>1 0 0 0 0 0</pose>", "<sphere><radius>1</radius></sphere>"),
+        "<tree_of_ours/>",
     ]
     .concat();
-    let (scene, warnings) = read(&content);
-    let messages: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    let reading = Scene::from_sdf(&world(&content), "test.world", &NoFiles).expect("a sound file");
+    let notes: Vec<String> = reading.account.notes().map(ToString::to_string).collect();
     let expected = [
-        "test.world:4:1: included model `model://oak` is not in this file; left out (2 times)",
-        "`m::l::c` is a <mesh>, which is not supported; left out",
-        "<actor> is not supported; left out",
         "model `ball` is not static; it stands still here",
-        "link `ghost::l` can be seen but has no <collision>; left out",
-        "pose of `m` is relative to `elsewhere`, which is not supported",
+        "link `l` can be seen but has no <collision>; left out",
+        "<tree_of_ours> is not of the format; left out",
     ];
-    assert_eq!(messages.len(), expected.len(), "{messages:#?}");
-    for (message, expected) in messages.iter().zip(expected) {
+    assert_eq!(notes.len(), expected.len(), "{notes:#?}");
+    let refused: Vec<String> = reading.account.refused().map(ToString::to_string).collect();
+    let unreadable = [
+        "test.world:4:1: included model `model://oak` is not there (2 times)",
+        "the mesh `rock.dae` of `l::c` is not there",
+        "`l::c` is a <image>, which cannot be read",
+        "the models that a <population> strews cannot be read",
+        "actor `crowd` moves as a plugin says, which cannot be read",
+    ];
+    assert_eq!(refused.len(), unreadable.len(), "{refused:#?}");
+    for (message, expected) in notes.iter().zip(expected).chain(refused.iter().zip(unreadable)) {
         assert!(message.contains(expected), "{message}");
     }
-    assert_eq!(scene.obstacles().len(), 2);
+    let lacking = reading.clone().whole().expect_err("a world that lacks something").to_string();
+    assert!(lacking.contains("model://oak") && lacking.contains("--without-missing"), "{lacking}");
+    assert_eq!(reading.without_missing().0.obstacles().len(), 1);
 }
 
 #[test]
 fn a_world_without_ground_plane_says_that_it_gets_one() {
     let (_, warnings) = read("");
     assert_eq!(warnings.len(), 1);
-    assert!(warnings[0].message.contains("flat ground"));
+    assert!(warnings[0].contains("flat ground"));
 }
 
 #[test]
 fn a_bare_model_is_a_world() {
     let text = format!("<sdf version='1.6'>{}</sdf>", model("", "<sphere><radius>1</radius></sphere>"));
-    let (scene, warnings) = Scene::from_sdf(&text, "model.sdf").expect("a sound model");
+    let (scene, warnings) = noted(Scene::from_sdf(&text, "model.sdf", &NoFiles).expect("a sound model"));
     assert_eq!((scene.name(), scene.obstacles().len()), ("m", 1));
-    assert_eq!(warnings, []);
+    assert_eq!(warnings, Vec::<String>::new());
 }
 
 #[test]
@@ -190,6 +208,31 @@ fn sizes_that_no_solid_can_have_are_refused() {
     }
 }
 
+/// Gazebo's own worlds have both.
+#[test]
+fn what_is_not_quite_xml_is_taken() {
+    let content = format!(
+        "<!-- run: gz sim \n--verbose -->{}<gz:note gz:by='me'/><!-- b --><model name='x'><pose>a</pose></model>",
+        model("", "<sphere><radius>1</radius></sphere>")
+    );
+    let message = refuse(&world(&content));
+    assert!(message.starts_with("test.world:4:"), "{message}");
+    let text = format!("\n<?xml version='1.0'?>\n{}", world(&content.replace("<pose>a</pose>", "")));
+    let (scene, _) = noted(Scene::from_sdf(&text, "test.world", &NoFiles).expect("a sound world"));
+    assert_eq!(scene.obstacles().len(), 1);
+}
+
+/// Classic Gazebo had x point west, unless it was told 180.
+#[test]
+fn a_heading_of_180_is_none_in_the_old_format_only() {
+    let turned = |version: &str| {
+        let content = "<spherical_coordinates><heading_deg>180</heading_deg></spherical_coordinates>";
+        let text = world(content).replace("version='1.6'", &format!("version='{version}'"));
+        Scene::from_sdf(&text, "test.world", &NoFiles).expect("a sound file").whole().is_err()
+    };
+    assert_eq!((turned("1.6"), turned("1.8"), turned("1.10")), (false, true, true));
+}
+
 #[test]
 fn broken_xml_is_refused_where_it_breaks() {
     let unclosed = refuse("<sdf>\n<world>\n  <!-- oops\n</world>\n</sdf>");
@@ -210,17 +253,17 @@ fn broken_xml_is_refused_where_it_breaks() {
 #[test]
 fn models_nest_to_a_limit() {
     let nested = |depth: usize| world(&["<model name='m'>".repeat(depth), "</model>".repeat(depth)].concat());
-    assert!(Scene::from_sdf(&nested(32), "deep.world").is_ok());
-    let error = Scene::from_sdf(&nested(33), "deep.world").expect_err("too deep");
+    assert!(Scene::from_sdf(&nested(32), "deep.world", &NoFiles).is_ok());
+    let error = Scene::from_sdf(&nested(33), "deep.world", &NoFiles).expect_err("too deep");
     assert!(matches!(error, SdfError::TooDeep { .. }), "{error}");
-    let error = Scene::from_sdf(&nested(20_000), "deep.world").expect_err("far too deep");
+    let error = Scene::from_sdf(&nested(20_000), "deep.world", &NoFiles).expect_err("far too deep");
     assert!(matches!(error, SdfError::TooDeep { .. }), "{error}");
 }
 
 proptest! {
     #[test]
     fn no_text_makes_the_reader_panic(text in ".{0,200}") {
-        let _ = Scene::from_sdf(&text, "any");
+        let _ = Scene::from_sdf(&text, "any", &NoFiles);
     }
 
     #[test]
@@ -236,7 +279,7 @@ proptest! {
         let start = cut.min(text.len());
         let end = (start + length).min(text.len());
         text.replace_range(start..end, &instead);
-        let _ = Scene::from_sdf(&text, "any");
+        let _ = Scene::from_sdf(&text, "any", &NoFiles);
     }
 }
 
@@ -250,29 +293,29 @@ fn published_worlds_are_read_as_their_readme_says() {
     }
     let load = |name: &str| {
         let text = std::fs::read_to_string(folder.join(name)).expect("a readable file");
-        Scene::from_sdf(&text, name)
+        Scene::from_sdf(&text, name, &NoFiles)
     };
     for (name, boxes) in [("boxes1.world", 1), ("boxes2.world", 2), ("boxes3.world", 6)] {
-        let (scene, _) = load(name).expect("a sound world");
+        let (scene, _) = noted(load(name).expect("a sound world"));
         assert_eq!(scene.obstacles().len(), boxes, "{name}");
     }
 
     let refused = load("moving_boxes.world").expect_err("not well-formed").to_string();
     assert!(refused.starts_with("moving_boxes.world:111:5: a comment opens"), "{refused}");
 
-    let (scene, warnings) = load("simple_obstacle.world").expect("a sound world");
-    assert!(scene.obstacles().is_empty());
-    let text: String = warnings.iter().map(|warning| format!("{warning}\n")).collect();
+    let reading = load("simple_obstacle.world").expect("a sound world");
+    let text: String = reading.account.refused().map(|entry| format!("{entry}\n")).collect();
     for expected in [
-        "`model://vrc_driving_terrain` is not in this file; left out\n",
-        "`model://pine_tree` is not in this file; left out (4 times)",
-        "`model://oak_tree` is not in this file; left out (8 times)",
+        "`model://vrc_driving_terrain` is not there\n",
+        "`model://pine_tree` is not there (4 times)",
+        "`model://oak_tree` is not there (8 times)",
     ] {
         assert!(text.contains(expected), "{text}");
     }
+    assert!(reading.whole().is_err());
 
     // The window: an opening 1.15 m wide and 1.75 m high.
-    let (scene, _) = load("window.world").expect("a sound world");
+    let (scene, _) = noted(load("window.world").expect("a sound world"));
     let middle = Vector3::new(5.0, 0.45, 3.0);
     let free = |offset: Vector3<f64>| scene.clearance(&(middle + offset)) > 0.0;
     for (half, axis) in [(0.575, Vector3::y()), (0.875, Vector3::z())] {
@@ -294,8 +337,7 @@ fn long_names_and_many_warnings_cost_no_more_than_in_proportion() {
     assert_eq!(scene.obstacles().len(), 100);
     assert_eq!(scene.obstacles()[7].name, format!("{}::l::7", "\u{e9}".repeat(64)));
 
-    let unknown: String = (0..150).map(|n| format!("<odd{n}/>")).collect();
-    let (_, warnings) = read(&format!("{GROUND}{unknown}"));
-    assert_eq!(warnings.len(), 101);
-    assert_eq!(warnings[100].message, "from here on, 50 more warnings are not listed");
+    let unknown: String = (0..1100).map(|n| format!("<odd{n}/>")).collect();
+    let reading = Scene::from_sdf(&world(&unknown), "many.world", &NoFiles).expect("a sound world");
+    assert_eq!((reading.account.entries.len(), reading.account.unlisted), (1000, 102));
 }

@@ -11,6 +11,7 @@ mod event_sets;
 mod kept;
 mod keys;
 mod mavlink;
+mod measured;
 mod missions;
 mod node;
 mod packets;
@@ -29,6 +30,7 @@ pub const TARGETS: &[Target] = &[
     kept::TARGET,
     keys::TARGET,
     mavlink::TARGET,
+    measured::TARGET,
     missions::TARGET,
     node::TARGET,
     packets::TARGET,

@@ -17,6 +17,7 @@ mod positions;
 mod preflight;
 mod scenarios;
 mod scripts;
+mod solids_of_many_kinds;
 mod tasks;
 mod thin_solids;
 mod wind;

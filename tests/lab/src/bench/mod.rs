@@ -4,6 +4,7 @@ mod bp;
 mod fleet;
 pub mod hold;
 mod link;
+mod mesh;
 mod nav;
 pub mod plan;
 
@@ -13,6 +14,7 @@ pub const TASKS: &[Entry] = &[
     Entry::of::<bp::Bp>(),
     Entry::of::<plan::Plan>(),
     Entry::of::<nav::Nav>(),
+    Entry::of::<mesh::Meshes>(),
     Entry::of::<fleet::Sizes>(),
     Entry::of::<fleet::OneSize>(),
     Entry::of::<link::Extent>(),

@@ -104,7 +104,7 @@ fn settings(dir: &Path, runs: usize) -> anyhow::Result<Vec<Setting>> {
             let text = std::fs::read_to_string(&mission_path)
                 .with_context(|| format!("{}: cannot be read", mission_path.display()))?;
             let mission = LscMission::read(&text, &mission_path.display().to_string())?;
-            let (scene, _) = read_world(&world_path)?;
+            let scene = read_world(&world_path, false)?.scene;
             Ok(Setting { name: format!("{}_{k}", family.name), mission, scene })
         })
         .collect()
