@@ -8,6 +8,7 @@
 mod agent_error;
 mod airspace_table;
 pub mod apart;
+mod arrival;
 #[cfg(feature = "zenoh")]
 pub mod autopilot_link;
 pub mod bthreads;
@@ -33,6 +34,7 @@ pub mod precedence;
 mod preflight;
 mod rank;
 mod report;
+mod reroute;
 mod safety;
 pub mod scripts;
 pub mod stretch;

@@ -25,6 +25,7 @@ pub fn config() -> AgentConfig {
         datum: Datum::from_degrees(47.4, 8.5, 400.0),
         home: [0.0; 3],
         waypoints: vec![[50.0, 0.0, 3.0]],
+        arrives_with: Vec::new(),
         takeoff_height_m: 2.0,
         return_altitude_m: 4.0,
         position: Default::default(),

@@ -4,9 +4,11 @@ use std::fmt;
 use std::path::Path;
 
 use serde::Serialize;
+use skein_agent::AgentCore;
 use skein_bp::behaviour::Behaviours;
 use skein_world::Scene;
 
+use crate::fly::agent_configs;
 use crate::mission::{self, MissionSet};
 use crate::scenario::{Overrides, Scenario, ScenarioError, read_world};
 
@@ -49,7 +51,9 @@ pub fn check(file: &Path, thin_solids: bool, known: &Behaviours) -> Result<Findi
             if !thin_solids {
                 scenario.check_thin_solids()?;
             }
-            let holds = format!("{} vehicles, {}", scenario.vehicles.len(), world(&scenario.scene));
+            check_scripts(&scenario)?;
+            let vehicles = counted(scenario.vehicles.len(), "vehicle");
+            let holds = format!("{vehicles}, {}", world(&scenario.scene));
             ("scenario", holds, scenario.notes)
         }
     };
@@ -58,15 +62,31 @@ pub fn check(file: &Path, thin_solids: bool, known: &Behaviours) -> Result<Findi
 
 fn world(scene: &Scene) -> String {
     let size = scene.bounds().max - scene.bounds().min;
-    let obstacles = scene.obstacles().len();
-    format!("{obstacles} obstacles in {:.0} x {:.0} x {:.0} m", size.x, size.y, size.z)
+    let obstacles = counted(scene.obstacles().len(), "obstacle");
+    format!("{obstacles} in {:.0} x {:.0} x {:.0} m", size.x, size.y, size.z)
 }
 
 fn missions(set: &MissionSet) -> String {
     let waypoints: usize = set.missions.iter().map(|m| m.waypoints.len()).sum();
     let zones = set.airspace.no_fly.len() + set.airspace.prisms.len();
-    let zones = if zones == 0 { String::new() } else { format!(", {zones} no-fly zones") };
-    format!("{} routes with {waypoints} waypoints in all{zones}", set.missions.len())
+    let zones = if zones == 0 { String::new() } else { format!(", {}", counted(zones, "no-fly zone")) };
+    let routes = counted(set.missions.len(), "route");
+    format!("{routes} with {} in all{zones}", counted(waypoints, "waypoint"))
+}
+
+/// So many of them, in words: `1 obstacle`, `2 obstacles`.
+fn counted(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
+/// The vehicles try their scripts out before they fly.
+fn check_scripts(scenario: &Scenario) -> Result<(), ScenarioError> {
+    let scripted = agent_configs(scenario).into_iter().filter(|config| !config.scripts.is_empty());
+    for config in scripted {
+        let vehicle = config.node.clone();
+        AgentCore::new(config).map_err(|why| ScenarioError::Agent { vehicle, why })?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -89,10 +109,10 @@ mod tests {
         let scenario = put("s.toml", "generator = \"open\"\nworld = \"w.csv\"\n")?;
         assert_eq!(
             (check(&world)?.kind, check(&world)?.holds.as_str()),
-            ("world", "1 obstacles in 100 x 100 x 21 m")
+            ("world", "1 obstacle in 100 x 100 x 21 m")
         );
-        assert_eq!(check(&mission)?.holds, "1 routes with 1 waypoints in all");
-        assert_eq!(check(&scenario)?.holds, "4 vehicles, 1 obstacles in 100 x 100 x 21 m");
+        assert_eq!(check(&mission)?.holds, "1 route with 1 waypoint in all");
+        assert_eq!(check(&scenario)?.holds, "4 vehicles, 1 obstacle in 100 x 100 x 21 m");
         assert_eq!(check(Path::new("forest"))?.kind, "scenario");
         Ok(())
     }
@@ -122,6 +142,26 @@ mod tests {
             bar(height_m, thickness_m, model)?;
             assert!(check(&path).is_ok(), "{height_m} m, {thickness_m} m, {model}");
         }
+        Ok(())
+    }
+
+    #[test]
+    fn a_script_that_no_vehicle_would_run_is_refused_as_fly_refuses_it()
+    -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("s.toml");
+        std::fs::write(&path, "generator = \"open\"\n[[script]]\nfile = \"grab.toml\"\n")?;
+        let script = |event: &str| {
+            let body = format!("[[body]]\nsync = {{ request = \"{{me}}/{event}\" }}\n");
+            std::fs::write(folder.path().join("grab.toml"), format!("name = \"grab\"\nabout = \"x\"\n{body}"))
+        };
+        script("airborne")?;
+        let error = check(&path).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(error.contains("uav/1") && error.contains("script `grab`"), "{error}");
+        let scenario =
+            Scenario::from_toml(&std::fs::read_to_string(&path)?, &path.to_string_lossy(), None, 1)?;
+        let refused = AgentCore::new(agent_configs(&scenario).remove(0)).err().map(|e| e.to_string());
+        assert!(refused.is_some_and(|refused| error.contains(&refused)), "what `fly` says");
         Ok(())
     }
 

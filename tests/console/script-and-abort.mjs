@@ -74,6 +74,11 @@ await drive({}, async (console) => {
   await console.selectNone();
   const aborted = console.fleet.time_s;
   await console.press('Abort');
+  const question = page.locator('dialog[open]');
+  await question.waitFor();
+  assert.match(await question.textContent(), /Abort all\?.*4 vehicles fly/s);
+  assert.ok(console.orders.every(({ what }) => what !== 'abort'), 'nothing is ordered before it is confirmed');
+  await question.getByRole('button', { name: 'Abort the mission', exact: true }).click();
   // In the middle of the circle they part first, so that one is down before another begins.
   const hasLanded = (name) => console.history(name, aborted).some((vehicle) => vehicle.mode === 'land');
   await console.until('everyone lands', () => NAMES.every(hasLanded));

@@ -30,7 +30,7 @@ pub fn flight(scenario: &str, seed: u64) -> Fly {
         secure: false,
         agent: None,
         ground: None,
-        console: ([127, 0, 0, 1], 0).into(),
+        console: Some(([127, 0, 0, 1], 0).into()),
         port_offset: 0,
     }
 }

@@ -204,6 +204,7 @@ impl fmt::Display for Value {
         match self {
             Self::Bool(b) => b.fmt(f),
             Self::Int(n) => n.fmt(f),
+            Self::Real(x) if f.alternate() => Real((x.get() * 100.0).round() / 100.0).fmt(f),
             Self::Real(x) => x.fmt(f),
             Self::Text(text) => write!(f, "{text:?}"),
         }

@@ -64,6 +64,11 @@ pub fn run(args: &cli::Fly, known: &Behaviours) -> anyhow::Result<Summary> {
         "--processes: each process follows the clock on the wall; leave out --clock lockstep"
     );
     anyhow::ensure!(
+        args.clock == Clock::Real || args.speed == 1.0,
+        "--speed {}: --clock lockstep is as fast as the processor allows; leave out one of them",
+        args.speed
+    );
+    anyhow::ensure!(
         !args.processes || args.controller == cli::Controller::Bp,
         "--processes: an agent of its own runs its b-threads; leave out --controller"
     );
@@ -83,7 +88,24 @@ pub fn run(args: &cli::Fly, known: &Behaviours) -> anyhow::Result<Summary> {
     };
     let path = out.join("summary.json");
     summary.write(&path).with_context(|| format!("{}: cannot be written", path.display()))?;
+    for line in debrief(&summary, &out.join("mission.mcap")) {
+        LiveTable::stderr().note(&line)?;
+    }
     Ok(summary)
+}
+
+/// Where the flight is recorded, and what to do with that.
+fn debrief(summary: &Summary, recording: &Path) -> Vec<String> {
+    let recording = recording.display();
+    let landed_early = summary.per_vehicle.iter().find(|vehicle| vehicle.reason.is_some());
+    let explain = match landed_early {
+        Some(vehicle) => format!("skein-ground explain {recording} --vehicle {}", vehicle.id),
+        None => format!("skein-ground explain {recording} --at {:.0}", summary.sim_time_s / 2.0),
+    };
+    vec![
+        format!("recording: {recording}, which Foxglove opens as it is"),
+        format!("why a vehicle did what it did: {explain}"),
+    ]
 }
 
 fn in_lockstep(

@@ -95,5 +95,5 @@ pub fn read_files(paths: &[PathBuf], datum: Option<Datum>) -> Result<MissionSet,
 }
 
 fn read_text(path: &Path) -> Result<String, MissionError> {
-    std::fs::read_to_string(path).map_err(|source| MissionError::Unreadable { path: path.to_owned(), source })
+    std::fs::read_to_string(path).map_err(|cause| MissionError::Unreadable { path: path.to_owned(), cause })
 }

@@ -98,6 +98,8 @@ pub struct Scenario {
     pub vehicles: Vec<VehiclePlan>,
     /// Nobody sets out before everybody is in the air.
     pub muster: bool,
+    /// All arrive at their goals at the same time.
+    pub arrive_together: bool,
     /// Speed the vehicles aim for between waypoints.
     pub cruise_speed_m_s: f64,
     /// The planners on board.
@@ -133,8 +135,6 @@ pub struct VehiclePlan {
     pub yaw: f64,
     /// ENU, metres. It lands under the last.
     pub waypoints: Vec<Vector3<f64>>,
-    /// Its speed as a share of the scenario's cruise speed: above 0, at most 1.
-    pub pace: f64,
     pub model: VehicleModel,
     /// Its autopilot; none for the one that the command line names.
     pub autopilot: Option<Make>,
@@ -636,6 +636,5 @@ pub fn read_world(path: &Path) -> Result<(Scene, Vec<String>), ScenarioError> {
 }
 
 fn read(path: &Path) -> Result<String, ScenarioError> {
-    std::fs::read_to_string(path)
-        .map_err(|source| ScenarioError::Unreadable { path: path.to_owned(), source })
+    std::fs::read_to_string(path).map_err(|cause| ScenarioError::Unreadable { path: path.to_owned(), cause })
 }
