@@ -83,4 +83,10 @@ await drive({}, async (console) => {
   const hasLanded = (name) => console.history(name, aborted).some((vehicle) => vehicle.mode === 'land');
   await console.until('everyone lands', () => NAMES.every(hasLanded));
   await console.stay();
+  // The station has ended with the mission, and nothing is said to be lost.
+  const banners = page.locator('#banners');
+  await banners.getByText('The station has ended').waitFor({ timeout: 5000 });
+  assert.match(await banners.textContent(), /Mission failed: 0 of 4 arrived.*It is recorded in .*mission\.mcap/s);
+  assert.doesNotMatch(await page.locator('body').textContent(), /connection[^.]*lost/i);
+  assert.equal(await page.locator('[role=option][data-vehicle]').count(), NAMES.length, 'the last state stays');
 });
