@@ -100,6 +100,9 @@ pub struct Fly {
     /// Show no live table.
     #[arg(long)]
     pub headless: bool,
+    /// Take off when an operator orders it at the console, not as soon as all is ready; `--clock real` only.
+    #[arg(long)]
+    pub launch_on_order: bool,
     /// Run world, ground station and each agent in a process of its own; `--clock real` only.
     #[arg(long)]
     pub processes: bool,

@@ -25,6 +25,7 @@ pub fn flight(scenario: &str, seed: u64) -> Fly {
         autopilots: Autopilots::default(),
         out: None,
         headless: true,
+        launch_on_order: false,
         processes: false,
         network: cli::Network::Peer,
         secure: false,

@@ -58,6 +58,22 @@ pub enum RecorderError {
     Write { path: PathBuf, cause: McapError },
 }
 
+/// Keeps a recording that is there already beside the one to come: `mission.mcap` as `mission-1.mcap`, or with the first
+/// number that is free.
+///
+/// # Errors
+/// [`RecorderError::Create`]: it cannot be renamed.
+pub fn keep_former(path: &Path) -> Result<(), RecorderError> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let numbered = |number: u32| path.with_file_name(format!("{stem}-{number}.mcap"));
+    match (1..).map(numbered).find(|kept| !kept.exists()).filter(|_| path.exists()) {
+        Some(kept) => {
+            std::fs::rename(path, &kept).map_err(|cause| RecorderError::Create { path: kept.clone(), cause })
+        }
+        None => Ok(()),
+    }
+}
+
 /// Writes one mission to a file.
 ///
 /// Times are the run's and should not go back; a message that is late gets the time of the newest before it. What

@@ -160,7 +160,8 @@ pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Control
     GroundConfig {
         orders: orders.collect(),
         loaded: controller == cli::Controller::Bp,
-        launch_on_order: scenario.orders.iter().any(|said| said.order.is_launch()),
+        launch_on_order: scenario.launch_on_order
+            || scenario.orders.iter().any(|said| said.order.is_launch()),
         muster: scenario.musters(),
         behaviours: scenario.behaviours.clone(),
         operators: NodeName::new(SCRIPT).into_iter().collect(),

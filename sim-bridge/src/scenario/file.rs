@@ -299,6 +299,7 @@ impl ScenarioFile {
             airspace,
             fixed_bounds,
             vehicles: plans,
+            launch_on_order: false,
             muster: table.formation.is_some() || table.targets.is_some(),
             arrive_together: table.arrive_together || table.targets.is_some(),
             cruise_speed_m_s,

@@ -96,6 +96,8 @@ pub struct Scenario {
     pub fixed_bounds: bool,
     /// The vehicles; vehicle `i` is `uav/{i + 1}`.
     pub vehicles: Vec<VehiclePlan>,
+    /// Nobody takes off before an operator orders it.
+    pub launch_on_order: bool,
     /// Nobody sets out before everybody is in the air.
     pub muster: bool,
     /// All arrive at their goals at the same time.
