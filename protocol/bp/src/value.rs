@@ -240,6 +240,15 @@ mod tests {
     }
 
     #[test]
+    fn people_read_two_decimals_and_nobody_else_loses_any() {
+        let length = Value::from(64.925_829_609_037_45);
+        assert_eq!(format!("{length:#} {:#} {:#}", Value::from(3.0), Value::from(7)), "64.93 3.0 7");
+        assert_eq!(length.to_string(), "64.92582960903745");
+        let event = crate::Event::new("uav/1/planned").with("length_m", 64.925_829_609_037_45);
+        assert_eq!(format!("{event:#}"), "uav/1/planned{length_m: 64.93}");
+    }
+
+    #[test]
     fn two_is_two_however_it_is_written() {
         assert_eq!(Value::from(2), Value::from(2.0));
         assert_eq!(Value::from(0), Value::from(-0.0));
