@@ -5,10 +5,10 @@ use skein_planning::map::MapError;
 /// Why an agent cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum AgentError {
-    #[error("agent configuration: `{field}` is {value:?}: {source}")]
-    Name { field: &'static str, value: String, source: skein_dbp::NodeNameError },
-    #[error("agent configuration: `fleet` is {value:?}: {source}")]
-    Fleet { value: String, source: skein_wire::KeyError },
+    #[error("agent configuration: `{field}` is {value:?}: {cause}")]
+    Name { field: &'static str, value: String, cause: skein_dbp::NodeNameError },
+    #[error("agent configuration: `fleet` is {value:?}: {cause}")]
+    Fleet { value: String, cause: skein_wire::KeyError },
     #[error("agent configuration: script `{name}`: {why}")]
     Script { name: String, why: String },
     #[error("agent configuration: `fence`: {0}")]

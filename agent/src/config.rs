@@ -23,6 +23,14 @@ pub struct Fence {
     pub max: [f64; 3],
 }
 
+impl Fence {
+    /// Whether a place is inside.
+    pub fn holds(&self, place: &[f64; 3]) -> bool {
+        let bounds = self.min.iter().zip(&self.max);
+        place.iter().zip(bounds).all(|(metres, (min, max))| (min..=max).contains(&metres))
+    }
+}
+
 /// The vehicle's abilities, and the distances it keeps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -184,6 +192,8 @@ pub struct AgentConfig {
     pub errands: Vec<Errand>,
     /// Where it may land instead of at home when it returns, metres ENU, at the height of the way there.
     pub rally: Vec<[f64; 3]>,
+    /// The vehicles together with which it arrives at its last waypoint; itself may be among them.
+    pub arrives_with: Vec<String>,
     /// Height above home to climb to before the mission begins, m.
     pub takeoff_height_m: f64,
     /// Height in the world at which this vehicle returns, m; different for every vehicle.

@@ -101,6 +101,8 @@ pub struct Mission {
     pub waypoints: Vec<[f64; 3]>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rally: Vec<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub arrives_with: Vec<String>,
     #[serde(default = "takeoff_height_m", deserialize_with = "field::positive")]
     pub takeoff_height_m: f64,
     #[serde(default = "return_altitude_m", deserialize_with = "field::positive")]
@@ -217,6 +219,7 @@ impl AgentFile {
                 home: agent.home,
                 waypoints: agent.waypoints.clone(),
                 rally: agent.rally.clone(),
+                arrives_with: agent.arrives_with.clone(),
                 takeoff_height_m: agent.takeoff_height_m,
                 return_altitude_m: agent.return_altitude_m,
                 without_ground: agent.link_loss,
@@ -248,6 +251,9 @@ impl AgentFile {
         }
         let lidar = self.lidar.map(|lidar| lidar.check(folder)).transpose()?;
         self.mission.check(&self.fence)?;
+        for other in &self.mission.arrives_with {
+            ensure!(self.roster.contains(other), "`mission.arrives_with`: `{other}` is not in `roster`");
+        }
         let airspace = self.airspace.check()?;
         self.mission.check_zones(&airspace)?;
         let agent = AgentConfig {
@@ -263,6 +269,7 @@ impl AgentFile {
             waypoints: self.mission.waypoints,
             errands: self.mission.errand,
             rally: self.mission.rally,
+            arrives_with: self.mission.arrives_with,
             takeoff_height_m: self.mission.takeoff_height_m,
             return_altitude_m: self.mission.return_altitude_m,
             position: self.position,
@@ -318,29 +325,26 @@ impl Mission {
                 fence.max
             );
         }
-        let inside = |[x, y, z]: [f64; 3]| {
-            [x, y, z]
-                .iter()
-                .zip(fence.min.iter().zip(&fence.max))
-                .all(|(c, (min, max))| (min..=max).contains(&c))
-        };
         ensure!(
             !self.waypoints.is_empty(),
             "`mission.waypoints` is empty: name at least the point to land at"
         );
         for (number, point) in (1..).zip(&self.waypoints) {
-            ensure!(inside(*point), "`mission.waypoints`: number {number}, {point:?}, is outside the fence");
+            ensure!(
+                fence.holds(point),
+                "`mission.waypoints`: number {number}, {point:?}, is outside the fence"
+            );
         }
         for (number, point) in (1..).zip(&self.rally) {
-            ensure!(inside(*point), "`mission.rally`: number {number}, {point:?}, is outside the fence");
+            ensure!(fence.holds(point), "`mission.rally`: number {number}, {point:?}, is outside the fence");
         }
-        ensure!(inside(self.home), "`mission.home`, {:?}, is outside the fence", self.home);
+        ensure!(fence.holds(&self.home), "`mission.home`, {:?}, is outside the fence", self.home);
         let [x, y, z] = self.home;
         for (field, height_m) in
             [("takeoff_height_m", z + self.takeoff_height_m), ("return_altitude_m", self.return_altitude_m)]
         {
             ensure!(
-                inside([x, y, height_m]),
+                fence.holds(&[x, y, height_m]),
                 "`mission.{field}` leads to {height_m} m above the origin, outside the fence"
             );
         }
@@ -420,6 +424,7 @@ mod tests {
             ("system_id = 1", "system_id = 256", "expected u8"),
             ("[15.0, 20.0, 3.0]", "[15.0, 20.0, 300.0]", "number 2"),
             ("[15.0, 20.0, 3.0]", "[nan, 20.0, 3.0]", "number 2"),
+            ("#arrives_with = []", "arrives_with = [\"uav/7\"]", "`mission.arrives_with`: `uav/7`"),
             ("max = [30.0", "max = [-30.0", "`fence`"),
             ("[envelope]", "[[airspace.no_fly]]\ncentre_m = [1.0, 2.0]\n[envelope]", "`airspace.no_fly[0]`"),
             (

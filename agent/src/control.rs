@@ -14,10 +14,11 @@ use skein_wire::{Limits, Readiness, Scan, State};
 
 use crate::{
     apart::decisions::{Decisions, Standing, is_too_late},
+    arrival,
     config::AgentConfig,
     energy::{Energy, known_charge},
     flight::{Flight, FlightPhase},
-    instruction::Instruction,
+    instruction::{Instruction, Waypoint},
     neighbours::{Neighbour, Neighbours},
     pipeline::{
         allowed::Allowed,
@@ -336,9 +337,31 @@ impl Control {
 
     /// Begins a navigation cycle: looks along the path.
     pub fn look_ahead(&mut self, now: Duration) -> Vec<Report> {
+        self.guidance.arrival_m_s = self.arrival_m_s();
         let Some(motion) = self.flown_motion() else { return Vec::new() };
         let (map, around) = (self.perception.map(), self.neighbours.around());
         self.guidance.look_ahead(now, &motion, map, around)
+    }
+
+    /// The time that the vehicle has to go at cruise speed until it arrives together with others, s; none if it does not.
+    fn to_go_s(&self) -> Option<f64> {
+        let (motion, course) = (self.flown_motion()?, &self.guidance.course);
+        let is_there = |waypoint: &Waypoint| course.has_arrived && waypoint.lands;
+        let is_alone = self.config.arrives_with.is_empty();
+        let waypoint = course.waypoint.filter(|waypoint| !is_alone && !is_there(waypoint))?;
+        let ahead = course.following.as_ref().map(|following| following.ahead().collect::<Vec<_>>());
+        let ahead = ahead.unwrap_or_else(|| vec![motion.position]).into_iter();
+        let way = ahead.chain([waypoint.target]);
+        Some(arrival::to_go_s(way, self.guidance.envelope()) + waypoint.beyond_s?)
+    }
+
+    /// The speed at which it does, m/s; infinite if it arrives by itself.
+    fn arrival_m_s(&self) -> f64 {
+        let Some(own_s) = self.to_go_s() else { return f64::INFINITY };
+        let with = &self.config.arrives_with;
+        let arrives_too = |other: &&Neighbour| with.iter().any(|node| node == other.node.as_str());
+        let others = self.neighbours.around().iter().filter(arrives_too);
+        arrival::speed_m_s(own_s, others, self.guidance.envelope())
     }
 
     /// The facts that whoever listens may be told, once the vehicle's place is known.
@@ -371,6 +394,7 @@ impl Control {
             incarnation: self.config.incarnation,
             path: self.guidance.way_ahead().take(State::MAX_PATH).collect(),
             echo: self.neighbours.echo(now),
+            to_go_s: self.to_go_s(),
             ..State::new(self.name.clone())
         })
     }

@@ -44,6 +44,8 @@ pub struct Waypoint {
     pub lands: bool,
     /// Whether it is where the way home ends.
     pub is_home: bool,
+    /// Time from there to the end of the mission at cruise speed, s; none if the mission does not lead there.
+    pub beyond_s: Option<f64>,
 }
 
 impl Instruction {
@@ -66,6 +68,6 @@ impl Instruction {
 
 impl From<Goto> for Waypoint {
     fn from(Goto { leg, lands, x, y, z }: Goto) -> Self {
-        Self { leg, target: Vector3::new(x, y, z), lands, is_home: leg == HOME_LEG }
+        Self { leg, target: Vector3::new(x, y, z), lands, is_home: leg == HOME_LEG, beyond_s: None }
     }
 }

@@ -8,6 +8,7 @@
 mod agent_error;
 mod airspace_table;
 pub mod apart;
+mod arrival;
 #[cfg(feature = "zenoh")]
 pub mod autopilot_link;
 pub mod bthreads;
@@ -35,6 +36,7 @@ mod preflight;
 mod rank;
 mod refuge;
 mod report;
+mod reroute;
 mod safety;
 pub mod scripts;
 pub mod stretch;

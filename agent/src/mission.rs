@@ -5,27 +5,29 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
+use nalgebra::Vector3;
 use skein_bp::script::Assignment;
 use skein_bp::{Event, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_wire::event::{
-    self, Advance, Complete, Declared as _, Enter, Failed, Goto, Hold, Land, Load, OrderTaken, PlaceFree,
-    PlaceTaken, Return, Right, ScriptNews, Takeoff, Unload, What,
+    self, Advance, Arrived, Complete, Declared as _, Declined, Enter, Failed, Goto, Hold, Land, Load,
+    OrderTaken, PlaceFree, PlaceTaken, Rerouted, Return, Right, ScriptNews, Takeoff, Text, Unload, What,
 };
 use skein_wire::{
-    Fleet, KeptScript, Limits, Link, MissionState, NodeLink, Readiness, State, Store, joint_roster,
+    Fleet, KeptScript, Limits, Link, MissionState, NodeLink, Readiness, Route, State, Store, joint_roster,
 };
 
 use crate::{
     agent_error::AgentError,
     apart::Words,
-    bthreads,
+    arrival, bthreads,
     config::AgentConfig,
-    instruction::Instruction,
+    instruction::{Instruction, Waypoint},
     me::Me,
     mind::Mind,
     precedence,
     report::Report,
+    reroute,
     safety::safety_events,
     scripts::{Begins, CONFIGURATION, Circumstances, Loaded, ScriptFacts, Scripts},
     verify::check_script,
@@ -61,6 +63,14 @@ pub struct Mission {
     scripts: Scripts,
     script_facts: ScriptFacts,
     task: String,
+    /// The points that the mission leads to, metres ENU, and who has sent them, if they are not those of the
+    /// configuration.
+    waypoints: Vec<[f64; 3]>,
+    sent_by: Option<Text>,
+    /// Who has sent the vehicle elsewhere last.
+    pointed_by: Text,
+    /// Where others stay, or mean to, metres ENU.
+    ends: Vec<(NodeName, Vector3<f64>)>,
     outcome: Option<Outcome>,
     selections: Vec<Happened>,
     limits: Limits,
@@ -131,7 +141,7 @@ impl Mission {
                 .map_err(|why| AgentError::Script { name: assignment.name().to_owned(), why })?;
         }
         let fleet = Fleet::new(&config.fleet)
-            .map_err(|source| AgentError::Fleet { value: config.fleet.clone(), source })?;
+            .map_err(|cause| AgentError::Fleet { value: config.fleet.clone(), cause })?;
         let name = node_config.name.clone();
         let node = Node::new(node_config, program);
         Ok(Self {
@@ -143,6 +153,10 @@ impl Mission {
             scripts,
             script_facts: ScriptFacts::default(),
             task: "on the ground".to_owned(),
+            waypoints: config.waypoints.clone(),
+            sent_by: None,
+            pointed_by: "an operator".into(),
+            ends: Vec::new(),
             outcome: None,
             selections: Vec::new(),
             limits: Limits::default(),
@@ -247,6 +261,8 @@ impl Mission {
 
     /// Tells whoever listens what is told to nobody else.
     pub fn tell_scripts(&mut self, circumstances: &Circumstances<'_>) {
+        self.ends.clear();
+        self.ends.extend(circumstances.neighbours.iter().map(|other| (other.node.clone(), other.end())));
         let is_heard =
             |fact: &str| self.scripts.listen_to(fact) || self.config.behaviours.hear(self.me.name(), fact);
         for event in self.script_facts.tell(&self.me, is_heard, circumstances) {
@@ -299,9 +315,65 @@ impl Mission {
         if happened.home != self.name {
             return None;
         }
+        self.look_after_routes(&happened.event);
         self.note_task(&happened.event, is_landing);
         self.look_after_scripts(happened);
-        Instruction::of(&self.me, &happened.event)
+        match Instruction::of(&self.me, &happened.event)? {
+            Instruction::GoTo(waypoint) => {
+                let beyond_s = self.beyond_s(waypoint.leg);
+                Some(Instruction::GoTo(Waypoint { beyond_s, ..waypoint }))
+            }
+            instruction => Some(instruction),
+        }
+    }
+
+    /// Time from the waypoint of this leg to the last one at cruise speed, s.
+    fn beyond_s(&self, leg: i64) -> Option<f64> {
+        let later = self.waypoints.get(usize::try_from(leg).ok()?..)?;
+        Some(arrival::to_go_s(later.iter().map(|point| (*point).into()), &self.config.envelope))
+    }
+
+    /// Answers a route that is sent, and notes who sends the vehicle where.
+    fn look_after_routes(&mut self, event: &Event) {
+        if let Some(order) = self.me.read::<OrderTaken>(event) {
+            match order.what {
+                What::Route => {
+                    let answer = self.answer_to_route(&order);
+                    self.node.node_mut().enqueue(answer);
+                }
+                What::GoTo => self.pointed_by = order.by,
+                _ => {}
+            }
+        } else if let Some(Rerouted { way, by }) = self.me.read(event)
+            && let Ok(route) = way.parse::<Route>()
+        {
+            self.waypoints = route.points().to_vec();
+            self.sent_by = Some(by);
+        }
+    }
+
+    fn answer_to_route(&self, order: &OrderTaken) -> Event {
+        match self.fit_route(order) {
+            Ok(route) => {
+                self.me.event(Rerouted { way: route.to_string().as_str().into(), by: order.by.clone() })
+            }
+            Err(why) => self.me.event(Declined { what: What::Route, why: why.as_str().into() }),
+        }
+    }
+
+    fn fit_route(&self, order: &OrderTaken) -> Result<Route, String> {
+        let program = self.node.node().program();
+        let mission = program.state_of::<bthreads::Mission>(bthreads::Mission::NAME);
+        let objection = mission.map_or(Some("it has no mission"), bthreads::Mission::objects_to_routes);
+        if let Some(why) = objection {
+            return Err(why.to_owned());
+        }
+        let way = order.way.as_deref().ok_or("the order names no points")?;
+        let route = way.parse::<Route>().map_err(|error| error.to_string())?;
+        match reroute::objection(&route, &self.config, &self.ends) {
+            Some(why) => Err(why),
+            None => Ok(route),
+        }
     }
 
     /// Keeps what happened for [`take_selections`](Self::take_selections).
@@ -315,9 +387,17 @@ impl Mission {
             Some(Takeoff::NAME) => "taking off".to_owned(),
             Some(Goto::NAME) => match Goto::read(event).map_or(0, |goto| goto.leg) {
                 bthreads::HOME_LEG => "flying home".to_owned(),
-                bthreads::OPERATOR_LEG => "going where the operator points".to_owned(),
-                leg => format!("leg {} of {}", leg + 1, self.config.waypoints.len()),
+                bthreads::OPERATOR_LEG => format!("going where {} points", self.pointed_by),
+                leg => {
+                    let whose = self.sent_by.as_ref().map(|by| format!(" of the route by {by}"));
+                    format!("leg {} of {}{}", leg + 1, self.waypoints.len(), whose.unwrap_or_default())
+                }
             },
+            Some(Arrived::NAME)
+                if Arrived::read(event).is_some_and(|it| it.leg == bthreads::OPERATOR_LEG) =>
+            {
+                format!("hovering where {} pointed, until resumed", self.pointed_by)
+            }
             Some(Hold::NAME) => "holding".to_owned(),
             Some(PlaceTaken::NAME) => {
                 PlaceTaken::read(event).map_or_else(String::new, |taken| self.beside(&taken))
@@ -490,7 +570,7 @@ impl Mission {
 /// The vehicle's node, as its configuration describes it.
 fn node_config(config: &AgentConfig, me: &Me, durable: bool) -> Result<NodeConfig, AgentError> {
     let name = |field, value: &str| {
-        NodeName::new(value).map_err(|source| AgentError::Name { field, value: value.to_owned(), source })
+        NodeName::new(value).map_err(|cause| AgentError::Name { field, value: value.to_owned(), cause })
     };
     let roster: Vec<_> = config.roster.iter().map(|node| name("roster", node)).collect::<Result<_, _>>()?;
     let own_name = name("node", &config.node)?;

@@ -83,6 +83,8 @@ pub struct Neighbour {
     pub way: Option<Arc<Path>>,
     /// Its right to go first where there is room for one.
     pub right: Right,
+    /// Time that it still had to fly at its cruise speed to arrive together with others, s, by its last word.
+    pub to_go_s: Option<f64>,
 }
 
 /// A vehicle slower than this stands, m/s.
@@ -92,6 +94,11 @@ impl Neighbour {
     /// Where it should be now, metres ENU.
     pub fn position(&self) -> Vector3<f64> {
         self.track.predicted()
+    }
+
+    /// Where it stays, or means to: the end of its path, as far as it told it, else where it is. Metres ENU.
+    pub fn end(&self) -> Vector3<f64> {
+        self.goal.unwrap_or_else(|| self.position())
     }
 
     /// Whether it stands, as far as is known, or has fallen silent.
@@ -208,6 +215,7 @@ impl Neighbours {
                 goal: state.path.last().copied(),
                 way: heard.way.clone(),
                 right: state.right,
+                to_go_s: state.to_go_s,
                 track: separation::Neighbour {
                     id,
                     position: state.position,

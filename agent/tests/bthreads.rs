@@ -36,6 +36,7 @@ fn config() -> AgentConfig {
         waypoints: vec![[10.0, 0.0, 2.0], [10.0, 10.0, 2.0]],
         errands: Vec::new(),
         rally: Vec::new(),
+        arrives_with: Vec::new(),
         takeoff_height_m: 2.0,
         return_altitude_m: RETURN_ALTITUDE_M,
         position: Default::default(),
@@ -509,6 +510,19 @@ mod operator {
         vehicle.is_ordered(What::Hold);
         vehicle.is_ordered(What::Return);
         assert_eq!(vehicle.reports(Planned::NAME), ["planned", "advance"]);
+    }
+
+    #[test]
+    fn whoever_has_its_mission_behind_it_declines_to_go_on() {
+        let mut vehicle = Vehicle::on_its_way();
+        vehicle.is_ordered(What::Land);
+        vehicle.reports(Landed::NAME);
+        let said = vehicle.is_ordered(What::Resume);
+        assert_eq!(said[0], "order resume");
+        assert!(said[1].starts_with("declined") && said.len() == 2, "{said:?}");
+        let why = vehicle.last(Declined::NAME).text("why").unwrap();
+        assert_eq!(why, "its mission is over, and it stands on the ground");
+        assert_eq!(vehicle.is_ordered(What::Resume), said, "and again");
     }
 
     #[test]

@@ -49,7 +49,7 @@ impl Flight {
 
     fn heads_for(mut self, [x, y, z]: [f64; 3], is_home: bool) -> Self {
         let target = Vector3::new(x, y, z);
-        self.guidance.head_for(Waypoint { leg: 0, target, lands: false, is_home });
+        self.guidance.head_for(Waypoint { leg: 0, target, lands: false, is_home, beyond_s: None });
         self
     }
 

@@ -33,7 +33,7 @@ impl Flight {
         let start = Vector3::new(0.0, 0.0, 3.0);
         let layers = Layers::of(&envelope, FENCE, Planners { local, ..Planners::default() });
         let mut guidance = Guidance::new(envelope, layers);
-        guidance.head_for(Waypoint { leg: 0, target, lands: true, is_home: false });
+        guidance.head_for(Waypoint { leg: 0, target, lands: true, is_home: false, beyond_s: None });
         Self {
             guidance,
             perception: Perception::new(&FENCE, Vector3::zeros(), [2.0, 7.0]).unwrap(),

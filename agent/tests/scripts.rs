@@ -44,6 +44,7 @@ fn config() -> AgentConfig {
         waypoints: vec![[50.0, 0.0, 3.0]],
         errands: Vec::new(),
         rally: Vec::new(),
+        arrives_with: Vec::new(),
         takeoff_height_m: 2.0,
         return_altitude_m: 4.0,
         position: Default::default(),
@@ -175,7 +176,7 @@ fn a_script_speaks_of_fields_that_there_are_and_of_what_they_may_be() {
     for (sync, why) in [
         (
             order(json!({"what": "land", "speed": 3})),
-            "it requests the field `speed`, and there is no such field: `order` has `what`, `x`, `y`, `z`, `by`",
+            "it requests the field `speed`, and there is no such field: `order` has `what`, `x`, `y`, `z`, `way`, `by`",
         ),
         (
             order(json!({"what": "goto", "x": "far"})),

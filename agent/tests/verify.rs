@@ -27,6 +27,7 @@ pub fn config() -> AgentConfig {
         waypoints: vec![[50.0, 0.0, 3.0]],
         errands: Vec::new(),
         rally: Vec::new(),
+        arrives_with: Vec::new(),
         takeoff_height_m: 2.0,
         return_altitude_m: 4.0,
         position: Default::default(),

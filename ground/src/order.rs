@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use skein_bp::script::{Assignment, ScriptFileError, TrialFault};
 use skein_bp::{Event, EventSet};
 use skein_dbp::NodeName;
+use skein_wire::Route;
 use skein_wire::event::{Declared as _, Events as _, OrderGiven, What};
 
 use crate::giver::Giver;
@@ -38,6 +39,8 @@ pub enum Order {
     Return(Who),
     /// Fly here and hover until resumed.
     GoTo(Who, Destination),
+    /// Fly this instead of what is left of the mission, and land under the last point.
+    Route(Who, Route),
     /// Fly again by yourself: the pilot has let go.
     HandBack(Who),
     /// Run a script beside whatever you do.
@@ -130,7 +133,7 @@ impl Order {
             What::Take => Self::Take(who),
             What::Release => Self::Release(who),
             What::Keep => Self::Keep(who),
-            What::GoTo | What::Load | What::Unload | What::Give => return None,
+            What::GoTo | What::Route | What::Load | What::Unload | What::Give => return None,
         })
     }
 
@@ -145,6 +148,7 @@ impl Order {
             Self::Land(_) => What::Land,
             Self::Return(_) => What::Return,
             Self::GoTo(..) => What::GoTo,
+            Self::Route(..) => What::Route,
             Self::HandBack(_) => What::HandBack,
             Self::Load(..) => What::Load,
             Self::Unload(..) => What::Unload,
@@ -166,6 +170,7 @@ impl Order {
             | Self::Land(who)
             | Self::Return(who)
             | Self::GoTo(who, _)
+            | Self::Route(who, _)
             | Self::Load(who, _)
             | Self::Unload(who, _)
             | Self::Ask(who)
@@ -205,6 +210,10 @@ impl Order {
             name: self.script().map(Into::into),
             script: match self {
                 Self::Load(_, script) => Some(script.text.clone()),
+                _ => None,
+            },
+            way: match self {
+                Self::Route(_, route) => Some(route.to_string().as_str().into()),
                 _ => None,
             },
             ..OrderGiven::plain(self.what(), who, by.as_str())

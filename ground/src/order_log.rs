@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use skein_dbp::{Happened, Node, NodeName};
 use skein_wire::event::{
-    Declared as _, Declined, Handover, Heeded, OrderTaken, Overruled, ScriptNews, ScriptState, Takeoff,
+    Declared as _, Declined, Handover, Heeded, OrderTaken, Overruled, Rerouted, ScriptNews, ScriptState,
+    Takeoff, What,
 };
 
 use crate::bthreads::{GOING_LASTS, Hold, LAUNCH_LASTS};
@@ -114,6 +115,7 @@ impl OrderLog {
         for record in &mut self.records {
             let lasts = match &record.order {
                 Order::LaunchTogether => Some(LAUNCH_LASTS),
+                Order::Route(..) => Some(GOING_LASTS),
                 order if order.what().sets_going() || order.script().is_some() => Some(GOING_LASTS),
                 _ => None,
             };
@@ -181,11 +183,14 @@ impl OrderLog {
 }
 
 /// Whether whoever has not taken in the `old` order need not any more. A launch is about those on the ground: it
-/// takes the place of no order, and only who calls all down calls it off. Scripts are beside all that.
+/// takes the place of no order, and only who calls all down calls it off. Scripts are beside all that, and a route takes
+/// the place of a route.
 fn supersedes(new: &Order, old: &Order) -> bool {
     match (new, old) {
         (new, _) if new.what().is_launch() => false,
         _ if new.script().is_some() || old.script().is_some() => false,
+        (Order::Route(..), old) => matches!(old, Order::Route(..)),
+        (_, Order::Route(..)) => false,
         (Order::Abort | Order::Land(Who::All) | Order::Return(Who::All), _) => true,
         (_, old) if old.what().is_launch() => false,
         _ => true,
@@ -201,7 +206,11 @@ fn answer_in(record: &OrderRecord, happened: &Happened, after: Duration) -> Opti
     if order.what().is_launch() && event.kind() == Takeoff::NAME {
         return acknowledged();
     }
-    if let Some(taken) = OrderTaken::read(event) {
+    if let (Order::Route(_, route), Some(taken)) = (order, Rerouted::read(event)) {
+        // The vehicle reads back what it has taken on.
+        return if *taken.by == *by && *taken.way == *route.to_string() { acknowledged() } else { None };
+    }
+    if let Some(taken) = OrderTaken::read(event).filter(|taken| taken.what != What::Route) {
         // What another has ordered, or a script its own vehicle, is nobody's answer.
         return if taken.what == order.what() && *taken.by == *by { acknowledged() } else { None };
     }

@@ -107,6 +107,20 @@ fn an_order_from_the_shell_names_who_gave_it_and_says_who_has_heard_it() {
 }
 
 #[test]
+fn the_shell_is_told_how_the_swarm_stands_and_what_a_route_is_wrong_by() {
+    let station = Station::start(None);
+    let told = said(&station.shell(&["status", "--by", "Anna"]));
+    assert_eq!(told["vehicles"][0]["name"], "uav/1");
+    let refused = station.shell(&["route", "-3,4 5,6,7", "--vehicle", "1", "--by", "Anna"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let why = said(&refused)["error"].as_str().unwrap().to_owned();
+    assert!(why.contains("point 1, `-3 4`"), "{why}");
+    let stranger = station.shell(&["route", "-3,4,5", "--vehicle", "7", "--by", "Anna"]);
+    assert!(said(&stranger)["error"].as_str().unwrap().contains("`uav/7` is no vehicle"), "{stranger:?}");
+    assert!(station.end().is_empty(), "nothing was ordered");
+}
+
+#[test]
 fn a_launch_from_the_shell_is_confirmed() {
     let station = Station::start(None);
     // Once it has acknowledged something, the station knows the vehicle.

@@ -4,11 +4,13 @@ use std::fmt;
 use std::path::Path;
 
 use serde::Serialize;
+use skein_agent::AgentCore;
 use skein_bp::behaviour::Behaviours;
 use skein_world::sdf::Entry;
 use skein_world::{Account, Scene};
 
 use crate::element::{Element, Verdict};
+use crate::fly::agent_configs;
 use crate::mission::{self, MissionSet};
 use crate::scenario::{Overrides, Scenario, ScenarioError, read_world};
 
@@ -53,7 +55,9 @@ pub fn check(file: &Path, allowed: &Overrides, known: &Behaviours) -> Result<Fin
             if !allowed.thin_solids {
                 scenario.check_thin_solids()?;
             }
-            let holds = format!("{} vehicles, {}", scenario.vehicles.len(), world(&scenario.scene));
+            check_scripts(&scenario)?;
+            let vehicles = counted(scenario.vehicles.len(), "vehicle");
+            let holds = format!("{vehicles}, {}", world(&scenario.scene));
             ("scenario", holds, scenario.notes)
         }
     };
@@ -117,21 +121,39 @@ fn world_elements(account: &Account) -> Vec<Element> {
 
 fn world(scene: &Scene) -> String {
     let size = scene.bounds().max - scene.bounds().min;
-    let obstacles = scene.obstacles().len();
-    format!("{obstacles} obstacles in {:.0} x {:.0} x {:.0} m", size.x, size.y, size.z)
+    let obstacles = counted(scene.obstacles().len(), "obstacle");
+    format!("{obstacles} in {:.0} x {:.0} x {:.0} m", size.x, size.y, size.z)
 }
 
 fn missions(set: &MissionSet) -> String {
     let waypoints: usize = set.missions.iter().map(|m| m.waypoints.len()).sum();
     let areas = set.airspace.stay_inside.iter().map(|zone| zone.any_of.len()).sum();
     let more = [
-        (set.airspace.no_fly.len() + set.airspace.prisms.len(), "no-fly zones"),
-        (areas, "areas to stay inside of"),
-        (set.rally.len(), "rally points"),
+        (set.airspace.no_fly.len() + set.airspace.prisms.len(), "no-fly zone"),
+        (areas, "fence"),
+        (set.rally.len(), "rally point"),
     ];
-    let more = more.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!(", {count} {what}"));
+    let more = more
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| format!(", {}", counted(*count, what)));
     let more: String = more.collect();
-    format!("{} routes with {waypoints} waypoints in all{more}", set.missions.len())
+    format!("{} with {} in all{more}", counted(set.missions.len(), "route"), counted(waypoints, "waypoint"))
+}
+
+/// So many of them, in words: `1 obstacle`, `2 obstacles`.
+fn counted(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
+/// The vehicles try their scripts out before they fly.
+fn check_scripts(scenario: &Scenario) -> Result<(), ScenarioError> {
+    let scripted = agent_configs(scenario).into_iter().filter(|config| !config.scripts.is_empty());
+    for config in scripted {
+        let vehicle = config.node.clone();
+        AgentCore::new(config).map_err(|why| ScenarioError::Agent { vehicle, why })?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -154,10 +176,10 @@ mod tests {
         let scenario = put("s.toml", "generator = \"open\"\nworld = \"w.csv\"\n")?;
         assert_eq!(
             (check(&world)?.kind, check(&world)?.holds.as_str()),
-            ("world", "1 obstacles in 100 x 100 x 21 m")
+            ("world", "1 obstacle in 100 x 100 x 21 m")
         );
-        assert_eq!(check(&mission)?.holds, "1 routes with 1 waypoints in all");
-        assert_eq!(check(&scenario)?.holds, "4 vehicles, 1 obstacles in 100 x 100 x 21 m");
+        assert_eq!(check(&mission)?.holds, "1 route with 1 waypoint in all");
+        assert_eq!(check(&scenario)?.holds, "4 vehicles, 1 obstacle in 100 x 100 x 21 m");
         assert_eq!(check(Path::new("forest"))?.kind, "scenario");
         Ok(())
     }
@@ -198,17 +220,38 @@ mod tests {
         let path = folder.path().join("w.sdf");
         let barn = "<include><uri>model://barn</uri></include><light name='l' type='point'/>";
         std::fs::write(&path, format!("<sdf version='1.9'><world name='w'>\n{barn}</world></sdf>"))?;
-        let Err(ScenarioError::Lacking(lacking)) = check(&path) else { panic!("it lacks a barn") };
-        assert!(lacking.to_string().contains("w.sdf:2:1: included model `model://barn` is not there"));
+        let Err(error) = check(&path) else { panic!("it lacks a barn") };
+        assert!(error.to_string().contains("w.sdf:2:1: included model `model://barn` is not there"));
         let verdict = |elements: Vec<Element>, name: &str| {
-            elements.into_iter().find(|element| element.element == name).map(|element| element.verdict)
+            elements.into_iter().find(|element| element.what == name).map(|element| element.verdict)
         };
-        assert_eq!(verdict(list(&lacking.0), "world/include"), Some("refused"));
+        let unsound = elements(&path, &Overrides::default(), &error);
+        assert_eq!(verdict(unsound, "world/include"), Some(Verdict::Refused));
         let allowed = Overrides { without_missing: true, ..Overrides::default() };
         let findings = super::check(&path, &allowed, &Behaviours::default())?;
         assert!(findings.warnings.iter().any(|warning| warning.contains("barn")), "{:?}", findings.warnings);
-        assert_eq!(verdict(findings.elements.clone(), "world/light"), Some("harmless"));
-        assert_eq!(verdict(findings.elements, "sdf/world"), Some("honoured"));
+        assert_eq!(verdict(findings.elements.clone(), "world/light"), Some(Verdict::Harmless));
+        assert_eq!(verdict(findings.elements, "sdf/world"), Some(Verdict::Honoured));
+        Ok(())
+    }
+
+    #[test]
+    fn a_script_that_no_vehicle_would_run_is_refused_as_fly_refuses_it()
+    -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("s.toml");
+        std::fs::write(&path, "generator = \"open\"\n[[script]]\nfile = \"grab.toml\"\n")?;
+        let script = |event: &str| {
+            let body = format!("[[body]]\nsync = {{ request = \"{{me}}/{event}\" }}\n");
+            std::fs::write(folder.path().join("grab.toml"), format!("name = \"grab\"\nabout = \"x\"\n{body}"))
+        };
+        script("airborne")?;
+        let error = check(&path).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(error.contains("uav/1") && error.contains("script `grab`"), "{error}");
+        let scenario =
+            Scenario::from_toml(&std::fs::read_to_string(&path)?, &path.to_string_lossy(), None, 1)?;
+        let refused = AgentCore::new(agent_configs(&scenario).remove(0)).err().map(|e| e.to_string());
+        assert!(refused.is_some_and(|refused| error.contains(&refused)), "what `fly` says");
         Ok(())
     }
 

@@ -109,6 +109,9 @@ pub struct Fly {
     /// Show no live table.
     #[arg(long)]
     pub headless: bool,
+    /// Take off when an operator orders it at the console, not as soon as all is ready; `--clock real` only.
+    #[arg(long)]
+    pub launch_on_order: bool,
     /// Run world, ground station and each agent in a process of its own; `--clock real` only.
     #[arg(long)]
     pub processes: bool,
@@ -124,9 +127,10 @@ pub struct Fly {
     /// Ground station to run in place of `skein-ground`: one with your behaviours.
     #[arg(long, value_name = "PATH", requires = "processes")]
     pub ground: Option<PathBuf>,
-    /// Address of the console on this computer, `--clock real` only; port 0 takes any that is free.
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8700")]
-    pub console: SocketAddr,
+    /// Address of the console on this computer, `--clock real` only; port 0 takes any that is free [default:
+    /// 127.0.0.1:8700, with the offset of ports].
+    #[arg(long, value_name = "ADDRESS")]
+    pub console: Option<SocketAddr>,
     /// Offset of all network ports, to run beside another swarm on this computer.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port_offset: u16,

@@ -47,15 +47,15 @@ pub struct Progress {
     /// Messages between nodes so far.
     pub messages: u64,
     /// Vehicles that have landed at their goals.
-    pub arrived: usize,
+    pub complete: usize,
     pub vehicles: usize,
 }
 
 impl Progress {
     pub fn line(&self) -> String {
-        let Self { sim_time_s, realtime_factor, events, messages, arrived, vehicles } = self;
+        let Self { sim_time_s, realtime_factor, events, messages, complete, vehicles } = self;
         format!(
-            "t {sim_time_s:.1} s  x{realtime_factor:.1} real time  arrived {arrived}/{vehicles}  \
+            "t {sim_time_s:.1} s  x{realtime_factor:.1} real time  complete {complete}/{vehicles}  \
              events {events}  messages {messages}"
         )
     }
@@ -175,7 +175,7 @@ mod tests {
         realtime_factor: 21.0,
         events: 120,
         messages: 3400,
-        arrived: 1,
+        complete: 1,
         vehicles: 3,
     };
 
@@ -224,7 +224,7 @@ mod tests {
     fn a_row_shows_battery_and_nearest_vehicle() {
         let picture = picture(160, &PROGRESS_NOW, &rows(1));
         assert!(picture.contains("87 %") && picture.contains("uav/2 3.2 m"), "{picture}");
-        assert!(picture.contains("arrived 1/3") && picture.contains("t 12.3 s"), "{picture}");
+        assert!(picture.contains("complete 1/3") && picture.contains("t 12.3 s"), "{picture}");
     }
 
     #[test]

@@ -138,3 +138,37 @@ fn ctrl_c_lands_everyone_and_finishes_the_files() {
     let bytes = std::fs::read(recording).expect("a recording");
     assert!(bytes.ends_with(b"\x89MCAP0\r\n"), "the recording ends as MCAP files do");
 }
+
+#[test]
+fn what_has_no_effect_with_another_option_is_refused() {
+    let lockstep = ["fly", "open", "--clock", "lockstep"];
+    let with = |option: &[&'static str]| [&lockstep[..], option].concat();
+    assert_refused(&with(&["--speed", "2"]), &["--speed 2", "lockstep"]);
+    assert_refused(&with(&["--launch-on-order"]), &["--launch-on-order", "lockstep"]);
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named_once_with_one_reason() {
+    for arguments in [["check", "nowhere.toml"], ["fly", "nowhere.toml"]] {
+        let error = String::from_utf8(skein_sim(&arguments).stderr).expect("text");
+        assert_eq!(error.matches("No such file").count(), 1, "{error}");
+        assert_eq!(error.matches("nowhere.toml").count(), 1, "{error}");
+    }
+}
+
+#[test]
+fn a_flight_says_where_its_recording_is_and_keeps_the_former_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("run");
+    let out = out.to_string_lossy();
+    let text = "time_limit_s = 60.0\n[[vehicle]]\nstart_m = [0.0, 0.0]\nwaypoints_m = [[6.0, 0.0, 3.0]]\n";
+    let scenario = write(folder.path(), "hop.toml", text);
+    let hop = || skein_sim(&["fly", &scenario, "--clock", "lockstep", "--headless", "--out", &out]);
+    let (first, again) = (hop(), hop());
+    let said = String::from_utf8_lossy(&first.stderr).into_owned();
+    assert!(first.status.success() && again.status.success(), "{said}");
+    assert!(said.contains(&format!("recording: {out}/mission.mcap")), "{said}");
+    assert!(said.contains(&format!("skein-ground explain {out}/mission.mcap --at")), "{said}");
+    let kept = |name: &str| folder.path().join("run").join(name).is_file();
+    assert!(kept("mission.mcap") && kept("mission-1.mcap"));
+}

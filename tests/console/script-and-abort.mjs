@@ -74,8 +74,19 @@ await drive({}, async (console) => {
   await console.selectNone();
   const aborted = console.fleet.time_s;
   await console.press('Abort');
+  const question = page.locator('dialog[open]');
+  await question.waitFor();
+  assert.match(await question.textContent(), /Abort all\?.*4 vehicles fly/s);
+  assert.ok(console.orders.every(({ what }) => what !== 'abort'), 'nothing is ordered before it is confirmed');
+  await question.getByRole('button', { name: 'Abort the mission', exact: true }).click();
   // In the middle of the circle they part first, so that one is down before another begins.
   const hasLanded = (name) => console.history(name, aborted).some((vehicle) => vehicle.mode === 'land');
   await console.until('everyone lands', () => NAMES.every(hasLanded));
   await console.stay();
+  // The station has ended with the mission, and nothing is said to be lost.
+  const banners = page.locator('#banners');
+  await banners.getByText('The station has ended').waitFor({ timeout: 5000 });
+  assert.match(await banners.textContent(), /Mission failed: 0 of 4 arrived.*It is recorded in .*mission\.mcap/s);
+  assert.doesNotMatch(await page.locator('body').textContent(), /connection[^.]*lost/i);
+  assert.equal(await page.locator('[role=option][data-vehicle]').count(), NAMES.length, 'the last state stays');
 });

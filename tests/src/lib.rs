@@ -25,12 +25,13 @@ pub fn flight(scenario: &str, seed: u64) -> Fly {
         autopilots: Autopilots::default(),
         out: None,
         headless: true,
+        launch_on_order: false,
         processes: false,
         network: cli::Network::Peer,
         secure: false,
         agent: None,
         ground: None,
-        console: ([127, 0, 0, 1], 0).into(),
+        console: Some(([127, 0, 0, 1], 0).into()),
         port_offset: 0,
     }
 }

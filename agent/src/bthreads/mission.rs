@@ -5,9 +5,10 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
+use skein_wire::Route;
 use skein_wire::event::{
     self, Airborne, Arrived, CommandFailed, Complete, Declared as _, Failed, FoundAirborne, Goto, HandBack,
-    Land, Landed, OrderTaken, Payload, Return, Takeoff, What,
+    Land, Landed, OrderTaken, Payload, Rerouted, Return, Takeoff, What,
 };
 
 use crate::bthreads::OPERATOR_LEG;
@@ -72,6 +73,29 @@ enum Phase {
 }
 
 impl Mission {
+    /// The name that this b-thread runs under: whoever is sent a route asks it by name.
+    pub const NAME: &'static str = "mission";
+
+    /// Why it takes on no route now, if so.
+    pub fn objects_to_routes(&self) -> Option<&'static str> {
+        match self.phase {
+            Phase::Descending { .. } | Phase::Landing { .. } => Some("it is on its way home or down"),
+            Phase::Down { .. } | Phase::Over => Some("its mission is over"),
+            _ => None,
+        }
+    }
+
+    /// A route takes the place of what was left; a vehicle that an operator has sent elsewhere flies it when resumed.
+    fn reroute(&mut self, route: &Route) {
+        self.waypoints = gotos(&self.me, route.points());
+        self.errands.clear();
+        self.phase = match self.phase {
+            Phase::Heading { .. } | Phase::Flying { .. } => Phase::Heading { leg: 0 },
+            Phase::Diverted { .. } => Phase::Diverted { leg: 0 },
+            ref phase => phase.clone(),
+        };
+    }
+
     /// A mission over `waypoints` in metres ENU, the last being where the vehicle lands.
     pub fn new(me: Me, waypoints: &[[f64; 3]]) -> Self {
         let errands = BTreeMap::new();
@@ -145,6 +169,10 @@ impl BThread for Mission {
         let ended_by_others = me.any::<(Land, Return, Landed)>();
         let diverted = me.any::<Goto>().and(Goto::leg(OPERATOR_LEG));
         let bid = Bid::new().priority(precedence::MISSION);
+        let bid = match self.objects_to_routes() {
+            None => bid.wait_for(me.any::<Rerouted>()),
+            Some(_) => bid,
+        };
         Some(match &self.phase {
             Phase::Grounded => bid.wait_for(me.any::<(Takeoff, FoundAirborne)>()),
             Phase::Found => bid.wait_for(me.any::<OrderTaken>()).wait_for(ended_by_others),
@@ -175,6 +203,12 @@ impl BThread for Mission {
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
+        if let Some(rerouted) = self.me.read::<Rerouted>(event) {
+            if let Ok(route) = rerouted.way.parse() {
+                self.reroute(&route);
+            }
+            return;
+        }
         let now = cx.now();
         let verb = self.me.verb(event).unwrap_or_default();
         self.phase = match (&self.phase, verb) {

@@ -84,7 +84,7 @@ pub fn load_with(program: &mut Program, config: &AgentConfig, right_of_way: impl
     program.add("return_home", ReturnHome::new(me.clone(), [x, y, config.return_altitude_m]));
     program.add("escape", Escape::new(me.clone()));
     program.add("await_place", AwaitPlace::new(me.clone()));
-    program.add("mission", Mission::new(me.clone(), &config.waypoints).with_errands(&config.errands));
+    program.add(Mission::NAME, Mission::new(me.clone(), &config.waypoints).with_errands(&config.errands));
     program.add("path_planning", PathPlanning::new(me.clone()));
     program.add("navigation", Navigation::new(me));
     config.behaviours.load(&config.host(), program);

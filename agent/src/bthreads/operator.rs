@@ -3,7 +3,7 @@
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_wire::event::{
-    Advance, Declared as _, Declined, HandBack, Hold, Land, OrderTaken, Return, Text, What,
+    Advance, Complete, Declared as _, Declined, Failed, HandBack, Hold, Land, OrderTaken, Return, Text, What,
 };
 
 use crate::{me::Me, precedence};
@@ -15,11 +15,13 @@ pub struct Operator {
     /// Until they can happen: what a pilot keeps from happening waits for the vehicle to be handed back.
     pending: Vec<Event>,
     holding: bool,
+    /// Its mission is over: there is nothing left to go on with.
+    is_over: bool,
 }
 
 impl Operator {
     pub fn new(me: Me) -> Self {
-        Self { me, pending: Vec::new(), holding: false }
+        Self { me, pending: Vec::new(), holding: false, is_over: false }
     }
 
     /// What the vehicle does by itself then, if it does.
@@ -30,6 +32,9 @@ impl Operator {
             What::Land => self.me.event(Land { why }),
             What::Return => self.me.event(Return { why }),
             What::HandBack => self.me.event(HandBack),
+            What::Resume if self.is_over => self
+                .me
+                .event(Declined { what, why: "its mission is over, and it stands on the ground".into() }),
             _ => return None,
         })
     }
@@ -46,6 +51,9 @@ impl BThread for Operator {
     fn bid(&self) -> Option<Bid> {
         let me = &self.me;
         let mut bid = Bid::new().priority(precedence::LINK).wait_for(me.any::<OrderTaken>());
+        if !self.is_over {
+            bid = bid.wait_for(me.any::<(Complete, Failed)>());
+        }
         if self.holding {
             // Whoever sends the vehicle home or down, it is no longer held.
             bid = bid.block(me.any::<Advance>()).wait_for(me.any::<(Return, Land)>());
@@ -54,6 +62,10 @@ impl BThread for Operator {
     }
 
     fn resume(&mut self, event: &Event, _: &mut Context) {
+        if matches!(self.me.verb(event), Some(Complete::NAME | Failed::NAME)) {
+            self.is_over = true;
+            return;
+        }
         if !self.me.heard::<OrderTaken>(event) {
             self.pending.retain(|pending| pending != event);
             self.holding &= self.me.heard::<Hold>(event) || self.me.heard::<Declined>(event);

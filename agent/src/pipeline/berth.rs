@@ -96,7 +96,7 @@ mod tests {
     const NEAR: Vector3<f64> = Vector3::new(7.5, 0.0, 3.0);
 
     fn course() -> Course {
-        Course::to(Waypoint { leg: 0, target: GOAL, lands: true, is_home: false })
+        Course::to(Waypoint { leg: 0, target: GOAL, lands: true, is_home: false, beyond_s: None })
     }
 
     fn other(position: Vector3<f64>, goal: Option<Vector3<f64>>) -> Neighbour {
@@ -116,6 +116,7 @@ mod tests {
             track,
             way: None,
             right: Right::Free,
+            to_go_s: None,
         }
     }
 

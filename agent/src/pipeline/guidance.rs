@@ -48,6 +48,8 @@ pub struct Guidance {
     /// An operator or a b-thread has told it to hover, and since then nobody to move.
     is_held: bool,
     allowed: Allowed,
+    /// The speed to arrive with others at, m/s; infinite without any.
+    pub arrival_m_s: f64,
     /// The room above and below, as it is seen now.
     pub headroom: Headroom,
     pub course: Course,
@@ -68,6 +70,7 @@ impl Guidance {
             leave_until: Duration::ZERO,
             is_held: false,
             allowed: Allowed::ANYTHING,
+            arrival_m_s: f64::INFINITY,
             headroom: Headroom::OPEN,
             course: Course::default(),
             planning: Planning::new(envelope, fence, finder, potential),
@@ -113,7 +116,10 @@ impl Guidance {
     /// The limits that count now: none on the way home, nor for a vehicle that is held.
     fn allowed(&self) -> Allowed {
         let goes_home = self.goes_home();
-        if goes_home || self.is_held { Allowed::ANYTHING } else { self.allowed }
+        match goes_home || self.is_held {
+            true => Allowed::ANYTHING,
+            false => Allowed { speed_m_s: self.allowed.speed_m_s.min(self.arrival_m_s), ..self.allowed },
+        }
     }
 
     /// Whether the way leads to where a return ends.
@@ -314,7 +320,9 @@ impl Guidance {
 
     /// For what the vehicle waits though it has leave to move.
     pub fn waits_for(&self) -> Option<&'static str> {
-        self.progress.waits().then_some("something that moves to leave its way")
+        let waits = self.progress.waits().then_some("something that moves to leave its way");
+        let dawdles = self.arrival_m_s < 0.5 * self.envelope.cruise_m_s;
+        waits.or(dawdles.then_some("those together with which it is to arrive"))
     }
 
     /// The set-point for now: along the path with leave, else at a place; kept apart from vehicles and obstacles

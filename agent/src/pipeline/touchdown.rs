@@ -183,7 +183,7 @@ mod tests {
             radius_m: 0.25,
             cooperative: true,
         };
-        Neighbour { node: name(node), armed, goal: None, track, way: None, right: Right::Free }
+        Neighbour { node: name(node), armed, goal: None, track, way: None, right: Right::Free, to_go_s: None }
     }
 
     fn map() -> ClearanceMap {

@@ -229,6 +229,7 @@ mod tests {
                 track,
                 way: None,
                 right: Right::Free,
+                to_go_s: None,
             });
             self
         }

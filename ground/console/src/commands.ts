@@ -1,7 +1,8 @@
 /**
  * The commands: what each button sends, and to whom.
  *
- * A safety order acts at once. Only launching asks again: see `launch-dialog.ts`.
+ * A safety order acts at once, but for what brings all down: see `confirmation.ts`. Launching asks again too: see
+ * `launch-dialog.ts`.
  */
 
 import { html, setAttribute, setText } from './dom';

@@ -10,7 +10,7 @@ const KEYS: [keys: string[], does: string][] = [
   [['B'], 'return: back home'],
   [['L'], 'land'],
   [['G'], 'go to: then click the ground'],
-  [['1', '…', '9'], 'select a vehicle, with ⇧ add it'],
+  [['1', '…', '9'], 'select a vehicle by its number (12: 1, then 2), with ⇧ add it'],
   [['0', 'A'], 'select all'],
   [['Esc'], 'leave a mode, then deselect'],
   [['F'], 'fit everything in'],

@@ -3,8 +3,8 @@
  * repetition of a key held down.
  */
 
-/** `digit` gets 1 to 9, and whether Shift is down. */
-export function listenToKeys(actions: Record<string, () => void>, digit: (number: number, more: boolean) => void): void {
+/** `digit` gets 0 to 9, and whether Shift is down; it says whether the digit means something to it. */
+export function listenToKeys(actions: Record<string, () => void>, digit: (digit: string, more: boolean) => boolean): void {
   document.addEventListener('keydown', (event) => {
     if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || document.querySelector('dialog[open]')) return;
     const typing = isField(event.target);
@@ -14,9 +14,8 @@ export function listenToKeys(actions: Record<string, () => void>, digit: (number
       return;
     }
     if (typing) return;
-    const number = /^(?:Digit|Numpad)([1-9])$/.exec(event.code)?.[1];
-    if (number) {
-      digit(Number(number), event.shiftKey);
+    const pressed = /^(?:Digit|Numpad)([0-9])$/.exec(event.code)?.[1];
+    if (pressed && digit(pressed, event.shiftKey)) {
       event.preventDefault();
       return;
     }

@@ -4,6 +4,7 @@
 
 import './console.css';
 import { Commands } from './commands';
+import { Confirmation } from './confirmation';
 import { Connection, liveUrl } from './connection';
 import { html, part, setText } from './dom';
 import { EventsPanel } from './events-panel';
@@ -26,7 +27,8 @@ import { View } from './view/view';
 import { WhyPanel } from './why-panel';
 import { showScript } from './script-dialog';
 import { ScriptsPanel } from './scripts-panel';
-import { clockWords, durationWords, orderName, outcomeWords } from './words';
+import { TypedNumber } from './typed-number';
+import { clockWords, durationWords, orderName, outcomeWords, overWords } from './words';
 
 /** The station speaks ten times a second; after this long what is shown is no longer live. */
 const STALE_MS = 2000;
@@ -61,8 +63,9 @@ const placing = new Placing(part('view').parentElement!, (on) => {
   view.setPlacing(on);
   commands.setPlacing(on);
 });
+const confirmation = new Confirmation();
 const commands = new Commands(part('commands'), {
-  order: (what) => order(what),
+  order: (what) => confirmed(what, () => order(what)),
   launch: () => person.named(What.launch, () => launch.open()),
   placing: () => placing.toggle(),
   everyone: () => selection.set([]),
@@ -78,6 +81,9 @@ const launch = new LaunchDialog(
 );
 
 let fleet: Fleet = { type: 'fleet', time_s: 0, outcome: null, vehicles: [] };
+/** Where the mission is recorded; empty while nobody says so. */
+let recording = '';
+const typed = new TypedNumber((number) => named(number) !== undefined);
 /** By tag. */
 const unanswered = new Map<string, Sent>();
 let tags = 0;
@@ -107,10 +113,11 @@ listenToKeys(
     '?': () => help.open(),
     Escape: () => (placing.active ? placing.set(false) : selection.set([])),
   },
-  (number, more) => {
-    for (const [name, look] of identities(names())) {
-      if (look.number === number) more ? selection.toggle(name) : selection.pick(name);
-    }
+  (digit, more) => {
+    const number = typed.type(digit, performance.now());
+    const name = number === null ? undefined : named(number);
+    if (name) more ? selection.toggle(name) : selection.pick(name);
+    return name !== undefined;
   },
 );
 
@@ -118,6 +125,7 @@ function receive(message: ServerMessage): void {
   switch (message.type) {
     case 'scene':
       showStation(message);
+      recording = message.recording;
       view.setScene(message);
       vehicles.setGround(view.groundZ);
       break;
@@ -192,6 +200,11 @@ function showFleet(): void {
   else outcomeBanner.hide();
 }
 
+/** The vehicle of this number. */
+function named(number: number): string | undefined {
+  return [...identities(names())].find(([, look]) => look.number === number)?.[0];
+}
+
 function names(): string[] {
   return fleet.vehicles.map(({ name }) => name);
 }
@@ -217,6 +230,13 @@ function showAddressees(): void {
   commands.setAddressees(addresseeWords(to, fleet.vehicles.length), to === 'all');
   const addressed = fleet.vehicles.filter(({ name }) => to === 'all' || to.includes(name));
   holders.show(addressed, person.name, person.mayNot(What.take));
+}
+
+/** Lands of everyone are asked about; what keeps vehicles where they are never is. */
+function confirmed(what: Command, give: () => void): void {
+  const all = selection.addressees(names()) === 'all';
+  if (what === What.abort || (what === What.land && all)) confirmation.ask(what, fleet.vehicles.filter(({ armed }) => armed).length, give);
+  else give();
 }
 
 function order(what: Command, point?: Point): void {
@@ -295,6 +315,7 @@ function connectionChanged(live: boolean, retryMs: number): void {
   }
   if (!live) {
     launch.close();
+    confirmation.close();
     placing.set(false);
     const lost = [...unanswered.keys()].map(settle);
     if (lost.length > 0) notices.show('The connection was lost before the station answered the last order.');
@@ -309,7 +330,11 @@ function showConnection(): void {
   const stale = live && silence > STALE_MS;
   document.body.classList.toggle('stale', !live || stale);
   setText(part('connection'), !live ? (everLive ? 'Disconnected' : 'Connecting') : stale ? 'Silent' : 'Live');
-  if (!live && !everLive && performance.now() < GRACE_MS) {
+  if (!live && fleet.outcome) {
+    setText(part('connection'), 'Over');
+    connectionBanner.show(overWords(fleet.outcome, names().length, recording), fleet.outcome.succeeded ? 'good' : 'warn');
+    outcomeBanner.hide();
+  } else if (!live && !everLive && performance.now() < GRACE_MS) {
     connectionBanner.hide();
   } else if (!live) {
     const wait = Math.max(0, Math.ceil((retryAt - performance.now()) / 1000));

@@ -92,6 +92,10 @@ export type Obstacle = { position: [number, number, number], orientation: [numbe
 
 export type OrderMessage = { tag?: string, what: What, to: To, point?: [number, number, number | null],
 /**
+ * For `route`: the points, metres ENU.
+ */
+points?: Array<[number, number, number]>,
+/**
  * For `load`: a script with values for its parameters.
  */
 script?: { script: unknown, with: Record<string, unknown> },
@@ -133,7 +137,11 @@ export type Role = "observer" | "safety" | "operator";
 /**
  * A message for browsers.
  */
-export type ServerMessage = { "type": "scene", fleet: string, station: string, software: string, bounds: Bounds | null, obstacles: Array<Obstacle>, } | { "type": "fleet", time_s: number, outcome: OutcomeView | null, vehicles: Array<VehicleView>, } | { "type": "orders", orders: Array<OrderView>, } | { "type": "events", events: Array<EventView>, } | { "type": "why", headline: string, vehicle: string, time_s: number,
+export type ServerMessage = { "type": "scene", fleet: string, station: string, software: string,
+/**
+ * The file in which the mission is recorded; empty if it is not.
+ */
+recording: string, bounds: Bounds | null, obstacles: Array<Obstacle>, } | { "type": "fleet", time_s: number, outcome: OutcomeView | null, vehicles: Array<VehicleView>, } | { "type": "orders", orders: Array<OrderView>, } | { "type": "events", events: Array<EventView>, } | { "type": "why", headline: string, vehicle: string, time_s: number,
 /**
  * Where it is and what it does; none of one that has not been heard.
  */

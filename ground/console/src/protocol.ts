@@ -185,6 +185,7 @@ function readScene(json: Raw<Told<'scene'>>): Scene {
     fleet: string(json.fleet),
     station: string(json.station),
     software: string(json.software),
+    recording: string(json.recording),
     bounds: min && max ? { min, max } : null,
     obstacles: list(json.obstacles, readObstacle),
   };

@@ -11,6 +11,7 @@ export const What = {
   return: 'return',
   abort: 'abort',
   goto: 'goto',
+  route: 'route',
   handBack: 'hand_back',
   load: 'load',
   unload: 'unload',

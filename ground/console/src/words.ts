@@ -71,10 +71,17 @@ export function clockWords(seconds: number): string {
 export function dataWords(data: Record<string, unknown>): string {
   const { what, why, x, y, z, ...rest } = data;
   const words = [what, why].filter((value) => value !== undefined).map(valueWords);
-  for (const [key, value] of Object.entries(rest)) words.push(`${spaced(key)} ${valueWords(value)}`);
+  for (const [key, value] of Object.entries(rest)) words.push(key === 'leg' ? legWords(value) : `${spaced(key)} ${valueWords(value)}`);
   const place = [x, y, z].filter((coordinate) => typeof coordinate === 'number');
   if (place.length > 0) words.push(`at ${place.map((coordinate) => coordinate.toFixed(1)).join(', ')}`);
   return words.join(' · ');
+}
+
+/** Legs are counted from 1, as the tasks of vehicles count them; those that no mission leads to have words of their own. */
+function legWords(leg: unknown): string {
+  if (leg === -1) return 'way home';
+  if (leg === -2) return "operator's point";
+  return typeof leg === 'number' ? `leg ${leg + 1}` : `leg ${valueWords(leg)}`;
 }
 
 function valueWords(value: unknown): string {
@@ -92,6 +99,12 @@ export function outcomeWords(outcome: Outcome, fleet: number): string {
   const reasons = failed.map(([name, why]) => (why ? `${name} (${why})` : name));
   const end = reasons.length > 0 ? `, failed: ${reasons.join(', ')}` : '';
   return `Mission ${outcome.succeeded ? 'complete' : 'failed'}: ${arrived}${end}`;
+}
+
+/** What the end of the connection means once the mission is over: nothing is wrong, and this is how it ended. */
+export function overWords(outcome: Outcome, fleet: number, recording: string): string {
+  const again = recording ? ` It is recorded in ${recording}.` : '';
+  return `${outcomeWords(outcome, fleet)}. The station has ended; you see how it left the swarm.${again}`;
 }
 
 /** Names in a row, or their number when there are too many to read. */

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { clockWords, dataWords, durationWords, faultWords, nameWords, orderName, outcomeWords, waitingWords } from '../src/words';
+import { clockWords, dataWords, durationWords, faultWords, nameWords, orderName, outcomeWords, overWords, waitingWords } from '../src/words';
 
 test('a b-thread elsewhere that blocks is named with its node', () => {
   assert.equal(waitingWords('ground/main#hold'), 'held by ground/main: hold');
@@ -36,7 +36,7 @@ test('the clock carries tenths into seconds and seconds into minutes', () => {
 });
 
 test('the reason comes first among the data, the place last', () => {
-  assert.equal(dataWords({ leg: 1, x: 1, y: 2.04, z: 3, why: 'new waypoint' }), 'new waypoint · leg 1 · at 1.0, 2.0, 3.0');
+  assert.equal(dataWords({ leg: 1, x: 1, y: 2.04, z: 3, why: 'new waypoint' }), 'new waypoint · leg 2 · at 1.0, 2.0, 3.0');
   assert.equal(dataWords({ length_m: 12.345, lands: true, odd: null }), 'length m 12.35 · lands yes · odd null');
   assert.equal(dataWords({ what: 'hold' }), 'hold');
   assert.equal(dataWords({}), '');
@@ -57,4 +57,15 @@ test('long rows of names are cut', () => {
 
 test('orders are named as on their buttons', () => {
   assert.deepEqual(['hold', 'goto', 'hand_back'].map(orderName), ['Hold', 'Go to', 'Hand back']);
+});
+
+test('ways that no mission leads along have words and no number', () => {
+  assert.equal(dataWords({ leg: -1 }), 'way home');
+  assert.equal(dataWords({ leg: -2, x: 1, y: 2, z: 3 }), "operator's point · at 1.0, 2.0, 3.0");
+});
+
+test('after the end of a mission nothing is said to be lost, and where its recording is', () => {
+  const words = overWords({ succeeded: true, failed: {} }, 3, 'out/forest-1/mission.mcap');
+  assert.equal(words, 'Mission complete: 3 of 3 arrived. The station has ended; you see how it left the swarm. It is recorded in out/forest-1/mission.mcap.');
+  assert.ok(!overWords({ succeeded: false, failed: { 'uav/1': 'battery low' } }, 3, '').includes('recorded'));
 });

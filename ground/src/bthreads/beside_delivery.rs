@@ -1,4 +1,4 @@
-//! Brings to one vehicle what stands beside its flight: scripts, and who holds it.
+//! Brings to one vehicle what stands beside its flight: scripts, routes, and who holds it.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -7,13 +7,13 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_dbp::NodeName;
 use skein_dbp::facts::Unknown;
-use skein_wire::event::{Declared as _, Events as _, Handover, Load, OrderGiven, Unload, What};
+use skein_wire::event::{Declared as _, Events as _, Handover, Load, OrderGiven, OrderTaken, Unload, What};
 
 use super::GOING_LASTS;
 use crate::order::{ordered, ordered_for};
 
-/// Requests `load` and `unload`, or `handover`, at one vehicle, in the order in which they were given, until each is taken
-/// in. Scripts and handovers have a b-thread each, so that neither waits for the other.
+/// Requests `load` and `unload`, or `order` with a route, or `handover`, at one vehicle, in the order in which they were
+/// given, until each is taken in. Each kind has a b-thread of its own, so that none waits for another.
 ///
 /// One that is not taken in for [`GOING_LASTS`] is not brought any more, and neither is one whose vehicle has restarted
 /// meanwhile: whoever gave it is told so, and may give it again.
@@ -32,6 +32,11 @@ impl BesideDelivery {
         Self::new(ground, vehicle, What::is_about_script)
     }
 
+    /// Brings routes to `vehicle`; named [`name_for_routes`](Self::name_for_routes).
+    pub fn of_routes(ground: NodeName, vehicle: NodeName) -> Self {
+        Self::new(ground, vehicle, |what| what == What::Route)
+    }
+
     /// Brings to `vehicle` who holds it; named [`name_for_handovers`](Self::name_for_handovers).
     pub fn of_handovers(ground: NodeName, vehicle: NodeName) -> Self {
         Self::new(ground, vehicle, What::is_handover)
@@ -47,14 +52,20 @@ impl BesideDelivery {
     }
 
     /// The name it runs under.
+    pub fn name_for_routes(vehicle: &NodeName) -> String {
+        format!("routes for {vehicle}")
+    }
+
+    /// The name it runs under.
     pub fn name_for_handovers(vehicle: &NodeName) -> String {
         format!("handovers for {vehicle}")
     }
 
     fn to_bring(&self, ordered: &Event) -> Option<Event> {
-        let OrderGiven { what, by, to, name, script, .. } = OrderGiven::read(ordered)?;
+        let OrderGiven { what, by, to, name, script, way, .. } = OrderGiven::read(ordered)?;
         Some(match what {
             What::Load => Load { name, script: script?, by: Some(by) }.at(&self.vehicle),
+            What::Route => OrderTaken { way, ..OrderTaken::plain(what, &by) }.at(&self.vehicle),
             What::Unload => Unload { name: name?, by: Some(by) }.at(&self.vehicle),
             what => Handover { what, by, to }.at(&self.vehicle),
         })

@@ -40,6 +40,8 @@ pub fn load(program: &mut Program, config: &GroundConfig) {
         program.add(Delivery::name(vehicle), Delivery::new(ground.clone(), vehicle.clone()));
         let scripts = BesideDelivery::of_scripts(ground.clone(), vehicle.clone());
         program.add(BesideDelivery::name_for_scripts(vehicle), scripts);
+        let routes = BesideDelivery::of_routes(ground.clone(), vehicle.clone());
+        program.add(BesideDelivery::name_for_routes(vehicle), routes);
         let handovers = BesideDelivery::of_handovers(ground.clone(), vehicle.clone());
         program.add(BesideDelivery::name_for_handovers(vehicle), handovers);
     }

@@ -6,6 +6,7 @@ mod explain;
 mod order;
 mod recording;
 mod serve;
+mod status;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -50,6 +51,8 @@ enum Command {
     Certificates(certificates::Certificates),
     #[command(flatten)]
     Order(order::OrderCommand),
+    /// Say where each vehicle of a station that runs is, what it does and for whom it waits.
+    Status(caller::Call),
     /// Explain why vehicles of a recorded mission moved or stood still: who requested what, who blocked it, and what
     /// would have to change.
     Explain {
@@ -76,6 +79,7 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
             serve(config, &known, *until_over, *incarnation, cli.json)
         }
         Command::Certificates(args) => certificates::run(args, cli.json),
+        Command::Status(call) => status::run(call, cli.json),
         Command::Order(order) => order::run(order, cli.json),
         Command::Explain { file, at, vehicle } => explain::run(file, *at, vehicle.as_deref(), cli.json),
     };

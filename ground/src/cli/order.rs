@@ -1,12 +1,15 @@
 //! Orders from the shell, to a station that runs: the console's buttons as commands.
 
 use std::io::{IsTerminal as _, Write as _};
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+use anyhow::Context as _;
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 use skein_wire::event::{OrderGiven, What};
+use skein_wire::{Route, UnfitRoute};
 
 use super::caller::{Call, Caller};
 
@@ -33,6 +36,18 @@ pub(super) enum OrderCommand {
         /// Metres east, north, and up; without the last each keeps its height.
         #[arg(long, value_name = "X,Y[,Z]", value_delimiter = ',', num_args = 2..=3, allow_negative_numbers = true, required = true)]
         place: Vec<f64>,
+    },
+    /// A vehicle flies these points instead of what is left of its mission, and lands under the last. It refuses those
+    /// outside its fence or in a zone, and an end beside another vehicle's place.
+    Route {
+        /// Points in metres east, north and up, such as "0,20,3 15,20,3", or a file with one on each line.
+        #[arg(value_name = "POINTS|FILE", allow_hyphen_values = true)]
+        route: String,
+        /// Number or name of the vehicle, such as 3 or uav/3.
+        #[arg(long, value_name = "VEHICLE")]
+        vehicle: String,
+        #[command(flatten)]
+        call: Call,
     },
     /// Vehicles fly by themselves again: the pilot has let go.
     HandBack(Addressed),
@@ -101,6 +116,12 @@ pub(super) fn run(order: &OrderCommand, as_json: bool) -> anyhow::Result<ExitCod
             request["point"] = json!([place[0], place[1], place.get(2)]);
             (call, request)
         }
+        OrderCommand::Route { route, vehicle, call } => {
+            let points = route_points(route)?;
+            let vehicle = if vehicle.contains('/') { vehicle.clone() } else { format!("uav/{vehicle}") };
+            let what = What::Route.word();
+            (call, json!({ "type": "order", "what": what, "to": [vehicle], "points": points.points() }))
+        }
         OrderCommand::Give { to, to_whom } => {
             let (call, mut request) = to.request(What::Give);
             request["name"] = json!(to_whom);
@@ -117,6 +138,23 @@ pub(super) fn run(order: &OrderCommand, as_json: bool) -> anyhow::Result<ExitCod
     tell(&order, as_json);
     let all = answers(&order).all(|(_, answer)| answer["state"] == "acknowledged");
     Ok(ExitCode::from(u8::from(!all)))
+}
+
+/// The points that the argument names, or those of the file whose path it is.
+fn route_points(given: &str) -> anyhow::Result<Route> {
+    let path = Path::new(given);
+    if !path.is_file() {
+        return points_in(given.split_whitespace()).with_context(|| {
+            format!("{given}: expected points such as \"0,20,3 15,20,3\", or a file with one on each line")
+        });
+    }
+    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    let lines = text.lines().map(|line| line.split('#').next().unwrap_or_default().trim());
+    points_in(lines.filter(|line| !line.is_empty())).with_context(|| path.display().to_string())
+}
+
+fn points_in<'a>(points: impl Iterator<Item = &'a str>) -> Result<Route, UnfitRoute> {
+    points.map(|point| point.replace(',', " ")).collect::<Vec<_>>().join("; ").parse()
 }
 
 fn for_all(what: What) -> Value {
@@ -193,4 +231,24 @@ fn confirmed(offer: &Value) -> anyhow::Result<bool> {
     let mut answer = String::new();
     std::io::stdin().read_line(&mut answer)?;
     Ok(matches!(answer.trim(), "y" | "yes"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_route_is_read_from_the_line_or_from_a_file() {
+        let points = [[-3.0, 4.5, 3.0], [6.0, 7.0, 8.0]];
+        assert_eq!(route_points("-3,4.5,3 6,7,8").unwrap().points(), points);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("route.csv");
+        std::fs::write(&path, "# Round the hut.\n-3, 4.5, 3\n\n6, 7, 8 # back\n").unwrap();
+        assert_eq!(route_points(path.to_str().unwrap()).unwrap().points(), points);
+        std::fs::write(&path, "1, 2\n").unwrap();
+        let error = format!("{:#}", route_points(path.to_str().unwrap()).unwrap_err());
+        assert!(error.contains("route.csv: point 1, `1  2`"), "{error}");
+        let error = format!("{:#}", route_points("nowhere.csv").unwrap_err());
+        assert!(error.contains("nowhere.csv: expected points such as"), "{error}");
+    }
 }

@@ -15,7 +15,7 @@ use skein_wire::event::{Advance, Declared as _, Homeward};
 use skein_wire::{Scene, State};
 
 use crate::core::GroundCore;
-use crate::recorder::{Level, Recorder, RecorderError};
+use crate::recorder::{Level, Recorder, RecorderError, keep_former};
 
 /// Planned paths are recorded this often.
 const PATH_PERIOD: Duration = Duration::from_millis(500);
@@ -97,7 +97,7 @@ impl Recording {
             self.write(move |recorder| recorder.trace(&name, &traced));
             // The trace holds every leave to move; people do not need to read each.
             if !matches!(happened.event.kind(), Advance::NAME | Homeward::NAME) {
-                self.note(now, Level::Info, happened.home.as_str(), &happened.event.to_string());
+                self.note(now, Level::Info, happened.home.as_str(), &format!("{:#}", happened.event));
             }
         }
         let heard: Vec<&State> = station.roster().filter_map(|(_, state)| state).collect();
@@ -176,7 +176,7 @@ fn record(folder: &Path, most_bytes: u64, writes: &Receiver<Write>) -> anyhow::R
     if let Some(why) = room.is_full().filter(|_| !path.exists()) {
         anyhow::bail!("`{}` is not begun: {why}", path.display());
     }
-    keep_former(folder, &path)?;
+    keep_former(&path)?;
     let mut recorder = Recorder::create(&path)?;
     for write in writes {
         if let Some(why) = room.is_full() {
@@ -186,16 +186,6 @@ fn record(folder: &Path, most_bytes: u64, writes: &Receiver<Write>) -> anyhow::R
         write(&mut recorder)?;
     }
     Ok(recorder.finish()?)
-}
-
-fn keep_former(folder: &Path, path: &Path) -> anyhow::Result<()> {
-    if !path.exists() {
-        return Ok(());
-    }
-    let numbered = |number: u32| folder.join(format!("mission-{number}.mcap"));
-    let Some(kept) = (1..).map(numbered).find(|path| !path.exists()) else { return Ok(()) };
-    let why = || format!("{}: cannot be kept as {}", path.display(), kept.display());
-    std::fs::rename(path, &kept).with_context(why)
 }
 
 /// Where a vehicle says that it is; it does not say how it is tilted.

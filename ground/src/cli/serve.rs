@@ -68,6 +68,7 @@ impl Station {
         let link = session.listen(Key::subscriptions_with_boards(&fleet, &config.station.name))?;
         let scenes = session.listen(vec![Key::pattern::<Scene>(&fleet)])?;
         let bell = link.bell();
+        let recording_path = config.record.join("mission.mcap");
         let recording = Recording::begin(config.record, config.record_most_bytes)?;
         let wake = {
             let bell = bell.clone();
@@ -114,6 +115,7 @@ impl Station {
             );
             core.note_disk("former promises", Some(&why));
         }
+        console.note_recording(&recording_path);
         console.show_scene(&core, None);
         let complaints = Complaints::default();
         Ok(Self {

@@ -35,6 +35,8 @@ pub(super) struct Feed {
     fleet_due: Duration,
     reasons_due: Duration,
     orders_shown: Option<u64>,
+    /// The file in which the mission is recorded; empty if it is not.
+    pub(super) recording: String,
 }
 
 /// A message for browsers.
@@ -47,6 +49,8 @@ pub(super) enum Message<'a> {
         fleet: &'a str,
         station: &'a str,
         software: &'static str,
+        /// The file in which the mission is recorded; empty if it is not.
+        recording: &'a str,
         bounds: Option<Bounds>,
         obstacles: Vec<Obstacle>,
     },
@@ -241,8 +245,13 @@ pub(super) struct EventView<'a> {
 impl Feed {
     pub(super) fn new() -> (Self, Subscription) {
         let (browsers, subscription) = Broadcast::new();
-        let feed =
-            Self { browsers, fleet_due: Duration::ZERO, reasons_due: Duration::ZERO, orders_shown: None };
+        let feed = Self {
+            browsers,
+            fleet_due: Duration::ZERO,
+            reasons_due: Duration::ZERO,
+            orders_shown: None,
+            recording: String::new(),
+        };
         (feed, subscription)
     }
 
@@ -261,6 +270,7 @@ impl Feed {
             fleet: station.node().fleet().as_str(),
             station: station.name().as_str(),
             software: env!("CARGO_PKG_VERSION"),
+            recording: &self.recording,
             bounds: scene.map(|scene| Bounds { min: scene.min.into(), max: scene.max.into() }),
             obstacles: obstacles.collect(),
         };

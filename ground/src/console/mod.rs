@@ -22,6 +22,7 @@ mod token;
 
 use std::collections::BTreeSet;
 use std::net::SocketAddr;
+use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
 
@@ -49,8 +50,8 @@ pub enum ConsoleError {
     NotLoopback { address: SocketAddr },
     #[error(transparent)]
     Security(#[from] ConsoleSecurityError),
-    #[error("console address `{address}`: {source}; use another port, or 0 for any that is free")]
-    Listen { address: SocketAddr, source: std::io::Error },
+    #[error("console address `{address}`: {cause}; use another port, or 0 for any that is free")]
+    Listen { address: SocketAddr, cause: std::io::Error },
     #[error("the console's thread cannot be started: {0}")]
     Thread(std::io::Error),
 }
@@ -81,7 +82,7 @@ impl Console {
         }
         let tls = security.map(ConsoleSecurity::open).transpose()?;
         let scheme = if tls.is_some() { "https" } else { "http" };
-        let listen = |source| ConsoleError::Listen { address, source };
+        let listen = |cause| ConsoleError::Listen { address, cause };
         let listener = std::net::TcpListener::bind(address).map_err(listen)?;
         listener.set_nonblocking(true).map_err(listen)?;
         let bound = listener.local_addr().map_err(listen)?;
@@ -98,6 +99,11 @@ impl Console {
     /// The address for a browser.
     pub fn url(&self) -> String {
         format!("{}://{}", self.scheme, self.address)
+    }
+
+    /// Names the file in which the mission is recorded, with the next scene.
+    pub fn note_recording(&mut self, path: &Path) {
+        self.feed.recording = path.display().to_string();
     }
 
     /// Shows what stands in the world, if that is known.

@@ -6,6 +6,7 @@ use std::sync::mpsc::SyncSender;
 use serde::Deserialize;
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_dbp::NodeName;
+use skein_wire::Route;
 use skein_wire::event::{OrderGiven, What};
 use tokio::sync::oneshot;
 
@@ -136,6 +137,10 @@ pub(super) struct OrderMessage {
     #[serde(default)]
     #[cfg_attr(test, ts(optional))]
     point: Option<(f64, f64, Option<f64>)>,
+    /// For `route`: the points, metres ENU.
+    #[serde(default)]
+    #[cfg_attr(test, ts(optional))]
+    points: Option<Vec<[f64; 3]>>,
     /// For `load`: a script with values for its parameters.
     #[serde(default)]
     #[cfg_attr(test, ts(optional, type = "{ script: unknown, with: Record<string, unknown> }"))]
@@ -225,7 +230,7 @@ impl OrderMessage {
     }
 }
 
-fn order(OrderMessage { what, to, point, script, name, .. }: OrderMessage) -> Result<Order, String> {
+fn order(OrderMessage { what, to, point, points, script, name, .. }: OrderMessage) -> Result<Order, String> {
     let who = match to {
         To::Word(word) if word == OrderGiven::ALL => Who::All,
         To::Word(word) => return Err(format!("`to` is {word:?}: expected \"all\" or a list of vehicles")),
@@ -258,6 +263,14 @@ fn order(OrderMessage { what, to, point, script, name, .. }: OrderMessage) -> Re
                 return Err("`point` must be finite numbers".into());
             }
             Order::GoTo(who, Destination { x, y, z })
+        }
+        What::Route => {
+            // Two on one way would meet at its end.
+            if !matches!(&who, Who::These(vehicles) if vehicles.len() == 1) {
+                return Err("a route is for one vehicle: name it in `to`".into());
+            }
+            let points = points.ok_or("`route` needs `points`: [[x, y, z], ...], metres")?;
+            Order::Route(who, Route::new(points).map_err(|error| error.to_string())?)
         }
         what => Order::plain(what, who).ok_or("this order needs more than its word")?,
     })
@@ -349,6 +362,9 @@ mod tests {
             (r#"{"type":"order","what":"goto","to":"all","point":[1e999,0,0]}"#, "number out of range"),
             (r#"{"type":"order","what":"launch","to":["uav/1"]}"#, "for all"),
             (r#"{"type":"order","what":"abort","to":["uav/1"]}"#, "for all"),
+            (r#"{"type":"order","what":"route","to":["uav/1"]}"#, "`points`"),
+            (r#"{"type":"order","what":"route","to":["uav/1"],"points":[]}"#, "a route of 0 points"),
+            (r#"{"type":"order","what":"route","to":"all","points":[[1,2,3]]}"#, "for one vehicle"),
             (r#"{"type":"why","vehicle":"uav"}"#, "`uav` is not a node name"),
             (r#"{"type":"order","what":"load","to":"all"}"#, "needs a `script`"),
             (r#"{"type":"order","what":"unload","to":"all"}"#, "needs the `name`"),

@@ -111,7 +111,7 @@ impl From<&Happened> for EventNote {
     fn from(happened: &Happened) -> Self {
         Self {
             time_s: happened.at.as_secs_f64(),
-            event: happened.event.to_string(),
+            event: format!("{:#}", happened.event),
             home: happened.home.to_string(),
             requested_by: happened.requested_by.iter().map(ToString::to_string).collect(),
             choice: happened.choice.as_deref().map(Into::into),

@@ -90,7 +90,7 @@ fn requests(board: &Board) -> Vec<Request> {
     let of_row = |row: &skein_dbp::BoardRow| {
         let (by, priority) = (row.bthread.clone(), row.priority);
         let request = move |request: &skein_dbp::BoardRequest| Request {
-            event: request.event.to_string(),
+            event: format!("{:#}", request.event),
             by: by.clone(),
             priority,
             blocked_by: request.blocked_by.iter().map(|name| blocker(board, name)).collect(),

@@ -15,12 +15,12 @@ use super::messages::Messages;
 /// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordedError {
-    #[error("{}: {source}", path.display())]
-    Open { path: PathBuf, source: std::io::Error },
-    #[error("{} is no recording that can be read: {source}; expected an MCAP file such as mission.mcap", path.display())]
-    Unreadable { path: PathBuf, source: McapError },
-    #[error("{}: a message on {topic} at {at_s:.3} s cannot be read: {source}", path.display())]
-    Message { path: PathBuf, topic: String, at_s: f64, source: DecodeError },
+    #[error("{}: {cause}", path.display())]
+    Open { path: PathBuf, cause: std::io::Error },
+    #[error("{} is no recording that can be read: {cause}; expected an MCAP file such as mission.mcap", path.display())]
+    Unreadable { path: PathBuf, cause: McapError },
+    #[error("{}: a message on {topic} at {at_s:.3} s cannot be read: {cause}", path.display())]
+    Message { path: PathBuf, topic: String, at_s: f64, cause: DecodeError },
 }
 
 /// A recording of boards, events and states of vehicles. Times are the run's, from 0.
@@ -40,13 +40,13 @@ impl Recorded {
     /// Reads a recording. One that was cut short counts as far as it goes.
     pub fn open(path: &Path) -> Result<Self, RecordedError> {
         let file =
-            std::fs::read(path).map_err(|source| RecordedError::Open { path: path.to_owned(), source })?;
+            std::fs::read(path).map_err(|cause| RecordedError::Open { path: path.to_owned(), cause })?;
         Self::read(&file, path)
     }
 
     /// Reads the content of a recording, which errors call by `path`.
     pub fn read(file: &[u8], path: &Path) -> Result<Self, RecordedError> {
-        let unreadable = |source| RecordedError::Unreadable { path: path.to_owned(), source };
+        let unreadable = |cause| RecordedError::Unreadable { path: path.to_owned(), cause };
         let mut messages = Messages::of(file);
         let mut recorded = Self {
             notes: Vec::new(),
@@ -61,15 +61,15 @@ impl Recorded {
                     recorded.complete = false;
                     break;
                 }
-                Err(source) => return Err(unreadable(source)),
+                Err(cause) => return Err(unreadable(cause)),
             };
             let at = Duration::from_nanos(header.log_time);
             recorded.span = (recorded.span.0.min(at), recorded.span.1.max(at));
-            let note = note(messages.schema(&header), &data).map_err(|source| RecordedError::Message {
+            let note = note(messages.schema(&header), &data).map_err(|cause| RecordedError::Message {
                 path: path.to_owned(),
                 topic: messages.topic(&header).unwrap_or_default().to_owned(),
                 at_s: at.as_secs_f64(),
-                source,
+                cause,
             })?;
             recorded.notes.extend(note.map(|note| (at, note)));
         }

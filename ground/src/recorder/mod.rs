@@ -52,10 +52,26 @@ const WORLD: &str = "world";
 /// Why a recording cannot be made or continued.
 #[derive(Debug, Error)]
 pub enum RecorderError {
-    #[error("cannot record to `{}`: {source}; give a folder that can be written to", path.display())]
-    Create { path: PathBuf, source: std::io::Error },
-    #[error("recording to `{}` failed: {source}", path.display())]
-    Write { path: PathBuf, source: McapError },
+    #[error("cannot record to `{}`: {cause}; give a folder that can be written to", path.display())]
+    Create { path: PathBuf, cause: std::io::Error },
+    #[error("recording to `{}` failed: {cause}", path.display())]
+    Write { path: PathBuf, cause: McapError },
+}
+
+/// Keeps a recording that is there already beside the one to come: `mission.mcap` as `mission-1.mcap`, or with the first
+/// number that is free.
+///
+/// # Errors
+/// [`RecorderError::Create`]: it cannot be renamed.
+pub fn keep_former(path: &Path) -> Result<(), RecorderError> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let numbered = |number: u32| path.with_file_name(format!("{stem}-{number}.mcap"));
+    match (1..).map(numbered).find(|kept| !kept.exists()).filter(|_| path.exists()) {
+        Some(kept) => {
+            std::fs::rename(path, &kept).map_err(|cause| RecorderError::Create { path: kept.clone(), cause })
+        }
+        None => Ok(()),
+    }
 }
 
 /// Writes one mission to a file.
@@ -106,7 +122,7 @@ struct Channel {
 impl Recorder {
     /// Makes the file, and the folders above it, if they are missing; a file that is there is replaced.
     pub fn create(path: &Path) -> Result<Self, RecorderError> {
-        let failed = |source| RecorderError::Create { path: path.to_owned(), source };
+        let failed = |cause| RecorderError::Create { path: path.to_owned(), cause };
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder).map_err(failed)?;
         }
@@ -115,7 +131,7 @@ impl Recorder {
         let options = WriteOptions::new().compression(Some(Compression::Lz4)).library(library);
         let writer = options
             .create(BufWriter::new(file))
-            .map_err(|source| RecorderError::Write { path: path.to_owned(), source })?;
+            .map_err(|cause| RecorderError::Write { path: path.to_owned(), cause })?;
         Ok(Self {
             path: path.to_owned(),
             writer,
@@ -250,7 +266,7 @@ impl Recorder {
     pub fn finish(mut self) -> Result<(), RecorderError> {
         match self.writer.finish() {
             Ok(_) => Ok(()),
-            Err(source) => Err(self.failed(source)),
+            Err(cause) => Err(self.failed(cause)),
         }
     }
 
@@ -286,7 +302,7 @@ impl Recorder {
     ) -> Result<MessageHeader, RecorderError> {
         if !self.channels.contains_key(topic) {
             let (name, data) = schema();
-            let id = self.open_channel(topic, name, data).map_err(|source| self.failed(source))?;
+            let id = self.open_channel(topic, name, data).map_err(|cause| self.failed(cause))?;
             self.channels.insert(topic.to_owned(), Channel { id, sequence: 0 });
         }
         let channel = self.channels.entry(topic.to_owned()).or_insert(Channel { id: 0, sequence: 0 });
@@ -310,7 +326,7 @@ impl Recorder {
         encode(&mut self.buffer);
         let header = MessageHeader { log_time: nanos(self.newest), publish_time: nanos(now), ..header };
         let written = self.writer.write_to_known_channel(&header, &self.buffer);
-        written.and_then(|()| self.close_chunk_if_due()).map_err(|source| self.failed(source))
+        written.and_then(|()| self.close_chunk_if_due()).map_err(|cause| self.failed(cause))
     }
 
     fn close_chunk_if_due(&mut self) -> Result<(), McapError> {
@@ -321,8 +337,8 @@ impl Recorder {
         self.writer.flush()
     }
 
-    fn failed(&self, source: McapError) -> RecorderError {
-        RecorderError::Write { path: self.path.clone(), source }
+    fn failed(&self, cause: McapError) -> RecorderError {
+        RecorderError::Write { path: self.path.clone(), cause }
     }
 }
 

@@ -196,11 +196,13 @@ impl Hash for Event {
     }
 }
 
+/// Name and data; with `{:#}` for people, whose numbers have two decimals.
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())?;
         for (at, (key, value)) in self.data().enumerate() {
-            write!(f, "{}{key}: {value}", if at == 0 { "{" } else { ", " })?;
+            write!(f, "{}{key}: ", if at == 0 { "{" } else { ", " })?;
+            value.fmt(f)?;
         }
         f.write_str(if self.0.data.is_empty() { "" } else { "}" })
     }

@@ -204,6 +204,7 @@ impl fmt::Display for Value {
         match self {
             Self::Bool(b) => b.fmt(f),
             Self::Int(n) => n.fmt(f),
+            Self::Real(x) if f.alternate() => Real((x.get() * 100.0).round() / 100.0).fmt(f),
             Self::Real(x) => x.fmt(f),
             Self::Text(text) => write!(f, "{text:?}"),
         }
@@ -236,6 +237,15 @@ mod tests {
             Just(Value::from(f64::NAN)),
             Just(Value::from("2")),
         ]
+    }
+
+    #[test]
+    fn people_read_two_decimals_and_nobody_else_loses_any() {
+        let length = Value::from(64.925_829_609_037_45);
+        assert_eq!(format!("{length:#} {:#} {:#}", Value::from(3.0), Value::from(7)), "64.93 3.0 7");
+        assert_eq!(length.to_string(), "64.92582960903745");
+        let event = crate::Event::new("uav/1/planned").with("length_m", 64.925_829_609_037_45);
+        assert_eq!(format!("{event:#}"), "uav/1/planned{length_m: 64.93}");
     }
 
     #[test]

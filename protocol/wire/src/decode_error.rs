@@ -18,8 +18,8 @@ pub enum DecodeError {
     Missing { field: &'static str },
     #[error("`{field}` is {given}: expected {expected}")]
     Range { field: &'static str, given: String, expected: &'static str },
-    #[error("`{field}`: {source}")]
-    Name { field: &'static str, source: NodeNameError },
-    #[error("`{field}`: {source}")]
-    Bound { field: &'static str, source: Exceeded },
+    #[error("`{field}`: {cause}")]
+    Name { field: &'static str, cause: NodeNameError },
+    #[error("`{field}`: {cause}")]
+    Bound { field: &'static str, cause: Exceeded },
 }

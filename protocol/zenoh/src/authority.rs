@@ -29,8 +29,8 @@ const HERE: [&str; 3] = ["localhost", "127.0.0.1", "::1"];
 /// Why certificates cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum AuthorityError {
-    #[error("`{}`: {source}", path.display())]
-    File { path: PathBuf, source: io::Error },
+    #[error("`{}`: {cause}", path.display())]
+    File { path: PathBuf, cause: io::Error },
     #[error("`{}`: {fault}", path.display())]
     Unsound { path: PathBuf, fault: String },
     #[error("{node} and {other} would have one file, {file}: give one of them another name")]
@@ -82,7 +82,7 @@ impl Authority {
     /// # Errors
     /// A file that is not sound, or cannot be written.
     pub fn open(folder: &Path, fleet: &str, now: SystemTime) -> Result<Self, AuthorityError> {
-        fs::create_dir_all(folder).map_err(|source| AuthorityError::File { path: folder.into(), source })?;
+        fs::create_dir_all(folder).map_err(|cause| AuthorityError::File { path: folder.into(), cause })?;
         let (path, key_path) = (folder.join(AUTHORITY), folder.join(AUTHORITY_KEY));
         let issuer = match path.exists() || key_path.exists() {
             true => {
@@ -240,12 +240,12 @@ fn hosts_of(certificate: &Path) -> Vec<String> {
 }
 
 fn read(path: &Path) -> Result<String, AuthorityError> {
-    fs::read_to_string(path).map_err(|source| AuthorityError::File { path: path.into(), source })
+    fs::read_to_string(path).map_err(|cause| AuthorityError::File { path: path.into(), cause })
 }
 
 /// Replaces a file whole; nobody else reads what is not for others, not even while it is written.
 fn write(path: &Path, text: &str, mode: u32) -> Result<(), AuthorityError> {
-    let failed = |source| AuthorityError::File { path: path.into(), source };
+    let failed = |cause| AuthorityError::File { path: path.into(), cause };
     let beside = path.with_extension("new");
     // Of an attempt before, with rights that may be others.
     let _ = fs::remove_file(&beside);

@@ -126,7 +126,7 @@ impl ZenohConfig {
         let (settings, listen) = self.settings()?;
         let mut config = zenoh::Config::default();
         for (key, value) in settings {
-            config.insert_json5(key, &value).map_err(|source| ZenohError::Config { key, value, source })?;
+            config.insert_json5(key, &value).map_err(|cause| ZenohError::Config { key, value, cause })?;
         }
         Ok((config, listen))
     }
@@ -268,7 +268,7 @@ impl<'a> Endpoint<'a> {
             return Ok(self.text.into());
         }
         let free = TcpListener::bind(format!("{}:0", self.host)).and_then(|listener| listener.local_addr());
-        let free = free.map_err(|source| ZenohError::NoPort { endpoint: self.text.into(), source })?;
+        let free = free.map_err(|cause| ZenohError::NoPort { endpoint: self.text.into(), cause })?;
         let protocol = if self.encrypted { "tls" } else { "tcp" };
         Ok(format!("{protocol}/{}:{}", self.host, free.port()))
     }

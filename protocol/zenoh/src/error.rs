@@ -40,14 +40,14 @@ pub enum ZenohError {
     NoRelay { node: NodeName },
     #[error("`mode = \"client\"` needs a router to connect to: name its endpoint in `connect`")]
     ClientOfNobody,
-    #[error("no free port for `{endpoint}`: {source}")]
-    NoPort { endpoint: String, source: std::io::Error },
-    #[error("Zenoh refuses the setting `{key}` = {value}: {source}")]
-    Config { key: &'static str, value: String, source: zenoh::Error },
-    #[error("cannot open a Zenoh session on {listen:?}: {source}")]
-    Open { listen: Vec<String>, source: zenoh::Error },
-    #[error("cannot subscribe to `{pattern}`: {source}")]
-    Subscribe { pattern: String, source: zenoh::Error },
+    #[error("no free port for `{endpoint}`: {cause}")]
+    NoPort { endpoint: String, cause: std::io::Error },
+    #[error("Zenoh refuses the setting `{key}` = {value}: {cause}")]
+    Config { key: &'static str, value: String, cause: zenoh::Error },
+    #[error("cannot open a Zenoh session on {listen:?}: {cause}")]
+    Open { listen: Vec<String>, cause: zenoh::Error },
+    #[error("cannot subscribe to `{pattern}`: {cause}")]
+    Subscribe { pattern: String, cause: zenoh::Error },
     #[error("the session has ended")]
     ThreadGone,
 }

@@ -160,7 +160,7 @@ fn open(config: &ZenohConfig) -> Result<(zenoh::Session, Vec<String>), ZenohErro
                 return Ok((session, listen));
             }
             Err(_) if tries > 0 => {}
-            Err(source) => return Err(ZenohError::Open { listen, source }),
+            Err(cause) => return Err(ZenohError::Open { listen, cause }),
         }
     }
 }
@@ -341,5 +341,5 @@ fn subscribe(
         .declare_subscriber(pattern.clone())
         .callback(heard)
         .wait()
-        .map_err(|source| ZenohError::Subscribe { pattern, source })
+        .map_err(|cause| ZenohError::Subscribe { pattern, cause })
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use super::call_off::{self, CalledOff};
+use super::call_off::{self, CalledOff, MissionClock};
 use super::setup::vehicle_name;
 use super::{account, live};
 use crate::cli::{self, Setup};
@@ -26,7 +26,7 @@ pub fn fly(
     let setup = Setup {
         network: args.network,
         port_offset: args.port_offset,
-        launch_on_order: false,
+        launch_on_order: args.launch_on_order,
         secure: args.secure,
     };
     let programs = Programs { agent: args.agent.clone(), ground: args.ground.clone() };
@@ -37,6 +37,7 @@ pub fn fly(
     let began = Instant::now();
     let mut called_off: Option<CalledOff> = None;
     let mut look_due = Duration::ZERO;
+    let mut clock = MissionClock::new(scenario.launch_on_order);
     loop {
         swarm.step();
         let now = swarm.world().simulation().now();
@@ -58,8 +59,9 @@ pub fn fly(
         if is_over {
             break;
         }
+        let flown = clock.time(now, swarm.world().is_grounded());
         if called_off.is_none() {
-            let limit = call_off::reason(now, scenario.time_limit_s).map(str::to_owned);
+            let limit = call_off::reason(flown, scenario.time_limit_s).map(str::to_owned);
             if let Some(why) = limit.or_else(|| swarm.ended()) {
                 swarm.call_off();
                 called_off = Some(CalledOff { why, at: now });

@@ -19,11 +19,33 @@ impl CalledOff {
     }
 }
 
-/// The reason why a mission is to be called off now, if there is one.
-pub fn reason(now: Duration, time_limit_s: f64) -> Option<&'static str> {
+/// The time that counts towards a mission's limit: from the start on, or from the first take-off on where that waits for
+/// an order.
+pub struct MissionClock {
+    waits: bool,
+    began: Duration,
+}
+
+impl MissionClock {
+    pub fn new(launch_on_order: bool) -> Self {
+        Self { waits: launch_on_order, began: Duration::ZERO }
+    }
+
+    /// The mission's time at `now`, when everybody is on the ground or not.
+    pub fn time(&mut self, now: Duration, is_grounded: bool) -> Duration {
+        self.waits &= is_grounded;
+        if self.waits {
+            self.began = now;
+        }
+        now.saturating_sub(self.began)
+    }
+}
+
+/// The reason why a mission that has taken so long is to be called off now, if there is one.
+pub fn reason(flown: Duration, time_limit_s: f64) -> Option<&'static str> {
     if interruptions() > 0 {
         Some("interrupted")
-    } else if now.as_secs_f64() > time_limit_s {
+    } else if flown.as_secs_f64() > time_limit_s {
         Some("the time limit was reached")
     } else {
         None
@@ -44,4 +66,19 @@ static INTERRUPTIONS: LazyLock<Arc<AtomicU32>> = LazyLock::new(|| {
 /// Counts the user's signals to stop, from the first call on.
 pub fn interruptions() -> u32 {
     INTERRUPTIONS.load(Ordering::Relaxed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_waits_for_an_order_to_launch_does_not_use_up_the_missions_time() {
+        let at = Duration::from_secs;
+        let mut at_once = MissionClock::new(false);
+        assert_eq!(at_once.time(at(20), true), at(20));
+        let mut waits = MissionClock::new(true);
+        assert_eq!([waits.time(at(400), true), waits.time(at(401), false)], [Duration::ZERO, at(1)]);
+        assert_eq!(waits.time(at(450), true), at(50), "landed again, it does not wait any more");
+    }
 }

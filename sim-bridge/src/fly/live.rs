@@ -28,13 +28,13 @@ pub fn rows(swarm: &Swarm) -> Vec<Row> {
 /// The live table's header.
 pub fn progress(account: &Account<'_>, wall: Duration) -> Progress {
     let sim_time_s = account.simulation.now().as_secs_f64();
-    let has_arrived = |outcome: &&Option<Outcome>| **outcome == Some(Outcome::Complete);
+    let is_complete = |outcome: &&Option<Outcome>| **outcome == Some(Outcome::Complete);
     Progress {
         sim_time_s,
         realtime_factor: sim_time_s / wall.as_secs_f64().max(1e-9),
         events: account.events.occurred,
         messages: account.network.messages,
-        arrived: account.outcomes.iter().filter(has_arrived).count(),
+        complete: account.outcomes.iter().filter(is_complete).count(),
         vehicles: account.outcomes.len(),
     }
 }

@@ -20,10 +20,11 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use skein_agent::{AgentConfig, Parts};
 use skein_bp::behaviour::Behaviours;
+use skein_ground::recorder::keep_former;
 use skein_ground::{Order, Who};
 use skein_wire::{Fleet, Network, NetworkConfig};
 
-use self::call_off::{CalledOff, interruptions};
+use self::call_off::{CalledOff, MissionClock, interruptions};
 pub use self::{
     recording::Recording,
     setup::{
@@ -50,11 +51,16 @@ const PATIENCE: u32 = 2;
 pub fn run(args: &cli::Fly, known: &Behaviours) -> anyhow::Result<Summary> {
     let mut scenario = args.world.open(known)?;
     args.autopilots.assign(&mut scenario);
+    scenario.launch_on_order |= args.launch_on_order;
     let out = args.out.clone().unwrap_or_else(|| default_folder(&scenario));
     std::fs::create_dir_all(&out).with_context(|| {
         format!("output folder {}: cannot be made; name another with --out", out.display())
     })?;
-    let recording = |out: &Path| Recording::create(&out.join("mission.mcap"), &scenario);
+    let recording = |out: &Path| {
+        let path = out.join("mission.mcap");
+        keep_former(&path)?;
+        Recording::create(&path, &scenario)
+    };
     let mut table = LiveTable::stderr();
     for note in &scenario.notes {
         table.note(note)?;
@@ -62,6 +68,15 @@ pub fn run(args: &cli::Fly, known: &Behaviours) -> anyhow::Result<Summary> {
     anyhow::ensure!(
         !(args.processes && args.clock == Clock::Lockstep),
         "--processes: each process follows the clock on the wall; leave out --clock lockstep"
+    );
+    anyhow::ensure!(
+        args.clock == Clock::Real || args.speed == 1.0,
+        "--speed {}: --clock lockstep is as fast as the processor allows; leave out one of them",
+        args.speed
+    );
+    anyhow::ensure!(
+        args.clock == Clock::Real || !args.launch_on_order,
+        "--launch-on-order: with --clock lockstep nobody is there to order it; leave out one of them"
     );
     anyhow::ensure!(
         !args.processes || args.controller == cli::Controller::Bp,
@@ -89,7 +104,24 @@ pub fn run(args: &cli::Fly, known: &Behaviours) -> anyhow::Result<Summary> {
     };
     let path = out.join("summary.json");
     summary.write(&path).with_context(|| format!("{}: cannot be written", path.display()))?;
+    for line in debrief(&summary, &out.join("mission.mcap")) {
+        LiveTable::stderr().note(&line)?;
+    }
     Ok(summary)
+}
+
+/// Where the flight is recorded, and what to do with that.
+fn debrief(summary: &Summary, recording: &Path) -> Vec<String> {
+    let recording = recording.display();
+    let landed_early = summary.per_vehicle.iter().find(|vehicle| vehicle.reason.is_some());
+    let explain = match landed_early {
+        Some(vehicle) => format!("skein-ground explain {recording} --vehicle {}", vehicle.id),
+        None => format!("skein-ground explain {recording} --at {:.0}", summary.sim_time_s / 2.0),
+    };
+    vec![
+        format!("recording: {recording}, which Foxglove opens as it is"),
+        format!("why a vehicle did what it did: {explain}"),
+    ]
 }
 
 fn in_lockstep(
@@ -182,6 +214,7 @@ struct Flight<'a> {
     recording: Option<Recording>,
     table: Option<LiveTable<std::io::Stderr>>,
     began: Instant,
+    clock: MissionClock,
     /// Why the swarm was ordered to land before its mission was over.
     called_off: Option<CalledOff>,
 }
@@ -200,7 +233,8 @@ impl<'a> Flight<'a> {
         let Agents { configs, parts, controller } = agents;
         let ground = ground_config(scenario, Fleet::new(setup::FLEET)?, controller);
         let swarm = Swarm::with_parts(simulation, configs, &*parts, ground, links)?;
-        Ok(Self { scenario, swarm, recording, table, began: Instant::now(), called_off: None })
+        let clock = MissionClock::new(scenario.launch_on_order);
+        Ok(Self { scenario, swarm, recording, table, began: Instant::now(), clock, called_off: None })
     }
 
     /// Lets the autopilots fly that the scenario's vehicles have.
@@ -246,8 +280,9 @@ impl<'a> Flight<'a> {
 
     fn look_after_limits(&mut self) {
         let now = self.swarm.now();
+        let flown = self.clock.time(now, self.swarm.is_grounded());
         if self.called_off.is_none()
-            && let Some(why) = call_off::reason(now, self.scenario.time_limit_s)
+            && let Some(why) = call_off::reason(flown, self.scenario.time_limit_s)
         {
             self.called_off = Some(CalledOff { why: why.to_owned(), at: now });
             // All are vehicles that there are.

@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     autopilots::make::Make,
-    cli,
+    cli, configure,
     mavlink_ports::MavlinkPorts,
     scenario::Scenario,
     scene_view,
@@ -62,7 +62,9 @@ pub fn fly(
     let heard = Key::subscriptions_with_boards(&fleet, &GROUND);
     let links = Links { vehicles: vehicle_links, ground: Box::new(ground.listen(heard)?) };
 
-    let console = serve_console(args.console)?;
+    let address = args.console.unwrap_or_else(|| configure::console(args.port_offset));
+    let mut console = serve_console(address)?;
+    console.note_recording(&out.join("mission.mcap"));
     table.note(&format!("console: {}", console.url()))?;
     table.note(&format!("other nodes: Zenoh on {}", vehicles.locators().join(", ")))?;
     // PX4 has ports of its own, the same ones.

@@ -93,7 +93,12 @@ impl Recording {
             self.recorder.trace(&happened.home, happened)?;
             // The trace holds every leave to move; people do not need to read each.
             if happened.event.kind() != Advance::NAME {
-                self.recorder.log(now, Level::Info, happened.home.as_str(), &happened.event.to_string())?;
+                self.recorder.log(
+                    now,
+                    Level::Info,
+                    happened.home.as_str(),
+                    &format!("{:#}", happened.event),
+                )?;
             }
         }
         Ok(())

@@ -82,6 +82,10 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             waypoints: plan.waypoints.iter().map(|point| (*point).into()).collect(),
             errands: plan.errands.clone(),
             rally: scenario.rally.iter().map(|place| (*place).into()).collect(),
+            arrives_with: match scenario.arrive_together {
+                true => vehicles().map(|name| name.to_string()).collect(),
+                false => Vec::new(),
+            },
             takeoff_height_m: scenario.takeoff_height_m,
             return_altitude_m: (RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64)
                 .min(bounds.max.z - 1.0),
@@ -91,7 +95,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             fence,
             airspace: scenario.airspace.clone(),
             envelope: Envelope {
-                cruise_m_s: plan.pace * scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
+                cruise_m_s: scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
                 climb_m_s: plan.model.max_climb_m_s.min(1.5),
                 airspeed_m_s: plan.model.top_airspeed_m_s(),
                 tilt_rad: plan.model.top_tilt_rad(),
@@ -158,7 +162,8 @@ pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Control
     GroundConfig {
         orders: orders.collect(),
         loaded: controller == cli::Controller::Bp,
-        launch_on_order: scenario.orders.iter().any(|said| said.order.is_launch()),
+        launch_on_order: scenario.launch_on_order
+            || scenario.orders.iter().any(|said| said.order.is_launch()),
         muster: scenario.musters(),
         behaviours: scenario.behaviours.clone(),
         operators: NodeName::new(SCRIPT).into_iter().collect(),

@@ -7,8 +7,8 @@ use thiserror::Error;
 /// Why a mission file cannot be flown.
 #[derive(Debug, Error)]
 pub enum MissionError {
-    #[error("cannot read `{}`: {source}", path.display())]
-    Unreadable { path: PathBuf, source: std::io::Error },
+    #[error("cannot read `{}`: {cause}", path.display())]
+    Unreadable { path: PathBuf, cause: std::io::Error },
     #[error("{file}: is larger than {limit} bytes: expected a mission, which is smaller")]
     TooLarge { file: String, limit: usize },
     #[error("{file}:{line}:{column}: {message}")]

@@ -203,6 +203,6 @@ pub fn account_of(
     allowances: Allowances,
 ) -> Result<Account, MissionError> {
     let text = std::fs::read_to_string(path)
-        .map_err(|source| MissionError::Unreadable { path: path.to_owned(), source })?;
+        .map_err(|cause| MissionError::Unreadable { path: path.to_owned(), cause })?;
     Account::read(&text, &path.display().to_string(), datum, allowances)
 }

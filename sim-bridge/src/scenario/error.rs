@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
+use skein_agent::AgentError;
 use skein_world::{CloudError, CsvError, Lacking, SdfError, VehicleError};
 use thiserror::Error;
 
@@ -14,8 +15,8 @@ use crate::mission::MissionError;
 pub enum ScenarioError {
     #[error("unknown scenario `{name}`: expected one of {known}, or the path of a scenario file (.toml)")]
     Unknown { name: String, known: String },
-    #[error("cannot read `{}`: {source}", path.display())]
-    Unreadable { path: PathBuf, source: std::io::Error },
+    #[error("cannot read `{}`: {cause}", path.display())]
+    Unreadable { path: PathBuf, cause: std::io::Error },
     #[error("{file}:{line}:{column}: {}{message}", at_field(.field))]
     Malformed { file: String, line: usize, column: usize, field: String, message: String },
     #[error("{file}: {field}: {message}")]
@@ -85,6 +86,8 @@ pub enum ScenarioError {
     /// Something on the way that a lidar does not see.
     #[error(transparent)]
     ThinSolids(#[from] ThinSolids),
+    #[error("{vehicle}: {why}")]
+    Agent { vehicle: String, why: AgentError },
     #[error("vehicle {vehicle} has nowhere to go: give it waypoints or a mission")]
     NoWaypoints { vehicle: usize },
     #[error("vehicle {vehicle}: no place for its {what} near {}: everything within {reach_m} m is too close to an obstacle, to another vehicle or to the bounds", place(.near))]

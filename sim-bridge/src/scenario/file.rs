@@ -26,7 +26,7 @@ use super::mountain;
 use super::moving::{self, Moves};
 use super::open::Open;
 use super::position_error::{PositionErrorTable, PositionFaultTable};
-use super::targets::{PacedRoute, Targets};
+use super::targets::Targets;
 use super::walker::Walker;
 use super::window::Window;
 use super::{
@@ -75,6 +75,8 @@ struct FileTable {
     time_limit_s: Option<f64>,
     #[serde(default)]
     without_ground: LinkLossPolicy,
+    #[serde(default)]
+    arrive_together: bool,
     world: Option<PathBuf>,
     #[serde(default)]
     mission: Vec<PathBuf>,
@@ -301,7 +303,9 @@ impl ScenarioFile {
             airspace,
             fixed_bounds,
             vehicles: plans,
+            launch_on_order: false,
             muster: table.formation.is_some() || table.targets.is_some(),
+            arrive_together: table.arrive_together || table.targets.is_some(),
             cruise_speed_m_s,
             planners: Planners {
                 global: table.global,
@@ -444,7 +448,7 @@ impl ScenarioFile {
             return self.described(count, &model);
         }
         if let Some(routes) = self.task(count, seed)? {
-            return Ok(routes.into_iter().map(|paced| from_under(paced, &model)).collect());
+            return Ok(routes.into_iter().map(|route| from_under(route, &model)).collect());
         }
         if let Some(layout) = layout {
             let plan = |route: &super::layout::Route| VehiclePlan {
@@ -452,7 +456,6 @@ impl ScenarioFile {
                 yaw: route.yaw(),
                 waypoints: vec![route.goal],
                 errands: Vec::new(),
-                pace: 1.0,
                 model: model.clone(),
                 autopilot: self.table.autopilot,
                 position_errors: PositionErrors::default(),
@@ -468,7 +471,6 @@ impl ScenarioFile {
             yaw: 0.0,
             waypoints: Vec::new(),
             errands: Vec::new(),
-            pace: 1.0,
             model,
             autopilot: self.table.autopilot,
             position_errors: PositionErrors::default(),
@@ -477,18 +479,17 @@ impl ScenarioFile {
     }
 
     /// The routes that the task for the whole swarm gives, if there is one.
-    fn task(&self, vehicles: usize, seed: u64) -> Result<Option<Vec<PacedRoute>>, ScenarioError> {
-        let at_cruise = |route| PacedRoute { route, pace: 1.0 };
+    fn task(&self, vehicles: usize, seed: u64) -> Result<Option<Vec<Vec<Vector3<f64>>>>, ScenarioError> {
         let table = &self.table;
         if let Some(coverage) = &table.coverage {
             let model = self.model(table.model.as_deref().unwrap_or(DEFAULT_MODEL))?;
             let cruise_m_s = self.cruise_speed_m_s().min(model.max_speed_m_s);
             let routes = coverage.routes(vehicles, &self.airspace()?, cruise_m_s, model.max_accel_m_s2);
             let routes = routes.map_err(|error| self.contradiction("coverage", error.to_string()))?;
-            return Ok(Some(routes.into_iter().map(at_cruise).collect()));
+            return Ok(Some(routes));
         }
         if let Some(formation) = &table.formation {
-            return Ok(Some(formation.routes(vehicles).into_iter().map(at_cruise).collect()));
+            return Ok(Some(formation.routes(vehicles)));
         }
         let (Some(targets), Some(bounds)) = (&table.targets, &table.bounds) else { return Ok(None) };
         let bounds = Aabb { min: bounds.min_m, max: bounds.max_m };
@@ -511,7 +512,6 @@ impl ScenarioFile {
                 yaw: table.yaw_rad.unwrap_or_else(|| ahead.y.atan2(ahead.x)),
                 waypoints: table.waypoints_m.clone(),
                 errands: Vec::new(),
-                pace: 1.0,
                 model: table.model.as_deref().map_or_else(|| Ok(model.clone()), |name| self.model(name))?,
                 autopilot: table.autopilot.or(self.table.autopilot),
                 position_errors: PositionErrors::default(),
@@ -683,7 +683,7 @@ impl ScenarioFile {
 }
 
 /// The plan of a vehicle that takes off under its route's first point.
-fn from_under(PacedRoute { route, pace }: PacedRoute, model: &VehicleModel) -> VehiclePlan {
+fn from_under(route: Vec<Vector3<f64>>, model: &VehicleModel) -> VehiclePlan {
     let first = route.first().copied().unwrap_or_default();
     let ahead = route.get(1).map_or(Vector3::x(), |second| second - first);
     VehiclePlan {
@@ -691,7 +691,6 @@ fn from_under(PacedRoute { route, pace }: PacedRoute, model: &VehicleModel) -> V
         yaw: ahead.y.atan2(ahead.x),
         waypoints: route,
         errands: Vec::new(),
-        pace,
         model: model.clone(),
         autopilot: None,
         position_errors: PositionErrors::default(),

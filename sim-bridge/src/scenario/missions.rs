@@ -179,7 +179,7 @@ impl Scenario {
             let commands = errand(before).map(|errand| &errand.payload[..]).unwrap_or_default();
             commands.iter().map(|one| Payload { command: one.command.into(), params: one.params }).collect()
         };
-        let cruise_m_s = self.cruise_speed_m_s.min(vehicle.model.max_speed_m_s) * vehicle.pace;
+        let cruise_m_s = self.cruise_speed_m_s.min(vehicle.model.max_speed_m_s);
         let waypoint = |(index, position): (usize, &Vector3<f64>)| Waypoint {
             position: *position,
             hold_s: stay_s(index + 1),

@@ -99,8 +99,12 @@ pub struct Scenario {
     pub fixed_bounds: bool,
     /// The vehicles; vehicle `i` is `uav/{i + 1}`.
     pub vehicles: Vec<VehiclePlan>,
+    /// Nobody takes off before an operator orders it.
+    pub launch_on_order: bool,
     /// Nobody sets out before everybody is in the air.
     pub muster: bool,
+    /// All arrive at their goals at the same time.
+    pub arrive_together: bool,
     /// Speed the vehicles aim for between waypoints.
     pub cruise_speed_m_s: f64,
     /// The planners on board.
@@ -140,8 +144,6 @@ pub struct VehiclePlan {
     pub waypoints: Vec<Vector3<f64>>,
     /// Stays, speeds and commands to what it carries, on the way.
     pub errands: Vec<Errand>,
-    /// Its speed as a share of the scenario's cruise speed: above 0, at most 1.
-    pub pace: f64,
     pub model: VehicleModel,
     /// Its autopilot; none for the one that the command line names.
     pub autopilot: Option<Make>,
@@ -655,6 +657,5 @@ fn text_of(name: &str) -> Result<Option<String>, ScenarioError> {
 }
 
 fn read(path: &Path) -> Result<String, ScenarioError> {
-    std::fs::read_to_string(path)
-        .map_err(|source| ScenarioError::Unreadable { path: path.to_owned(), source })
+    std::fs::read_to_string(path).map_err(|cause| ScenarioError::Unreadable { path: path.to_owned(), cause })
 }

@@ -5,9 +5,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use skein_planning::airspace::{Airspace, NoFlyZone, ThreatZone};
 use skein_swarm::assignment::assign;
-use skein_swarm::route::{
-    Effort, Planner, RouteCost, RouteError, arrival_slots, arrive_together, plan_in_turn,
-};
+use skein_swarm::route::{Effort, Planner, RouteCost, RouteError, arrival_slots, plan_in_turn};
 use skein_world::Aabb;
 
 use super::field::{ground_points, points, positive};
@@ -16,8 +14,6 @@ use super::field::{ground_points, points, positive};
 const WAYPOINTS: usize = 6;
 /// Distance of routes from threat and no-fly zones: a vehicle's stray from its route, and its hull, in metres.
 const MARGIN_M: f64 = 1.5;
-/// Factor by which a vehicle may fly slower than at cruise so that all arrive together.
-const SLOWEST: f64 = 2.0;
 
 /// The `[targets]` table.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -55,17 +51,9 @@ pub enum TargetsError {
     NoRoute { vehicle: usize },
 }
 
-/// A route and how fast it is flown.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PacedRoute {
-    /// From above the start to the target (ENU, metres).
-    pub route: Vec<Vector3<f64>>,
-    /// Share of the cruise speed, 0 to 1.
-    pub pace: f64,
-}
-
 impl Targets {
-    /// Routes of so many vehicles that fly at `cruise_m_s` from `height_m` above where they stand.
+    /// Routes of so many vehicles that fly at `cruise_m_s` from `height_m` above where they stand to their targets (ENU,
+    /// metres).
     pub fn routes(
         &self,
         vehicles: usize,
@@ -74,7 +62,7 @@ impl Targets {
         height_m: f64,
         cruise_m_s: f64,
         seed: u64,
-    ) -> Result<Vec<PacedRoute>, TargetsError> {
+    ) -> Result<Vec<Vec<Vector3<f64>>>, TargetsError> {
         if !airspace.prisms.is_empty() || !airspace.stay_inside.is_empty() {
             return Err(TargetsError::Polygon);
         }
@@ -89,10 +77,7 @@ impl Targets {
                 Err(TargetsError::NoRoute { vehicle: vehicle + 1 })
             }
         })?;
-        let times_s: Vec<f64> = plans.iter().map(|plan| plan.assessment.time_s).collect();
-        let slowed = arrive_together(&times_s, SLOWEST).slowed;
-        let paced = plans.into_iter().zip(slowed);
-        Ok(paced.map(|(plan, slowed)| PacedRoute { route: plan.route, pace: 1.0 / slowed }).collect())
+        Ok(plans.into_iter().map(|plan| plan.route).collect())
     }
 
     /// From where to where each vehicle flies, so assigned that the straight ways are shortest together.

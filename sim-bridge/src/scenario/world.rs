@@ -36,7 +36,7 @@ pub fn read_world(path: &Path, without_missing: bool) -> Result<ReadWorld, Scena
         "csv" => Ok(plain(Scene::from_csv(&read(path)?, &name)?)),
         "obj" | "pcd" | "ply" => {
             let bytes = std::fs::read(path)
-                .map_err(|source| ScenarioError::Unreadable { path: path.to_owned(), source })?;
+                .map_err(|cause| ScenarioError::Unreadable { path: path.to_owned(), cause })?;
             Ok(plain(Scene::from_measured(&bytes, &name)?))
         }
         _ => {

@@ -15,6 +15,7 @@ mod narrow_alone;
 mod no_lidar;
 mod positions;
 mod preflight;
+mod routes;
 mod scenarios;
 mod scripts;
 mod solids_of_many_kinds;

@@ -3,7 +3,10 @@
 use std::time::Duration;
 
 use skein_agent::Outcome;
+use skein_sim::scenario::{Order, Scenario, Who};
 use skein_tests::Lockstep;
+use skein_wire::NetworkConfig;
+use skein_wire::event::What;
 
 type Point = [f64; 3];
 
@@ -120,21 +123,100 @@ fn geese_keep_their_places_from_their_start_to_their_goals() {
     }
 }
 
+/// When each of these vehicles arrives, in seconds.
+fn arrivals_s(
+    scenario: &Scenario,
+    poses: &[Vec<Point>],
+    vehicles: impl IntoIterator<Item = usize>,
+) -> Vec<f64> {
+    let arrival_s = |vehicle: usize| {
+        let goal = scenario.vehicles[vehicle].goal().into();
+        poses.iter().position(|at| distance(&at[vehicle], &goal) < 1.0).unwrap() as f64 / 10.0
+    };
+    vehicles.into_iter().map(arrival_s).collect()
+}
+
+fn spread_s(times_s: &[f64]) -> f64 {
+    let first_s = times_s.iter().copied().fold(f64::INFINITY, f64::min);
+    times_s.iter().copied().fold(0.0, f64::max) - first_s
+}
+
 #[test]
 fn targets_behind_threats_are_reached_together() {
     let (lockstep, poses) = flown("valley");
-    let arrival_s = |vehicle: usize| {
-        let goal = lockstep.scenario.vehicles[vehicle].goal().into();
-        poses.iter().position(|at| distance(&at[vehicle], &goal) < 1.0).unwrap() as f64 / 10.0
-    };
-    let times_s: Vec<f64> = (0..lockstep.scenario.vehicles.len()).map(arrival_s).collect();
-    let first_s = times_s.iter().copied().fold(f64::INFINITY, f64::min);
-    let last_s = times_s.iter().copied().fold(0.0, f64::max);
-    assert!(last_s - first_s < 3.0, "{times_s:?}");
+    let times_s = arrivals_s(&lockstep.scenario, &poses, 0..10);
+    assert!(spread_s(&times_s) < 1.0, "{times_s:?}");
     for at in poses.iter().flatten() {
         for (x, y, radius_m) in [(50.0, 50.0, 20.0), (25.0, 60.0, 10.0)] {
             assert!(distance(at, &[x, y, 0.0]) > radius_m, "{at:?} is in a threat zone");
         }
         assert!(distance(at, &[75.0, 25.0, at[2]]) > 10.0, "{at:?} is where nobody may fly");
     }
+}
+
+/// The vehicle of this number, from 0, is held for ten seconds from then on.
+fn holding(mut scenario: Scenario, vehicle: usize, from_s: f64) -> Scenario {
+    let given = |at_s, order| Order { at_s, order, who: Who::Vehicle(vehicle + 1) };
+    scenario.orders.extend([given(from_s, What::Hold), given(from_s + 10.0, What::Resume)]);
+    scenario
+}
+
+/// When this vehicle has flown this share of its way by itself, in seconds.
+fn flown_s(poses: &[Vec<Point>], vehicle: usize, share: f64) -> f64 {
+    let way_m: Vec<f64> = poses
+        .windows(2)
+        .scan(0.0, |way_m, at| {
+            *way_m += distance(&at[0][vehicle], &at[1][vehicle]);
+            Some(*way_m)
+        })
+        .collect();
+    let whole_m = way_m.last().unwrap();
+    way_m.iter().position(|way_m| *way_m >= share * whole_m).unwrap() as f64 / 10.0
+}
+
+#[test]
+fn who_is_held_on_the_way_is_waited_for_and_all_arrive_together() {
+    let (lockstep, alone) = flown("valley");
+    for (vehicle, share) in [(0, 0.3), (4, 0.55), (7, 0.65)] {
+        // Before it lands, which is no part of the way.
+        let unheld_s = arrivals_s(&lockstep.scenario, &alone, [vehicle])[0];
+        let from_s = flown_s(&alone[..(unheld_s * 10.0) as usize], vehicle, share);
+        let scenario = Scenario::built_in("valley", None, 1).unwrap();
+        let (held, poses) = flown_in(Lockstep::of(holding(scenario, vehicle, from_s)));
+        let times_s = arrivals_s(&held.scenario, &poses, 0..10);
+        assert!(spread_s(&times_s) < 1.0, "{vehicle} held from {from_s} s on: {times_s:?}");
+        assert!(times_s[vehicle] > unheld_s + 3.0, "it was held: {times_s:?}, not {unheld_s}");
+    }
+}
+
+#[test]
+fn without_the_ground_and_over_a_network_that_loses_messages_they_arrive_together() {
+    let mut lockstep = Lockstep::new("valley", None, 1);
+    lockstep.network.set_config(NetworkConfig { loss: 0.2, ..NetworkConfig::default() });
+    lockstep.run_until(Duration::from_secs(40));
+    let ground = lockstep.nodes[10].clone();
+    lockstep.network.leave(&ground);
+    let (lockstep, poses) = flown_in(lockstep);
+    let times_s = arrivals_s(&lockstep.scenario, &poses, 0..10);
+    assert!(
+        times_s.iter().all(|time_s| *time_s > 1.0),
+        "the ground leaves while all are on the way: {times_s:?}"
+    );
+    assert!(spread_s(&times_s) < 1.0, "{times_s:?}");
+}
+
+#[test]
+fn who_is_lost_on_the_way_is_not_waited_for() {
+    let (unlost, alone) = flown("valley");
+    let mut lockstep = Lockstep::new("valley", None, 1);
+    lockstep.run_until(Duration::from_secs_f64(flown_s(&alone, 0, 0.4)));
+    let lost = lockstep.nodes[0].clone();
+    lockstep.network.leave(&lost);
+    let before_s = lockstep.swarm.now().as_secs_f64();
+    let (lockstep, poses) = flown_in(lockstep);
+    let times_s = arrivals_s(&lockstep.scenario, &poses, 1..10);
+    assert!(spread_s(&times_s) < 1.0, "{times_s:?}");
+    let last_s = before_s + times_s[0];
+    let with_all_s = arrivals_s(&unlost.scenario, &alone, [1])[0];
+    assert!(last_s < with_all_s + 1.0, "at {last_s} s, and at {with_all_s} s with the one that was lost");
 }

@@ -21,6 +21,8 @@ skein_bp::words! {
         Abort = "abort",
         /// Fly there and hover until resumed.
         GoTo = "goto",
+        /// Fly these points instead of what is left of the mission, and land under the last.
+        Route = "route",
         /// Fly again by yourself: the pilot has let go.
         HandBack = "hand_back",
         /// Run a script beside whatever you do.
@@ -53,7 +55,7 @@ impl What {
 
     /// Whether it needs more than whom it is for: a place, or a script.
     pub fn needs_more(self) -> bool {
-        matches!(self, Self::GoTo | Self::Load | Self::Unload | Self::Give)
+        matches!(self, Self::GoTo | Self::Route | Self::Load | Self::Unload | Self::Give)
     }
 
     pub fn is_launch(self) -> bool {
@@ -73,7 +75,7 @@ impl What {
     /// Whether only who holds a vehicle may order it; whoever orders it takes a vehicle that nobody holds. Anybody with
     /// the right may always hold a vehicle in its place, send it home, or land it.
     pub fn needs_holder(self) -> bool {
-        self.is_launch() || self.sets_going() || self.is_about_script()
+        self.is_launch() || self.sets_going() || self.is_about_script() || self == Self::Route
     }
 
     /// Whether it is for safety: it brings a vehicle to a stop, home, or down.
@@ -83,7 +85,7 @@ impl What {
 
     /// Whether a vehicle takes it in at its gateway, as [`OrderTaken`]. The ground station carries out the others.
     pub fn reaches_vehicle(self) -> bool {
-        matches!(self, Self::Resume | Self::Land | Self::Return | Self::GoTo | Self::HandBack)
+        matches!(self, Self::Resume | Self::Land | Self::Return | Self::GoTo | Self::Route | Self::HandBack)
     }
 
     /// Whether a script may give it to its own vehicle.
@@ -118,7 +120,7 @@ impl What {
 
     /// Whether it says nothing against what other orders have set going.
     pub fn is_beside_flight(self) -> bool {
-        self.is_launch() || self.is_about_script() || self.is_handover()
+        self.is_launch() || self.is_about_script() || self.is_handover() || self == Self::Route
     }
 }
 
@@ -133,6 +135,8 @@ skein_bp::events! {
         x: Option<f64> ["m"],
         y: Option<f64> ["m"],
         z: Option<f64> ["m"],
+        /// The points of a `route`, in m: `x y z; x y z`.
+        way: Option<Text>,
         /// The person or program that has given it; of a script, its b-thread: `script/NAME`. One that names nobody is
         /// declined.
         by: Text,
@@ -162,6 +166,13 @@ skein_bp::events! {
         what: What,
         why: Text,
     }
+    /// The vehicle takes on a route instead of what was left of its mission.
+    Rerouted = "rerouted", Own {
+        /// Its points, in m: `x y z; x y z`.
+        way: Text,
+        /// The person or program that has sent it.
+        by: Text,
+    }
     /// A joint decision is taken to heart.
     Heeded = "heeded", Own {
         what: What,
@@ -171,7 +182,7 @@ skein_bp::events! {
 impl OrderTaken {
     /// An order of this person or program that needs no more than its word.
     pub fn plain(what: What, by: &str) -> Self {
-        Self { what, x: None, y: None, z: None, by: by.into(), aboard: None }
+        Self { what, x: None, y: None, z: None, way: None, by: by.into(), aboard: None }
     }
 
     /// The order to go there, metres ENU.

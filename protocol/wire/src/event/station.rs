@@ -39,6 +39,8 @@ skein_bp::events! {
         x: Option<f64> ["m"],
         y: Option<f64> ["m"],
         z: Option<f64> ["m"],
+        /// The points of a `route`, in m: `x y z; x y z`.
+        way: Option<Text>,
     }
     /// An order is not brought to this vehicle any more: another person or program holds it.
     Overruled = "overruled", Anyone {
@@ -75,7 +77,7 @@ impl OrderGiven {
     /// An order that needs no more than whom it is for.
     pub fn plain(what: What, who: &str, by: &str) -> Self {
         let (who, by) = (who.into(), by.into());
-        Self { what, who, by, to: None, name: None, script: None, x: None, y: None, z: None }
+        Self { what, who, by, to: None, name: None, script: None, x: None, y: None, z: None, way: None }
     }
 
     /// The same order, to this place, metres ENU.

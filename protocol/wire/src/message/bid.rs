@@ -58,7 +58,7 @@ impl TryFrom<proto::BidRecord> for BidRecord {
             decided: number("BidRecord.decided", record.decided, 0)?,
             bids: record.bids.into_iter().map(RemoteBid::try_from).collect::<Result<_>>()?,
         };
-        record.check_bounds().map_err(|source| DecodeError::Bound { field: "BidRecord", source })?;
+        record.check_bounds().map_err(|cause| DecodeError::Bound { field: "BidRecord", cause })?;
         Ok(record)
     }
 }

@@ -60,7 +60,7 @@ impl TryFrom<proto::Event> for Event {
         let event = event.data.into_iter().try_fold(Event::new(event.name), |event, (key, value)| {
             Ok::<_, DecodeError>(event.with(key, Value::try_from(value)?))
         })?;
-        event.check_bounds().map_err(|source| DecodeError::Bound { field: "Event", source })?;
+        event.check_bounds().map_err(|cause| DecodeError::Bound { field: "Event", cause })?;
         Ok(event)
     }
 }

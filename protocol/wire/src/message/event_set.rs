@@ -43,7 +43,7 @@ impl TryFrom<proto::EventSet> for EventSet {
 
     fn try_from(set: proto::EventSet) -> Result<Self> {
         let set = read(set)?;
-        set.check_bounds().map_err(|source| DecodeError::Bound { field: "EventSet", source })?;
+        set.check_bounds().map_err(|cause| DecodeError::Bound { field: "EventSet", cause })?;
         Ok(set)
     }
 }

@@ -12,7 +12,7 @@ use crate::proto;
 pub type Result<T> = std::result::Result<T, DecodeError>;
 
 pub fn node(field: &'static str, name: &str) -> Result<NodeName> {
-    NodeName::new(name).map_err(|source| DecodeError::Name { field, source })
+    NodeName::new(name).map_err(|cause| DecodeError::Name { field, cause })
 }
 
 pub fn text(name: &NodeName) -> String {
@@ -63,7 +63,7 @@ pub fn at_most(field: &'static str, given: usize, most: usize, expected: &'stati
 
 /// Lets through so many of something as there may be.
 pub fn bounded(field: &'static str, bound: Bound, given: usize) -> Result<()> {
-    bound.check(given).map_err(|source| DecodeError::Bound { field, source })
+    bound.check(given).map_err(|cause| DecodeError::Bound { field, cause })
 }
 
 /// A place in the world, metres ENU.

@@ -51,6 +51,9 @@ pub struct State {
     pub asked_by: String,
     /// Its right to go first where there is room for one.
     pub right: Right,
+    /// Time that it still has to fly to the end of its mission at its cruise speed, s: while it flies there, to arrive
+    /// together with others.
+    pub to_go_s: Option<f64>,
     /// The last word of one other vehicle, each in turn: from it that one learns how long messages take.
     pub echo: Option<Echo>,
 }
@@ -105,6 +108,7 @@ impl State {
             holder: String::new(),
             asked_by: String::new(),
             right: Right::Free,
+            to_go_s: None,
             echo: None,
         }
     }
@@ -158,6 +162,7 @@ impl From<&State> for proto::State {
             holder: words(&state.holder),
             asked_by: words(&state.asked_by),
             right: proto::Right::from(state.right).into(),
+            to_go_s: state.to_go_s,
             echo: state.echo.as_ref().map(|echo| proto::Echo {
                 node: text(&echo.node),
                 incarnation: echo.incarnation,
@@ -198,6 +203,7 @@ impl TryFrom<proto::State> for State {
             holder: words(state.holder),
             asked_by: words(state.asked_by),
             right: proto::Right::try_from(state.right).unwrap_or_default().into(),
+            to_go_s: state.to_go_s.map(|to_go_s| not_negative("State.to_go_s", to_go_s)).transpose()?,
             echo: state.echo.map(Echo::try_from).transpose()?,
         })
     }

@@ -167,7 +167,13 @@ impl<'a> Flight<'a> {
         self.legs += 1;
         self.has_arrived = false;
         let target = Vector3::new(goal.x, goal.y, HEIGHT_M);
-        self.guidance.head_for(Waypoint { leg: self.legs as i64, target, lands: true, is_home: false });
+        self.guidance.head_for(Waypoint {
+            leg: self.legs as i64,
+            target,
+            lands: true,
+            is_home: false,
+            beyond_s: None,
+        });
         self.plan(times)
     }
 
