@@ -112,7 +112,7 @@ mod tests {
             cooperative: true,
         };
         let goal = goal.map(Vector3::from);
-        Neighbour { node: name(node), armed: true, goal, track, way: None, right: Right::Free }
+        Neighbour { node: name(node), armed: true, goal, track, way: None, right: Right::Free, to_go_s: None }
     }
 
     /// Home is at the origin; points are 40 and 60 m east of it.
