@@ -84,7 +84,7 @@ mod tests {
     fn who_has_less_to_go_flies_so_much_slower_and_the_last_at_cruise() {
         let speed = |own_s, others: &[Neighbour]| speed_m_s(own_s, others, &ENVELOPE);
         let held = other(Some(20.25), 0.0, 0.5);
-        assert_eq!(speed(10.0, &[held.clone()]), 2.0);
+        assert_eq!(speed(10.0, std::slice::from_ref(&held)), 2.0);
         assert_eq!(speed(10.0, &[held.clone(), other(Some(5.0), 4.0, 0.0)]), 2.0);
         assert_eq!(speed(25.0, &[held]), 4.0);
         assert_eq!(speed(10.0, &[other(Some(20.25), 2.0, 0.5)]), 4.0 * 10.0 / 19.75, "it has moved on since");

@@ -351,7 +351,7 @@ fn vehicles_that_return_land_at_the_nearest_rally_point_one_each() {
     let at_point = |end: &Vector3<f64>| {
         points.iter().position(|p| (end.xy() - nalgebra::Vector2::new(p[0], p[1])).norm() < 1.0)
     };
-    let mut had: Vec<_> = ends.iter().map(|end| at_point(end)).collect();
+    let mut had: Vec<_> = ends.iter().map(at_point).collect();
     had.sort_unstable();
     assert_eq!(had, [Some(0), Some(1)], "{ends:?} {:?}", flown.summary.reason);
     assert_eq!(flown.summary.collisions.vehicle, 0);

@@ -38,7 +38,8 @@ impl Route {
         if !(1..=Self::MOST_POINTS).contains(&points.len()) {
             return Err(UnfitRoute::Length(points.len()));
         }
-        let is_unfit = |point: &[f64; 3]| point.iter().any(|metres| !(metres.abs() <= FURTHEST_M));
+        let is_unfit =
+            |point: &[f64; 3]| point.iter().any(|metres| !(-FURTHEST_M..=FURTHEST_M).contains(metres));
         match points.iter().position(is_unfit) {
             Some(index) => Err(UnfitRoute::Point { number: index + 1, text: written(&points[index]) }),
             None => Ok(Self(points)),

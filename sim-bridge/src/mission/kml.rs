@@ -100,8 +100,11 @@ fn wrong(found: String) -> Shape {
     Shape::Wrong("coordinates `longitude,latitude` or `longitude,latitude,height`".to_owned(), found)
 }
 
-/// Longitude and latitude, and the height where there is one; else the words at fault.
-fn coordinates(node: &Node<'_, '_>) -> Result<Vec<([f64; 2], Option<f64>)>, String> {
+/// Longitude and latitude in degrees, and the height in metres where there is one.
+type Coordinates = ([f64; 2], Option<f64>);
+
+/// The coordinates of a line or ring; else the words at fault.
+fn coordinates(node: &Node<'_, '_>) -> Result<Vec<Coordinates>, String> {
     let text = child(node, "coordinates").and_then(|node| node.text()).unwrap_or_default();
     let place = |words: &str| {
         let numbers: Option<Vec<f64>> = words.split(',').map(|word| word.trim().parse().ok()).collect();

@@ -51,11 +51,11 @@ fn read(geometry: &str) -> Scene {
 fn meets(scene: &Scene, from: [f64; 3], along: [f64; 3], range_m: Option<f64>) {
     let (from, along) = (Point3::from(from), Vector3::from(along).normalize());
     let met = scene.cast_ray(&from, &along, 50.0);
-    match (met, range_m) {
-        (Some(met), Some(range_m)) if (met - range_m).abs() < 0.02 => {}
-        (None, None) => {}
-        _ => panic!("from {from:?} along {along:?}: met {met:?}, not {range_m:?}"),
-    }
+    let is_right = match (met, range_m) {
+        (Some(met), Some(range_m)) => (met - range_m).abs() < 0.02,
+        (met, range_m) => met.is_none() && range_m.is_none(),
+    };
+    assert!(is_right, "from {from:?} along {along:?}: met {met:?}, not {range_m:?}");
 }
 
 const EAST: [f64; 3] = [1.0, 0.0, 0.0];
