@@ -26,7 +26,7 @@ pub struct Errand {
     /// The greatest speed on the way there, m/s.
     #[serde(default, deserialize_with = "speed_m_s", skip_serializing_if = "Option::is_none")]
     pub speed_m_s: Option<f64>,
-    /// What is told to what it carries, once the stay is over.
+    /// Commands to what it carries, once the stay is over.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub payload: Vec<PayloadCommand>,
 }

@@ -67,7 +67,7 @@ pub struct Mission {
     /// configuration.
     waypoints: Vec<[f64; 3]>,
     sent_by: Option<Text>,
-    /// Who has sent the vehicle elsewhere last.
+    /// The last that has sent the vehicle elsewhere.
     pointed_by: Text,
     /// Where others stay, or mean to, metres ENU.
     ends: Vec<(NodeName, Vector3<f64>)>,

@@ -25,7 +25,7 @@ pub struct Findings {
     pub holds: String,
     /// Parts that have no effect or give way.
     pub warnings: Vec<String>,
-    /// What becomes of each element of a world or mission file.
+    /// The fate of each element of a world or mission file.
     pub elements: Vec<Element>,
 }
 

@@ -13,9 +13,9 @@ pub struct Element {
     /// Line from 1, of the first.
     pub line: usize,
     pub verdict: Verdict,
-    /// What becomes of it, or what is wrong with it; empty where that is plain.
+    /// Its fate, or the fault in it; empty where that is plain.
     pub why: String,
-    /// How many there are of one name and one fate.
+    /// Number of those of one name and one fate.
     pub count: usize,
 }
 

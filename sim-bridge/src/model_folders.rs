@@ -18,7 +18,7 @@ const CACHES: [&str; 2] = [".gz/fuel", ".ignition/fuel"];
 pub struct ModelFolders {
     /// In the order of the search.
     folders: Vec<PathBuf>,
-    /// What was fetched from servers, by their names.
+    /// Models fetched from servers, by their names.
     caches: Vec<PathBuf>,
 }
 

@@ -9,7 +9,7 @@ use skein_wire::event::{Advance, Arrived, Declared as _, Goto, Land, Landed, Pla
 
 use crate::{me::Me, precedence};
 
-/// How long a vehicle waits in all on the way to one waypoint, for one that stays.
+/// Time that a vehicle waits in all on the way to one waypoint, for one that stays.
 pub const PATIENCE: Duration = Duration::from_secs(20);
 /// The same, for one that is on its way elsewhere: it may wait for others itself.
 pub const LONG_PATIENCE: Duration = Duration::from_secs(90);
@@ -20,7 +20,7 @@ pub const LONG_PATIENCE: Duration = Duration::from_secs(90);
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct AwaitPlace {
     me: Me,
-    /// What is left of the patience with who stays.
+    /// The rest of the patience with who stays.
     left: Duration,
     /// The same with who is on its way.
     left_with_leaving: Duration,
@@ -39,7 +39,7 @@ impl AwaitPlace {
         Self { me, left: PATIENCE, left_with_leaving: LONG_PATIENCE, phase: Phase::Free }
     }
 
-    /// What is left of the patience with one that stays or leaves.
+    /// The rest of the patience with one that stays or leaves.
     fn left(&mut self, leaves: bool) -> &mut Duration {
         if leaves { &mut self.left_with_leaving } else { &mut self.left }
     }

@@ -21,7 +21,7 @@ pub struct Mission {
     me: Me,
     /// The `goto` events of the waypoints, in order.
     waypoints: Vec<Event>,
-    /// What comes before each leg, where something does.
+    /// The errand before each leg, where there is one.
     errands: BTreeMap<usize, Steps>,
     phase: Phase,
 }
@@ -133,7 +133,7 @@ impl Mission {
         self.errands.get(&leg)?.payload.get(index)
     }
 
-    /// What is stated on the way to waypoint `leg`.
+    /// The limit that is stated on the way to waypoint `leg`.
     fn limit(&self, leg: usize) -> impl Iterator<Item = Event> + '_ {
         self.errands.get(&leg).and_then(|errand| errand.limit.clone()).into_iter()
     }

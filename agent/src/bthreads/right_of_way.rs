@@ -36,7 +36,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// Who waits for others claims no longer than this at a time, outside and inside.
 const INSISTS_FOR: Duration = Duration::from_secs(3);
 const INSISTS_INSIDE_FOR: Duration = Duration::from_secs(10);
-/// Who has no leave to move any more stands after this.
+/// A vehicle without leave to move stands after this.
 const STOPS_WITHIN: Duration = Duration::from_secs(2);
 /// Claims that were made apart are known to both sides so many leases after they have met again: records are repeated
 /// every tenth of one.
@@ -143,7 +143,7 @@ impl RightOfWay {
         EventSet::any_of(needed.map(|(node, _)| of::<Enter>(node))).and(against)
     }
 
-    /// What becomes of its claim on the place with number `next`, which it insists on until then, now that another
+    /// The fate of its claim on the place with number `next`, which it insists on until then, now that another
     /// vehicle's is in its way: if that goes before it, who has entered nothing withdraws its claim at once, and who
     /// has, when it stands.
     fn stand_against(&mut self, stalled: &Stalled, (next, until): (usize, Duration), now: Duration) -> Phase {
@@ -159,7 +159,7 @@ impl RightOfWay {
         }
     }
 
-    /// What it has entered of a stretch is its own, though it does not go on entering it now.
+    /// Keeps as its own the part of a stretch that it has entered, though it does not go on entering it now.
     fn keep_entered(&mut self) {
         if let Phase::Entering { next, .. } = self.phase {
             self.held = self.held.and_first(next, &self.ahead);

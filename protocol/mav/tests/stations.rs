@@ -33,7 +33,7 @@ impl Station {
         Self { writer: FrameWriter::new(Address { system_id: id, component_id: 190 }), id }
     }
 
-    /// What the autopilot answers to a message.
+    /// The autopilot's answers to a message.
     fn say<D: mavlink::MessageData>(&mut self, autopilot: &mut Endpoint, message: &D) -> Vec<MavMessage> {
         self.writer.write(message);
         autopilot.receive(Duration::from_secs(1), &self.writer.take());

@@ -33,7 +33,7 @@ pub enum Shape {
     Polygon(Vec<Vec<[f64; 2]>>),
     /// Neither a zone nor a route.
     Mark,
-    /// What is wrong with it: expected, found.
+    /// The fault in it: expected, found.
     Wrong(String, String),
 }
 

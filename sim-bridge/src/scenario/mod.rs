@@ -219,7 +219,8 @@ pub struct Overrides {
     /// A Gazebo world (SDF), list of boxes (.csv), mesh (.obj) or point cloud (.pcd, .ply) in place of the scenario's world.
     #[arg(long, value_name = "FILE")]
     pub world: Option<PathBuf>,
-    /// A QGroundControl plan, `QGC WPL 110` file, KML, GeoJSON or LSC mission; one that all fly in trail, or one for each vehicle.
+    /// A QGroundControl plan, `QGC WPL 110` file, KML, GeoJSON or LSC mission; one that all fly in trail, or one for
+    /// each vehicle.
     #[arg(long = "mission", value_name = "FILE")]
     pub missions: Vec<PathBuf>,
     #[command(flatten)]

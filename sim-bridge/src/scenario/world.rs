@@ -11,7 +11,7 @@ use crate::model_folders::ModelFolders;
 #[derive(Debug, Clone)]
 pub struct ReadWorld {
     pub scene: Scene,
-    /// What became of the elements of a Gazebo world; empty of others.
+    /// The fate of the elements of a Gazebo world; empty of others.
     pub account: Account,
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 /// A place where files are, each with a name of its own.
 pub trait Files {
-    /// What `uri` (a path, or `model://`, `file://`, `https://`) is called in the file `from`.
+    /// The name of what the file `from` calls `uri` (a path, or `model://`, `file://`, `https://`).
     fn open(&self, uri: &str, from: &str) -> Found;
 }
 

@@ -13,7 +13,8 @@ const RING_M: f64 = 0.5;
 /// No further than this, metres.
 const FURTHEST_M: f64 = 100.0;
 
-/// An [`Airspace`]'s zones, and what is outside of areas to stay inside of, with a margin around them, and the air over its terrain up to a clearance.
+/// An [`Airspace`]'s zones, and what is outside of areas to stay inside of, with a margin around them, and the air over
+/// its terrain up to a clearance.
 ///
 /// Threats are closed as no-fly zones are, and not merely dear: being seen for a moment is enough, and no detour is
 /// so long that it is worth that. Below the ground a threat goes on, as a ball. The airspace's box counts for nothing

@@ -25,7 +25,7 @@ pub struct CloudError {
     pub message: String,
 }
 
-/// What a file of points holds.
+/// The content of a file of points.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Cloud {
     points: Vec<[f64; 3]>,
@@ -39,7 +39,7 @@ impl Scene {
     /// 0.2 m; those no higher than 0.1 m are ground.
     ///
     /// # Errors
-    /// What is wrong with the file.
+    /// The fault in the file.
     pub fn from_measured(bytes: &[u8], source_name: &str) -> Result<Self, CloudError> {
         let refuse = |message: String| CloudError { source_name: source_name.to_owned(), message };
         let mesh = match source_name.rsplit('.').next().unwrap_or_default().to_lowercase().as_str() {

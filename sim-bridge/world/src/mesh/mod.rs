@@ -42,9 +42,9 @@ pub struct Mesh {
 enum Inside {
     /// Nothing: a vehicle may fly in the rooms of a house.
     Hollow,
-    /// What its faces, which point outwards, enclose.
+    /// The inside of its faces, which point outwards.
     Filled,
-    /// What is below its faces.
+    /// All that is below its faces.
     Below,
     /// Its cubes.
     Cubes,

@@ -9,7 +9,7 @@ use super::text::Element;
 /// Kinds of elements that are listed.
 const MOST_ENTRIES: usize = 1000;
 
-/// What became of an element.
+/// The fate of an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Verdict {
     /// It counts.
@@ -48,9 +48,9 @@ impl fmt::Display for Entry {
 pub struct Account {
     /// In the order in which they were first met; at most 1000.
     pub entries: Vec<Entry>,
-    /// How many elements are of none of these.
+    /// Number of elements of none of these.
     pub unlisted: usize,
-    /// How many were refused, listed or not.
+    /// Number of those refused, listed or not.
     refused: usize,
     numbers: HashMap<(String, Verdict, String), usize>,
 }
@@ -61,12 +61,12 @@ impl Account {
         self.entries.iter().filter(|entry| entry.verdict == Verdict::Harmless && !entry.note.is_empty())
     }
 
-    /// What the world lacks.
+    /// All that the world lacks.
     pub fn refused(&self) -> impl Iterator<Item = &Entry> {
         self.entries.iter().filter(|entry| entry.verdict == Verdict::Refused)
     }
 
-    /// How many elements the world lacks.
+    /// Number of elements that the world lacks.
     pub fn count_refused(&self) -> usize {
         self.refused
     }

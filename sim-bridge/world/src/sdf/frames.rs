@@ -21,7 +21,7 @@ struct Node<'m> {
     /// The number of the model that holds it.
     scope: usize,
     pose: &'m Pose,
-    /// What its pose is relative to where that does not say.
+    /// The frame of its pose where that does not say.
     attached_to: Option<&'m Reference>,
     placement: Option<&'m Reference>,
     /// Models in it whose parts count as its own.

@@ -42,7 +42,7 @@ const NAMED: usize = 8;
 #[derive(Debug, Clone)]
 pub struct Reading {
     scene: Scene,
-    /// What of the file the scene has, and what it lacks.
+    /// The parts of the file that the scene has, and those that it lacks.
     pub account: Account,
 }
 
@@ -74,7 +74,7 @@ impl Reading {
     /// The scene, if it has all that is solid in the file.
     ///
     /// # Errors
-    /// What it lacks.
+    /// All that it lacks.
     pub fn whole(self) -> Result<(Scene, Account), Lacking> {
         match self.account.count_refused() {
             0 => Ok((self.scene, self.account)),

@@ -86,7 +86,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// What a plugin does is not known; what moves a model is said.
+    /// The effect of a plugin is not known; one that moves a model is named.
     pub(super) fn pass_plugin(&mut self, plugin: Element<'_>) {
         let words = [plugin.attribute("filename"), plugin.attribute("name")];
         let words: String = words.into_iter().flatten().collect::<String>().to_lowercase();

@@ -173,7 +173,7 @@ impl<'a> Element<'a> {
         if above.is_empty() { self.name().to_owned() } else { format!("{above}/{}", self.name()) }
     }
 
-    /// What is written in it, without space around it.
+    /// The text in it, without space around it.
     pub(super) fn text(&self) -> &'a str {
         self.node.text().unwrap_or_default().trim()
     }
@@ -196,7 +196,7 @@ impl<'a> Element<'a> {
         self.children(name).next()
     }
 
-    /// What is written in a child.
+    /// The text in a child.
     pub(super) fn child_text(&self, name: &'static str) -> Option<&'a str> {
         self.child(name).map(|child| child.text())
     }

@@ -38,7 +38,7 @@ pub(super) struct Model {
 #[derive(Debug, Clone)]
 pub(super) struct Frame {
     pub name: String,
-    /// What its pose is relative to where it does not say.
+    /// The frame of its pose where it does not say.
     pub attached_to: Option<Reference>,
     pub pose: Pose,
 }

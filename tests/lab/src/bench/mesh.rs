@@ -38,7 +38,8 @@ pub struct Meshes {
 
 impl Task for Meshes {
     const NAME: &'static str = "mesh";
-    const ABOUT: &'static str = "Rays and distances a second on a mesh of 100,000 triangles; the forest's real-time factor without and with it";
+    const ABOUT: &'static str = "Rays and distances a second on a mesh of 100,000 triangles; \
+                                 the forest's real-time factor without and with it";
 
     fn run(&self, as_json: bool) -> anyhow::Result<Exit> {
         let (faces, mesh) = hills()?;

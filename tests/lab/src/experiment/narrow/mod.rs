@@ -117,7 +117,14 @@ impl Experiment for Narrow {
             .iter()
             .zip(&flights)
             .filter(|(_, flight)| flight.is_solvable && !flight.arrived())
-            .map(|(seed, flight)| json!({ "seed": seed, "shape": flight.shape.name(), "why": flight.summary.reason, "longest_wait_s": flight.wait_s }))
+            .map(|(seed, flight)| {
+                json!({
+                    "seed": seed,
+                    "shape": flight.shape.name(),
+                    "why": flight.summary.reason,
+                    "longest_wait_s": flight.wait_s,
+                })
+            })
             .collect();
         report.number("not_arrived", failed);
         report.goal(
