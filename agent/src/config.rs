@@ -217,6 +217,8 @@ pub struct AgentConfig {
     pub behaviours: Chosen,
     /// Lease of the bids this node sends.
     pub lease: Duration,
+    /// The distance within which vehicles are sure to hear one another, m; everywhere where there is none.
+    pub radio_range_m: Option<f64>,
     /// The rights of other nodes to request and block events here.
     pub authority: Authority,
     /// The promises of a former life of this node; see [`AgentCore::durable`](crate::AgentCore::durable).

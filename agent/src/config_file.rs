@@ -34,6 +34,8 @@ pub struct AgentFile {
     state: PathBuf,
     #[serde(default = "lease_ms", skip_serializing, deserialize_with = "field::lease_ms")]
     lease_ms: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "field::optional_positive")]
+    radio_range_m: Option<f64>,
     #[serde(default)]
     pub seed: u64,
     #[serde(default)]
@@ -203,6 +205,7 @@ impl AgentFile {
             roster: agent.roster.clone(),
             state: state(),
             lease_ms: lease_ms(),
+            radio_range_m: agent.radio_range_m,
             // TOML has no greater number.
             seed: agent.seed.min(i64::MAX.unsigned_abs()),
             position: agent.position,
@@ -282,6 +285,7 @@ impl AgentFile {
             link_loss: self.mission.without_ground,
             scripts: self.script.iter().map(|script| script.read(folder)).collect::<anyhow::Result<_>>()?,
             lease: Duration::from_secs_f64(self.lease_ms / 1000.0),
+            radio_range_m: self.radio_range_m,
             authority: self.authority.unwrap_or_else(standard_authority),
             kept: Kept::default(),
             seed: self.seed,

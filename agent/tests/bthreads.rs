@@ -50,6 +50,7 @@ fn config() -> AgentConfig {
         scripts: Vec::new(),
         behaviours: Default::default(),
         lease: SECOND,
+        radio_range_m: None,
         authority: skein_wire::standard_authority(),
         kept: skein_dbp::Kept::default(),
         seed: 1,
@@ -1278,8 +1279,12 @@ mod right_of_way_without_the_lost {
 
     /// In a fleet of five, whose others are all heard.
     fn in_reach() -> Vehicle {
+        with_radio_to(None)
+    }
+
+    fn with_radio_to(radio_range_m: Option<f64>) -> Vehicle {
         let roster = [ME, LOWER, HIGHER, "uav/12", "ground/1", "script/operator"].map(str::to_owned);
-        let config = AgentConfig { roster: roster.to_vec(), ..config() };
+        let config = AgentConfig { roster: roster.to_vec(), radio_range_m, ..config() };
         let mut vehicle = Vehicle::in_the_air(&config);
         for other in [LOWER, HIGHER, "uav/12", "ground/1"] {
             vehicle.learns(joined(other));
@@ -1319,6 +1324,25 @@ mod right_of_way_without_the_lost {
         let mut vehicle = in_reach();
         loses(&mut vehicle, HIGHER, "hold right_of_way");
         assert_eq!(asks(&mut vehicle), [LOWER, HIGHER, "uav/12"]);
+    }
+
+    #[test]
+    fn one_that_is_lost_with_a_claim_closes_only_what_it_claimed() {
+        for (place, is_closed) in [([5.0, 0.0, 2.0], true), ([45.0, 0.0, 2.0], false)] {
+            let mut vehicle = in_reach();
+            vehicle.hears(at(Event::new(format!("{HIGHER}/passage")), place));
+            loses(&mut vehicle, HIGHER, "hold right_of_way");
+            assert_eq!(asks(&mut vehicle).contains(&HIGHER), is_closed, "{place:?}");
+        }
+    }
+
+    #[test]
+    fn where_radio_is_short_nobody_is_asked_who_is_not_heard() {
+        let mut vehicle = with_radio_to(Some(15.0));
+        for other in [HIGHER, "uav/12", "ground/1"] {
+            loses(&mut vehicle, other, "right_of_way");
+        }
+        assert_eq!(asks(&mut vehicle), [LOWER]);
     }
 
     #[test]

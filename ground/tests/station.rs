@@ -210,6 +210,7 @@ const LOSSY: NetworkConfig = NetworkConfig {
     loss: 0.2,
     duplicate: 0.1,
     reorder: 0.3,
+    range_m: None,
 };
 
 #[test]

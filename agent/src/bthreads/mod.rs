@@ -59,7 +59,8 @@ pub fn load(program: &mut Program, config: &AgentConfig) {
     let with_say = |node: &&String| node.starts_with("uav/") || **node == config.ground;
     let others = config.roster.iter().filter(with_say).filter(|node| **node != config.node);
     let others = others.map(String::as_str);
-    load_with(program, config, RightOfWay::new(Me::new(&config.node), others, config.lease));
+    let right_of_way = RightOfWay::new(Me::new(&config.node), others, config.lease);
+    load_with(program, config, right_of_way.with_short_radio(config.radio_range_m.is_some()));
 }
 
 /// The same with another b-thread in place of [`RightOfWay`].

@@ -12,9 +12,13 @@
 //! makes way: see [`Right`]. If it cannot, it is cornered, and goes first.
 //!
 //! A vehicle that is lost confirms nothing, and must not close every passage for ever. It is done without while most of
-//! the fleet is in reach, unless it had a claim when it was lost: to claim one since, it would have needed the
-//! confirmation of those who have lost it. So on a cut network one side at most goes on, and whoever was inside is
-//! waited for. Whoever has just heard another again first lets claims cross, for as long as it takes to repeat them.
+//! the fleet is in reach, unless it had a claim to this very stretch when it was lost: to claim another since, it would
+//! have needed the confirmation of those who have lost it. So on a cut network one side at most goes on, and whoever was
+//! inside is waited for. Whoever has just heard another again first lets claims cross, for as long as it takes to repeat
+//! them.
+//!
+//! Where radio is known to be short, silence is distance: whoever is not heard is so far away that it cannot be at a
+//! place within half the range before that is let go, and is done without.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -48,8 +52,10 @@ pub struct RightOfWay {
     me: Me,
     /// The other vehicles and the ground station.
     others: BTreeMap<String, Other>,
-    /// The rights of those of them that are in a narrow place, by what they said last.
-    inside: BTreeMap<String, Right>,
+    /// Their last word of those of them that have a narrow stretch before them.
+    told: BTreeMap<String, Told>,
+    /// Who is not heard is out of range.
+    radio_is_short: bool,
     /// The time that claims take to cross.
     meeting: Duration,
     /// No claim counts before this.
@@ -73,6 +79,13 @@ enum Other {
     Lost,
     /// Lost with a claim: it may be in a passage.
     LostClaiming,
+}
+
+/// The word of another vehicle: its right to go first, and the stretch of its way.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+struct Told {
+    right: Right,
+    stretch: Stretch,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -103,11 +116,12 @@ impl RightOfWay {
     pub fn new<'a>(me: Me, others: impl IntoIterator<Item = &'a str>, lease: Duration) -> Self {
         let others = others.into_iter().map(|node| (node.to_owned(), Other::Unheard)).collect();
         let meeting = lease.mul_f64(MEETING_LEASES);
-        let (held, ahead, inside) = (Stretch::default(), Stretch::default(), BTreeMap::new());
+        let (held, ahead, told) = (Stretch::default(), Stretch::default(), BTreeMap::new());
         Self {
             me,
             others,
-            inside,
+            told,
+            radio_is_short: false,
             meeting,
             met: Duration::ZERO,
             held,
@@ -115,6 +129,12 @@ impl RightOfWay {
             cornered: false,
             phase: Phase::Clear,
         }
+    }
+
+    /// The same in a fleet whose radios do not reach everywhere.
+    #[must_use]
+    pub fn with_short_radio(self, radio_is_short: bool) -> Self {
+        Self { radio_is_short, ..self }
     }
 
     /// Its right to go first.
@@ -135,12 +155,21 @@ impl RightOfWay {
     fn claim(&self) -> EventSet {
         let against = self.held.against().or(self.ahead.against());
         let alive = 1 + self.others.values().filter(|other| **other == Other::Alive).count();
-        if 2 * alive <= self.others.len() + 1 {
+        if !self.radio_is_short && 2 * alive <= self.others.len() + 1 {
             return self.of_everyone(against);
         }
-        let needed =
-            self.others.iter().filter(|(_, other)| matches!(other, Other::Alive | Other::LostClaiming));
+        let needed = self.others.iter().filter(|(node, other)| match other {
+            Other::Alive => true,
+            Other::LostClaiming => !self.radio_is_short && self.may_hold(node),
+            Other::Unheard | Other::Lost => false,
+        });
         EventSet::any_of(needed.map(|(node, _)| of::<Enter>(node))).and(against)
+    }
+
+    /// Whether another that was lost with a claim may be in the stretch ahead: its claim was for what it told last.
+    fn may_hold(&self, node: &str) -> bool {
+        let told = self.told.get(node).filter(|told| !told.stretch.is_empty());
+        told.is_none_or(|told| self.ahead.leads_against(&told.stretch, &self.me))
     }
 
     /// The fate of its claim on the place with number `next`, which it insists on until then, now that another
@@ -149,7 +178,7 @@ impl RightOfWay {
     fn stand_against(&mut self, stalled: &Stalled, (next, until): (usize, Duration), now: Duration) -> Phase {
         // Facts name a remote b-thread `node#bthread`.
         let node = stalled.by.split('#').next().unwrap_or_default();
-        let its_right = self.inside.get(node).copied().unwrap_or(Right::Free);
+        let its_right = self.told.get(node).map_or(Right::Free, |told| told.right);
         let gives_in = stalled.event.ends_with(Enter::NAME)
             && goes_before((node, its_right), (self.me.name(), self.right()));
         match (gives_in, self.held.is_entered()) {
@@ -231,12 +260,18 @@ impl RightOfWay {
     fn hear_other(&mut self, event: &Event, now: Duration) -> Option<Phase> {
         let (node, verb) =
             event.name().rsplit_once('/').filter(|(node, _)| self.others.contains_key(*node))?;
-        let is_inside = Stretch::read(event).is_some_and(|stretch| !stretch.here().is_empty());
-        match (verb, self.inside.get(node)) {
-            (Cornered::NAME, _) => drop(self.inside.insert(node.to_owned(), Right::Cornered)),
-            (Passage::NAME, Some(Right::Cornered)) => {}
-            (Passage::NAME, _) if is_inside => drop(self.inside.insert(node.to_owned(), Right::Inside)),
-            _ => drop(self.inside.remove(node)),
+        match (verb, Stretch::read(event)) {
+            (Cornered::NAME, _) => self.told.entry(node.to_owned()).or_default().right = Right::Cornered,
+            (_, Some(stretch)) => {
+                let told = self.told.entry(node.to_owned()).or_default();
+                told.right = match told.right {
+                    Right::Cornered => Right::Cornered,
+                    _ if stretch.here().is_empty() => Right::Free,
+                    _ => Right::Inside,
+                };
+                told.stretch = stretch;
+            }
+            _ => drop(self.told.remove(node)),
         }
         Some(match self.phase {
             Phase::Yielding { .. } if verb == Leave::NAME => self.go_on(now),

@@ -149,6 +149,7 @@ fn memory_network(scenario: &Scenario) -> Network {
     let config = NetworkConfig {
         latency: (mean / 2, mean * 3 / 2),
         loss: scenario.network.loss,
+        range_m: scenario.network.radio_range_m,
         ..NetworkConfig::default()
     };
     Network::new(config, scenario.seed)
@@ -182,6 +183,11 @@ struct Lockstep(Network);
 impl Host for Lockstep {
     fn before_step(&mut self, swarm: &mut Swarm) {
         self.0.advance(swarm.now() + skein_world::STEP);
+        for (index, agent) in swarm.agents().enumerate() {
+            if let Some(vehicle) = swarm.simulation().vehicle(index) {
+                self.0.place(agent.name(), vehicle.motion.position.into());
+            }
+        }
     }
 
     fn after_step(&mut self, _: &Swarm, _: &Happenings) {}

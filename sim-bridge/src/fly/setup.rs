@@ -110,6 +110,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             scripts: scripts_of(scenario, index + 1),
             behaviours: scenario.behaviours.clone(),
             lease: lease(scenario),
+            radio_range_m: scenario.network.radio_range_m,
             authority: standard_authority(),
             kept: Kept::default(),
             seed: scenario.seed.wrapping_mul(1000).wrapping_add(index as u64),

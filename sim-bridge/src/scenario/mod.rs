@@ -177,11 +177,15 @@ pub struct Network {
     /// long as a message takes there and back.
     #[serde(deserialize_with = "field::lease_ms")]
     pub lease_ms: f64,
+    /// Vehicles hear one another within so many metres; everywhere, if it is left out. The ground station hears and is
+    /// heard by all.
+    #[serde(deserialize_with = "field::optional_positive")]
+    pub radio_range_m: Option<f64>,
 }
 
 impl Default for Network {
     fn default() -> Self {
-        Self { latency_ms: 5.0, loss: 0.0, lease_ms: 1000.0 }
+        Self { latency_ms: 5.0, loss: 0.0, lease_ms: 1000.0, radio_range_m: None }
     }
 }
 

@@ -6,7 +6,7 @@ mod circle;
 mod dstar_grid;
 mod feasibility;
 mod lsc;
-mod naive_right_of_way;
+pub mod naive_right_of_way;
 mod narrow;
 mod performance;
 mod potential;
