@@ -128,7 +128,8 @@ impl Control {
             estimate: Estimate::default(),
             doubt: None,
             perception: Perception::of_mission(&config)?,
-            neighbours: Neighbours::new(name.clone(), config.incarnation, config.roster.len()),
+            neighbours: Neighbours::new(name.clone(), config.incarnation, config.roster.len())
+                .within_radio_range(config.radio_range_m),
             watches: Watches::default(),
             refuge: Refuge::new([config.home[0], config.home[1], config.return_altitude_m], &config.rally),
             energy: Energy::new(config.clone()),
@@ -217,6 +218,7 @@ impl Control {
 
     /// Takes in what other vehicles say of themselves.
     pub fn hear(&mut self, now: Duration, states: Vec<State>) {
+        self.neighbours.listen_at(self.motion().map(|motion| motion.position));
         for state in states {
             self.neighbours.hear(now, state);
         }

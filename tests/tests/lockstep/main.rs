@@ -10,6 +10,7 @@ mod faults;
 mod gazebo_worlds;
 mod landing;
 mod limits;
+mod lost_inside;
 mod moving;
 mod narrow_alone;
 mod no_lidar;
