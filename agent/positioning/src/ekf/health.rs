@@ -11,11 +11,12 @@ pub enum Aid {
     Flow,
     Range,
     Pressure,
+    Rest,
 }
 
 impl Aid {
-    pub const ALL: [Self; 6] =
-        [Self::Markers, Self::Lidar, Self::Satellites, Self::Flow, Self::Range, Self::Pressure];
+    pub const ALL: [Self; 7] =
+        [Self::Markers, Self::Lidar, Self::Satellites, Self::Flow, Self::Range, Self::Pressure, Self::Rest];
 }
 
 /// What one source has done.
@@ -27,6 +28,8 @@ pub struct Fused {
     pub fused: Option<Duration>,
     /// Since when every one has been further off than noise explains.
     pub off_since: Option<Duration>,
+    /// How many in a row noise explains.
+    pub fits: u64,
     /// The squared innovation of the newest by its covariance, per degree of freedom: 1 on the mean where covariances
     /// are honest.
     pub ratio: f64,
@@ -52,8 +55,10 @@ impl Health {
         fused.ratio = weighed.ratio;
         if weighed.passed {
             fused.off_since = None;
+            fused.fits += 1;
         } else {
             fused.refused += 1;
+            fused.fits = 0;
             fused.off_since.get_or_insert(stamp);
         }
         if weighed.passed && is_fused {

@@ -67,6 +67,14 @@ pub struct Pressure {
     pub sigma_m: f64,
 }
 
+/// The vehicle stands still.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rest {
+    pub stamp: Duration,
+    /// Standard deviation of each axis of its velocity, m/s.
+    pub sigma_m_s: f64,
+}
+
 /// A measurement of any sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Measurement {
@@ -76,6 +84,7 @@ pub enum Measurement {
     Flow(Flow),
     Range(Range),
     Pressure(Pressure),
+    Rest(Rest),
 }
 
 type Jacobian<const ROWS: usize> = SMatrix<f64, ROWS, SIZE>;
@@ -89,6 +98,7 @@ impl Measurement {
             Self::Flow(flow) => flow.stamp,
             Self::Range(range) => range.stamp,
             Self::Pressure(pressure) => pressure.stamp,
+            Self::Rest(rest) => rest.stamp,
         }
     }
 
@@ -100,6 +110,7 @@ impl Measurement {
             Self::Flow(_) => Aid::Flow,
             Self::Range(_) => Aid::Range,
             Self::Pressure(_) => Aid::Pressure,
+            Self::Rest(_) => Aid::Rest,
         }
     }
 
@@ -113,6 +124,7 @@ impl Measurement {
             Self::Flow(flow) => flow_of(flow, state, is_fused),
             Self::Range(range) => range_of(range, state, is_fused),
             Self::Pressure(pressure) => pressure_of(pressure, state, is_fused),
+            Self::Rest(rest) => rest_of(rest, state, is_fused),
         }
     }
 }
@@ -204,4 +216,11 @@ fn pressure_of(pressure: &Pressure, state: &mut State, is_fused: bool) -> Option
     jacobian[PRESSURE_OFFSET] = 1.0;
     let noise = Matrix1::new(pressure.sigma_m * pressure.sigma_m);
     state.correct(&Vector1::new(pressure.height_m - expected), &jacobian, &noise, ONE, is_fused)
+}
+
+fn rest_of(rest: &Rest, state: &mut State, is_fused: bool) -> Option<Weighed> {
+    let mut jacobian = Jacobian::<3>::zeros();
+    jacobian.fixed_view_mut::<3, 3>(0, VELOCITY).fill_with_identity();
+    let noise = Matrix3::from_diagonal_element(rest.sigma_m_s * rest.sigma_m_s);
+    state.correct(&-state.velocity, &jacobian, &noise, THREE, is_fused)
 }

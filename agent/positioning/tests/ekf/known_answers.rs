@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector2, Vector3};
 use skein_positioning::ekf::{
-    Aid, Ekf, Flow, Inertial, Measurement, Noise, Pressure, Range, Satellites, Start,
+    Aid, Ekf, Flow, Inertial, Measurement, Noise, Pressure, Range, Rest, Satellites, Start,
 };
 use skein_positioning::{PlanarFix, PoseFix};
 
@@ -208,4 +208,17 @@ fn a_shift_moves_the_place_and_keeps_the_motion() {
     hover(&mut ekf, ms(600));
     ekf.measure(marker(ms(550), Vector3::new(1.0, 0.0, 2.0)), true);
     assert_eq!(ekf.health().of(Aid::Markers).taken, 1);
+}
+
+#[test]
+fn standing_still_teaches_the_biases_and_keeps_the_place() {
+    let mut ekf = Ekf::new(Noise::SMALL, start());
+    let turns_too_much = Vector3::new(0.004, -0.003, 0.0);
+    for step in 1..=2000 {
+        let stamp = ms(10 * step);
+        ekf.feel(Inertial { stamp, rate: turns_too_much, force: GRAVITY });
+        ekf.measure(Measurement::Rest(Rest { stamp, sigma_m_s: 0.02 }), true);
+    }
+    assert!((ekf.state().rate_bias - turns_too_much).norm() < 5e-4, "{}", ekf.state().rate_bias);
+    assert!((ekf.state().position - start().position).norm() < 0.05);
 }
