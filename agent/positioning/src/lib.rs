@@ -4,5 +4,6 @@
 //! chooses.
 
 mod fix;
+pub mod lidar;
 
 pub use self::fix::{PlanarFix, PoseFix};
