@@ -15,12 +15,13 @@ const GROUND_SLOPE: f64 = 0.02;
 const SURFACE_M: f64 = 0.25;
 /// Returns on either side that tell a surface's direction, at most.
 const MOST_ON_A_SIDE: usize = 6;
-/// Variance of the direction of a surface that is a ray or two wide, rad²: it looks at the lidar, more or less.
-const LONE_RAD2: f64 = 0.3;
-/// Added where a surface ends, rad²: a round one turns away there.
-const EDGE_RAD2: f64 = 0.05;
-/// Returns nearer to the one before than this tell nothing new, m.
-const THINNEST_M: f64 = 0.04;
+/// Variance of the direction of a surface that is a ray or two wide, rad²: it looks at the lidar, more or less. No
+/// direction is worse known.
+const LONE_RAD2: f64 = 0.05;
+/// Returns nearer to one another than this are one, m.
+const FINEST_M: f64 = 0.04;
+/// Cosine between the directions of two returns of one surface, at least.
+const ONE_SURFACE: f64 = 0.7;
 /// No scan has more returns than this; of more rays every second, third ... is used.
 const MOST_RETURNS: usize = 1440;
 
@@ -114,25 +115,39 @@ impl LevelScan {
             sigma_m: sweep.sigma_m.max(1e-3),
             rays: (step * (rays as f64 + 1.0) > TAU).then_some(rays),
         };
-        let mut returns: Vec<Return> = Vec::with_capacity(hits.len());
-        for at in 0..hits.len() {
-            let is_new = |last: &Return| (last.point - hits[at].point).norm() >= THINNEST_M;
-            if returns.last().is_none_or(is_new) {
-                returns.extend(surfaces.at(at));
-            }
-        }
-        Self { stamp: sweep.stamp, returns }
+        let returns: Vec<Return> = (0..hits.len()).filter_map(|at| surfaces.at(at)).collect();
+        Self { stamp: sweep.stamp, returns: gathered(&returns, FINEST_M) }
     }
+}
 
-    /// The same returns, none nearer than `spacing_m` to the one before.
-    pub fn thinned(&self, spacing_m: f64) -> Vec<Return> {
-        let mut kept: Vec<Return> = Vec::new();
-        for one in &self.returns {
-            if kept.last().is_none_or(|last| (last.point - one.point).norm() >= spacing_m) {
-                kept.push(*one);
-            }
+/// Neighbours within `spacing_m` become one, their mean. None is left out: whether a return is so far from the one before
+/// depends on its error, so that those that are would lean the same way all along a wall.
+pub fn gathered(returns: &[Return], spacing_m: f64) -> Vec<Return> {
+    let mut all: Vec<Return> = Vec::new();
+    let mut from = 0;
+    for to in 1..=returns.len() {
+        let first = &returns[from];
+        let is_one = |one: &Return| {
+            (one.point - first.point).norm() < spacing_m && one.normal.dot(&first.normal) > ONE_SURFACE
+        };
+        if !returns.get(to).is_some_and(is_one) {
+            all.push(mean(&returns[from..to]));
+            from = to;
         }
-        kept
+    }
+    all
+}
+
+fn mean(returns: &[Return]) -> Return {
+    let count = returns.len() as f64;
+    let sum = |of: fn(&Return) -> f64| returns.iter().map(of).sum::<f64>();
+    let vector = |of: fn(&Return) -> Vector2<f64>| returns.iter().map(of).sum::<Vector2<f64>>();
+    Return {
+        point: vector(|one| one.point) / count,
+        normal: vector(|one| one.normal).normalize(),
+        // Neighbours share the returns that tell their directions.
+        normal_variance: sum(|one| one.normal_variance) / count,
+        variance: sum(|one| one.variance) / (count * count),
     }
 }
 
@@ -181,20 +196,18 @@ impl Surfaces<'_> {
         let sides = [self.side(at, true), self.side(at, false)];
         let least = sides[0].len().min(sides[1].len());
         // As many on both sides: so the direction is true on a round surface too.
-        let (used, edge_rad2) = match least >= 2 {
-            true => (least, 0.0),
-            false => (MOST_ON_A_SIDE, EDGE_RAD2),
-        };
+        let is_balanced = least >= 2;
+        let used = if is_balanced { least } else { MOST_ON_A_SIDE };
         let near: Vec<Vector2<f64>> = sides.iter().flat_map(|side| side.iter().take(used)).copied().collect();
         let to_lidar = -hit.point.normalize();
         let (normal, normal_variance) = match near.len() >= 2 {
-            true => self.direction(&hit.point, &near, &to_lidar),
+            true => self.direction(&hit.point, &near, &to_lidar, is_balanced),
             false if self.stands_out(at) => (to_lidar, LONE_RAD2),
             false => return None,
         };
         let facing = normal.dot(&to_lidar).powi(2).max(0.1);
         let variance = self.sigma_m.powi(2) * facing;
-        let normal_variance = (normal_variance + edge_rad2).min(LONE_RAD2);
+        let normal_variance = normal_variance.min(LONE_RAD2);
         Some(Return { point: hit.point, normal, normal_variance, variance })
     }
 
@@ -247,6 +260,7 @@ impl Surfaces<'_> {
         point: &Vector2<f64>,
         near: &[Vector2<f64>],
         to_lidar: &Vector2<f64>,
+        is_balanced: bool,
     ) -> (Vector2<f64>, f64) {
         let count = near.len() as f64 + 1.0;
         let mean = near.iter().fold(*point, |sum, other| sum + other) / count;
@@ -256,7 +270,9 @@ impl Surfaces<'_> {
         let least = usize::from(eigen.eigenvalues[1] < eigen.eigenvalues[0]);
         let normal = eigen.eigenvectors.column(least).into_owned();
         let (across, along) = (eigen.eigenvalues[least].max(0.0), eigen.eigenvalues[1 - least]);
-        let noise = (across / (count - 1.0).max(1.0)).max(self.sigma_m.powi(2));
+        // What a round surface bends away turns nothing where there is as much on both sides.
+        let bent = if is_balanced { 0.0 } else { across / (count - 1.0).max(1.0) };
+        let noise = bent.max(self.sigma_m.powi(2));
         let variance = noise / along.max(1e-9);
         (if normal.dot(to_lidar) < 0.0 { -normal } else { normal }, variance)
     }

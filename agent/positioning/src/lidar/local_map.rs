@@ -58,9 +58,9 @@ impl LocalMap {
         self.surfaces.clear();
     }
 
-    /// World place of the corner with the least coordinates, m.
-    pub fn corner(&self) -> &Vector2<f64> {
-        &self.corner
+    /// Memory it takes, bytes.
+    pub fn bytes(&self) -> usize {
+        self.first.capacity() * size_of::<u32>() + self.surfaces.capacity() * size_of::<Surface>()
     }
 
     pub fn surfaces(&self) -> &[Surface] {

@@ -81,6 +81,33 @@ impl World {
         Self { walls: Vec::new(), trunks: trunks.collect() }
     }
 
+    /// A hall of racks 2 m deep, 6 m apart, all alike but for the goods that stand out by up to 0.3 m.
+    pub fn warehouse(length_m: f64, racks: u32, seed: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let [from, to] = [-10.0, length_m];
+        let north = 6.0 * f64::from(racks) + 2.0;
+        let mut walls = Self::outline(&[[from, -8.0], [to, -8.0], [to, north], [from, north]]);
+        for rack in 0..racks {
+            let middle = 3.0 + 6.0 * f64::from(rack) - 6.0;
+            let (low, high) = (middle - 1.0, middle + 1.0);
+            walls.extend(Self::outline(&[
+                [2.0, low],
+                [length_m - 12.0, low],
+                [length_m - 12.0, high],
+                [2.0, high],
+            ]));
+            for _ in 0..(length_m / 2.5) as u32 {
+                let (x, out) = (random.random_range(2.5..length_m - 14.0), random.random_range(0.05..0.3));
+                let (side, sign) =
+                    if random.random_range(0.0..1.0) < 0.5 { (low, -1.0) } else { (high, 1.0) };
+                let corners =
+                    [[x, side], [x, side + sign * out], [x + 0.8, side + sign * out], [x + 0.8, side]];
+                walls.extend(Self::outline(&corners));
+            }
+        }
+        Self { walls, trunks: Vec::new() }
+    }
+
     /// From `place` along the direction to the first thing met, m.
     pub fn range(&self, place: &Vector2<f64>, direction_rad: f64) -> f64 {
         let direction = Vector2::new(direction_rad.cos(), direction_rad.sin());
@@ -126,5 +153,38 @@ impl World {
             ray_step_s: 0.0,
             sigma_m: SIGMA_M,
         }
+    }
+}
+
+/// A flight through a world, told by dead reckoning that errs.
+pub struct Flight {
+    random: ChaCha8Rng,
+    truth: Isometry2<f64>,
+    reckoned: Isometry2<f64>,
+    covariance: Matrix3<f64>,
+}
+
+impl Flight {
+    pub fn new(start: Isometry2<f64>, seed: u64) -> Self {
+        let covariance = Matrix3::identity() * 1e-6;
+        Self { random: ChaCha8Rng::seed_from_u64(seed), truth: start, reckoned: start, covariance }
+    }
+
+    /// Flies to `to` in a tenth of a second, with an error of 3 % and a bit of the way, and of 2 mrad.
+    pub fn fly(&mut self, to: Isometry2<f64>) -> Prediction {
+        let moved = self.truth.inverse() * to;
+        let sigma_m = 0.005 + 0.03 * moved.translation.vector.norm();
+        let mut off = |sigma: f64| sigma * normal(&mut self.random);
+        let wrong = Isometry2::new(Vector2::new(off(sigma_m), off(sigma_m)), off(0.002));
+        self.truth = to;
+        self.reckoned *= moved * wrong;
+        let grown = Vector3::new(sigma_m.powi(2), sigma_m.powi(2), 0.002_f64.powi(2));
+        self.covariance += Matrix3::from_diagonal(&grown);
+        Prediction { covariance: self.covariance, ..flat(self.reckoned, 0.0) }
+    }
+
+    /// From now on the reckoning is off by `away`.
+    pub fn mislead(&mut self, away: &Isometry2<f64>) {
+        self.reckoned *= away;
     }
 }
