@@ -203,6 +203,7 @@ impl Control {
         if now.saturating_sub(scan.stamp) > FRESH_FOR {
             return;
         }
+        self.positioning.scan(scan);
         let [up_m, down_m] = [scan.up_m, scan.down_m].map(|range| range.map(f64::from));
         self.look = Some(Look { stamp: scan.stamp, up_m, down_m });
         let Some((position, attitude)) = self.estimate.pose_at(scan.stamp) else { return };
@@ -645,6 +646,12 @@ impl Control {
     #[must_use]
     pub fn guidance(&self) -> &Guidance {
         &self.guidance
+    }
+
+    /// The vehicle's state by its own belief.
+    #[must_use]
+    pub fn estimate(&self) -> &Estimate {
+        &self.estimate
     }
 
     /// Standard deviation of the position, m; 0 while there is none.

@@ -21,7 +21,7 @@ use crate::{
     control::{Control, SetPointRecord},
     mission::{Mission, Outcome},
     parts::Parts,
-    positioning::Motion,
+    positioning::{Estimate, Motion},
     scripts::RunningScript,
 };
 
@@ -144,6 +144,12 @@ impl AgentCore {
     /// Takes in a lidar scan.
     pub fn sense(&mut self, now: Duration, scan: &Scan) {
         self.side.control.sense(now, scan);
+    }
+
+    /// The vehicle's state by its own belief.
+    #[must_use]
+    pub fn estimate(&self) -> &Estimate {
+        self.side.control.estimate()
     }
 
     /// Takes in a pose by markers.

@@ -5,5 +5,6 @@
 
 pub mod ekf;
 mod fix;
+pub mod lidar;
 
 pub use self::fix::{PlanarFix, PoseFix};

@@ -7,10 +7,13 @@
 
 use std::time::Duration;
 
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix6, UnitQuaternion, Vector3};
 use skein_mav::{External, Landed, Measured, Stamped, Telemetry};
 use skein_positioning::PoseFix;
 use skein_positioning::ekf::{Aid, Ekf, Flow, Inertial, Measurement, Noise, Range, Rest, Satellites, Start};
+use skein_positioning::lidar::{LevelScan, Prediction, Slam, SlamConfig, Sweep};
+
+use skein_wire::Scan;
 
 use super::autopilot::Autopilot;
 use super::dead_reckoning;
@@ -44,6 +47,9 @@ const LEAST_QUALITY: f64 = 0.2;
 /// A distance without an accuracy of its own has this one, m, and no distance a better one than this.
 const RANGE_M: f64 = 0.03;
 const BEST_RANGE_M: f64 = 0.01;
+/// Scans count from this height, m, and are this noisy, m.
+const SCANS_ABOVE_M: f64 = 0.5;
+const SCAN_SIGMA_M: f64 = 0.03;
 /// A distance to the ground is that of flow for so long.
 const RANGE_LASTS: Duration = Duration::from_millis(200);
 
@@ -65,6 +71,9 @@ pub struct Fused {
     home: Vector3<f64>,
     range: Option<Stamped<f64>>,
     newest_markers: Option<PoseFix>,
+    slam: Option<Slam>,
+    /// Covariance east and north of the newest fix by lidar, m²: the errors of the map that all of them share.
+    of_lidar: Matrix2<f64>,
     smooth: Smooth,
     /// All jumps of the filter's frame, m, and their number.
     frame: Vector3<f64>,
@@ -88,6 +97,8 @@ impl Fused {
             home,
             range: None,
             newest_markers: None,
+            slam: sources.contains(&PositionSource::Lidar).then(|| Slam::new(SlamConfig::default())),
+            of_lidar: Matrix2::zeros(),
             smooth: Smooth::default(),
             frame: Vector3::zeros(),
             resets: 0,
@@ -195,6 +206,25 @@ impl Fused {
         }
     }
 
+    /// Where the vehicle is believed to be when a scan was taken; none on the ground, from where there is little to see.
+    fn prediction(&self, stamp: Duration) -> Option<Prediction> {
+        let state = self.ekf.as_ref()?.state();
+        let lead_s = stamp.as_secs_f64() - state.stamp.as_secs_f64();
+        let position = state.position + state.velocity * lead_s;
+        let covariance = state.covariance();
+        let mut planar = Matrix3::zeros();
+        planar.fixed_view_mut::<2, 2>(0, 0).copy_from(&covariance.fixed_view::<2, 2>(0, 0));
+        planar[(2, 2)] = covariance[(8, 8)];
+        (position.z > self.home.z + SCANS_ABOVE_M && lead_s.abs() < 0.5).then(|| Prediction {
+            position,
+            body_to_world: state.body_to_world * UnitQuaternion::from_scaled_axis(state.rate * lead_s),
+            velocity: state.velocity,
+            turn_rate: state.rate,
+            covariance: planar,
+            ground_m: self.home.z,
+        })
+    }
+
     /// Finds out which sources have come and gone.
     fn review(&mut self, now: Duration) {
         let Some(ekf) = &self.ekf else { return };
@@ -256,6 +286,10 @@ impl Fused {
         let mut of_motion: Matrix6<f64> = covariance.fixed_view::<6, 6>(0, 0).into();
         let mut place = of_motion.fixed_view_mut::<3, 3>(0, 0);
         place += offset * offset.transpose();
+        if self.flown != Some(PositionSource::Markers) {
+            let mut level = of_motion.fixed_view_mut::<2, 2>(0, 0);
+            level += self.of_lidar;
+        }
         let motion =
             Motion { position: state.position + offset, velocity: state.velocity, covariance: of_motion };
         let attitude = Attitude {
@@ -327,7 +361,26 @@ impl Positioning for Fused {
                 self.newest_markers = Some(*fix);
                 self.take(Measurement::Markers(*fix));
             }
-            Sensed::Lidar(fix) => self.take(Measurement::Lidar(*fix)),
+        }
+    }
+
+    fn scan(&mut self, scan: &Scan) {
+        let Some(prediction) = self.prediction(scan.stamp) else { return };
+        let Some(slam) = &mut self.slam else { return };
+        let sweep = Sweep {
+            stamp: scan.stamp,
+            ranges_m: &scan.ranges_m,
+            angle_min: scan.angle_min,
+            angle_step: scan.angle_step,
+            max_range_m: scan.max_range_m,
+            first_ray_s: 0.0,
+            ray_step_s: 0.0,
+            sigma_m: SCAN_SIGMA_M,
+        };
+        let level = LevelScan::new(&sweep, &prediction, |_| false);
+        if let Some(fix) = slam.step(&level, &prediction) {
+            self.of_lidar = fix.covariance.fixed_view::<2, 2>(0, 0).into();
+            self.take(Measurement::Lidar(fix));
         }
     }
 

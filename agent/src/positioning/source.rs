@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use skein_mav::{External, Measured, Stamped, Telemetry};
-use skein_positioning::{PlanarFix, PoseFix};
+use skein_positioning::PoseFix;
+use skein_wire::Scan;
 
 use super::estimate::Estimate;
 use crate::config::PositionSource;
@@ -15,8 +16,6 @@ pub enum Sensed {
     Instrument(Stamped<Measured>),
     /// A pose by markers.
     Markers(PoseFix),
-    /// A pose by matched scans.
-    Lidar(PlanarFix),
 }
 
 /// A source of position can be flown by from now on, or cannot.
@@ -34,6 +33,9 @@ pub trait Positioning: std::fmt::Debug + Send {
 
     /// Takes in what a sensor has told.
     fn sense(&mut self, _now: Duration, _sensed: &Sensed) {}
+
+    /// Takes in a lidar scan.
+    fn scan(&mut self, _scan: &Scan) {}
 
     /// Whether it lives on what the autopilot's instruments measure.
     fn wants_measured(&self) -> bool {

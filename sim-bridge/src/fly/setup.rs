@@ -89,7 +89,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             takeoff_height_m: scenario.takeoff_height_m,
             return_altitude_m: (RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64)
                 .min(bounds.max.z - 1.0),
-            position: sources(plan),
+            position: sources(scenario, plan),
             sigma_limit_m: DEFAULT_SIGMA_LIMIT_M,
             lidar: plan.model.lidar.is_some(),
             fence,
@@ -118,8 +118,11 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
         .collect()
 }
 
-/// The sources of position that a vehicle of the simulated world has.
-fn sources(plan: &VehiclePlan) -> Vec<PositionSource> {
+/// The sources of position of a vehicle of the simulated world: what the scenario says, or what it has.
+fn sources(scenario: &Scenario, plan: &VehiclePlan) -> Vec<PositionSource> {
+    if !scenario.position.is_empty() {
+        return scenario.position.clone();
+    }
     let model = &plan.model;
     let sources = [
         (PositionSource::Autopilot, model.gps.is_some()),

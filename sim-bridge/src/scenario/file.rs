@@ -9,7 +9,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AirspaceTable, GlobalPlanner, LocalPlanner, Nose, Planners, Repellers};
+use skein_agent::{
+    AirspaceTable, GlobalPlanner, LocalPlanner, Nose, Planners, PositionSource, Repellers, position_sources,
+};
 use skein_bp::behaviour::{Behaviours, Settings};
 use skein_bp::configuration::{self, Malformed};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
@@ -95,6 +97,8 @@ struct FileTable {
     markers: Option<MarkersTable>,
     #[serde(default, deserialize_with = "field::optional_positive")]
     margin_m: Option<f64>,
+    #[serde(default, deserialize_with = "position_sources")]
+    position: Vec<PositionSource>,
     bounds: Option<BoundsTable>,
     wind: Option<WindTable>,
     #[serde(default)]
@@ -340,6 +344,7 @@ impl ScenarioFile {
             },
             separation_hulls: SEPARATION_HULLS,
             margin_m: table.margin_m,
+            position: table.position,
             takeoff_height_m,
             without_ground: table.without_ground,
             time_limit_s,

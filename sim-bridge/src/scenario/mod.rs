@@ -32,7 +32,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::value::{Error as WordError, StrDeserializer};
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{Errand, Planners};
+use skein_agent::{Errand, Planners, PositionSource};
 use skein_bp::behaviour::{Behaviours, Chosen};
 use skein_bp::script::Assignment;
 use skein_mav::Datum;
@@ -114,6 +114,8 @@ pub struct Scenario {
     pub separation_hulls: f64,
     /// Clearance kept between hull and obstacles when a path is planned, in metres; the agent's own if `None`.
     pub margin_m: Option<f64>,
+    /// What tells vehicles where they are, the preferred one first; what each has, if empty.
+    pub position: Vec<PositionSource>,
     /// Height above the ground at which a take-off ends.
     pub takeoff_height_m: f64,
     /// The policy of a vehicle that has been without the ground station for long.
