@@ -1,5 +1,7 @@
 //! Closing loops: a place that was seen before is looked for where the path's covariance lets it be, and measured.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Isometry2, Matrix3, Vector2};
 
 use super::key_frames::KeyFrames;
@@ -44,7 +46,7 @@ pub struct Loop {
 #[derive(Clone, Debug, Default)]
 pub struct Closure {
     /// The frames of which it was tried whether they show one place.
-    tried: Vec<[usize; 2]>,
+    tried: BTreeSet<[usize; 2]>,
     search: Option<Box<Attempt>>,
 }
 
@@ -93,9 +95,9 @@ impl Closure {
         let to =
             (0..frames.len()).filter(may_be).min_by(|one, other| unlike(*one).total_cmp(&unlike(*other)))?;
         if self.tried.len() >= MOST_TRIED {
-            self.tried.drain(..MOST_TRIED / 2);
+            self.tried.pop_first();
         }
-        self.tried.push([closing.from, to]);
+        self.tried.insert([closing.from, to]);
         let sigma_m = closing.apart[to].sqrt();
         let mut map = LocalMap::new(&Vector2::zeros());
         closing.frames.draw(&mut map, &frames[to].position(), to, &closing.frames.apart(to));
@@ -116,7 +118,7 @@ impl Attempt {
         let (own, other) = (&frames.all()[self.from], &frames.all()[self.to]);
         let found: Match = refine(&self.map, &own.returns, guess)?;
         let off_m = (found.pose.translation.vector - own.position()).norm();
-        if found.share < LEAST_SHARE || found.degenerate.is_some() || off_m > GATE * self.sigma_m + 0.1 {
+        if found.share < LEAST_SHARE || !found.is_whole || off_m > GATE * self.sigma_m + 0.1 {
             return None;
         }
         let back = turned(&found.pose).transpose();

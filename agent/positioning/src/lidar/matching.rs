@@ -47,6 +47,8 @@ pub struct Match {
     pub share: f64,
     /// Unit vector in the world along which the scan tells nothing, as in a smooth corridor.
     pub degenerate: Option<Vector2<f64>>,
+    /// Whether the scan tells each part of the pose, the heading too.
+    pub is_whole: bool,
     /// Steps taken.
     pub steps: usize,
 }
@@ -79,7 +81,8 @@ pub fn refine(map: &LocalMap, scan: &[Return], guess: &Isometry2<f64>) -> Option
         if steps >= MOST_STEPS || (steps > WIDE_STEPS && step.norm() < LEAST_STEP_M) {
             let share = normal.inliers as f64 / scan.len() as f64;
             let (covariance, degenerate) = (normal.covariance(), normal.degenerate());
-            return Some(Match { pose, covariance, share, degenerate, steps });
+            let is_whole = normal.told.iter().all(Option::is_some);
+            return Some(Match { pose, covariance, share, degenerate, is_whole, steps });
         }
         pose.translation.vector += step.xy();
         pose.rotation *= nalgebra::UnitComplex::new(step.z / arm_m);
@@ -176,7 +179,8 @@ impl Normal {
         let variances = Vector3::from(self.told.map(variance));
         let covariance = self.axes * Matrix3::from_diagonal(&variances) * self.axes.transpose();
         let unscaled = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0 / self.arm_m));
-        unscaled * covariance * unscaled
+        let covariance = unscaled * covariance * unscaled;
+        (covariance + covariance.transpose()) / 2.0
     }
 
     fn degenerate(&self) -> Option<Vector2<f64>> {

@@ -15,6 +15,8 @@ const KERNEL: f64 = 12.0;
 /// By so much the kernel narrows from round to round (Yang 2020): at first each loop pulls, and in the end those that
 /// the rest does not bear out do not.
 const NARROWING: f64 = 4.0;
+/// The last round's longest step in a solution, m and rad.
+const SETTLED: f64 = 0.02;
 /// No covariance is less than this, so that each has an inverse: m² and rad².
 const LEAST_VARIANCE: f64 = 1e-8;
 
@@ -66,6 +68,8 @@ pub struct Solve {
     round: usize,
     factor: Factor,
     stage: Stage,
+    /// The longest step of the last round, m and rad.
+    last_step: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,6 +110,7 @@ impl Solve {
             round: 0,
             factor: Factor::default(),
             stage,
+            last_step: 0.0,
         }
     }
 
@@ -138,6 +143,11 @@ impl Solve {
             products = products.saturating_sub(done.max(1));
         }
         self.stage == Stage::Done
+    }
+
+    /// Whether the last round changed hardly anything: without that the solution is none.
+    pub fn has_settled(&self) -> bool {
+        self.last_step < SETTLED
     }
 
     /// Poses and their covariances (world axes), once it is done.
@@ -188,7 +198,12 @@ impl Solve {
 
     fn step(&mut self) {
         let steps = self.factor.solve();
+        self.last_step = 0.0;
         for (pose, step) in self.poses.iter_mut().zip(&steps) {
+            // Not `max`, which passes over what is no number.
+            if !(step.norm() <= self.last_step) {
+                self.last_step = step.norm();
+            }
             pose.translation.vector += step.xy();
             pose.rotation *= nalgebra::UnitComplex::new(step.z);
         }

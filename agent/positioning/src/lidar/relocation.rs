@@ -36,12 +36,17 @@ pub struct Relocation {
     search: Search,
 }
 
-/// Where the vehicle is.
+/// What has come of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Located {
-    pub pose: Isometry2<f64>,
-    /// A frame near it.
-    pub frame: usize,
+pub enum Relocated {
+    Searching,
+    At {
+        pose: Isometry2<f64>,
+        /// A frame near it.
+        frame: usize,
+    },
+    /// At no place that is known.
+    Nowhere,
 }
 
 impl Relocation {
@@ -73,22 +78,21 @@ impl Relocation {
     }
 
     /// Goes on; where the vehicle is now, once it is found, when `guess` is where it is believed to be.
-    pub fn advance(&mut self, frames: &KeyFrames, guess: &Isometry2<f64>, squares: usize) -> Option<Located> {
+    pub fn advance(&mut self, frames: &KeyFrames, guess: &Isometry2<f64>, squares: usize) -> Relocated {
         let found = match self.search.advance(squares) {
-            Found::Searching => return None,
+            Found::Searching => return Relocated::Searching,
             Found::At(pose) => refine(&self.map, &self.returns, &pose),
             Found::Nowhere => None,
         };
-        if let Some(found) = found.filter(|found| found.share >= LEAST_SHARE && found.degenerate.is_none()) {
+        if let Some(found) = found.filter(|found| found.share >= LEAST_SHARE && found.is_whole) {
             let since = self.guess.inverse() * guess;
-            return Some(Located { pose: found.pose * since, frame: self.frame });
+            return Relocated::At { pose: found.pose * since, frame: self.frame };
         }
-        if let Some(frame) = self.next.pop() {
-            let pose = frames.all()[frame].pose;
-            self.frame = frame;
-            frames.draw(&mut self.map, &pose.translation.vector, frame, &frames.apart(frame));
-            self.search = Search::new(&self.map, &self.returns, &pose, ALIKE_M, PI);
-        }
-        None
+        let Some(frame) = self.next.pop() else { return Relocated::Nowhere };
+        let pose = frames.all()[frame].pose;
+        self.frame = frame;
+        frames.draw(&mut self.map, &pose.translation.vector, frame, &frames.apart(frame));
+        self.search = Search::new(&self.map, &self.returns, &pose, ALIKE_M, PI);
+        Relocated::Searching
     }
 }

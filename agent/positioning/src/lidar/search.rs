@@ -202,14 +202,20 @@ fn levels(map: &LocalMap) -> Vec<Vec<u8>> {
 
 /// Squares twice as wide as those of `cells`, which are `edge` wide.
 fn wider(cells: &[u8], edge: usize) -> Vec<u8> {
-    let best = |cells: &[u8], at: usize, beyond: Option<usize>| {
-        beyond.map_or(cells[at], |beyond| cells[at].max(cells[beyond]))
-    };
-    let along = |at: usize| best(cells, at, (at % SIDE + edge < SIDE).then_some(at + edge));
-    let rows: Vec<u8> = (0..cells.len()).map(along).collect();
-    (0..cells.len())
-        .map(|at| best(&rows, at, (at / SIDE + edge < SIDE).then_some(at + edge * SIDE)))
-        .collect()
+    let mut wide = cells.to_vec();
+    for (row, wide) in cells.chunks_exact(SIDE).zip(wide.chunks_exact_mut(SIDE)) {
+        raise(wide, &row[edge..]);
+    }
+    let narrow = wide.clone();
+    raise(&mut wide, &narrow[edge * SIDE..]);
+    wide
+}
+
+/// The greater of both, one by one, as far as both reach.
+fn raise(cells: &mut [u8], by: &[u8]) {
+    for (cell, by) in cells.iter_mut().zip(by) {
+        *cell = (*cell).max(*by);
+    }
 }
 
 impl PartialEq for Square {

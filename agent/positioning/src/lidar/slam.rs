@@ -8,21 +8,23 @@ use super::level::{LevelScan, Prediction};
 use super::local_map::LocalMap;
 use super::matching::{Match, refine};
 use super::pose_graph::{Solve, composed, turned};
-use super::relocation::Relocation;
+use super::relocation::{Relocated, Relocation};
 use crate::PlanarFix;
 
 /// Fewer returns tell nothing of where the vehicle is.
 const LEAST_RETURNS: usize = 15;
-/// Share of the returns that lie on the map where it is known.
-const LEAST_SHARE: f64 = 0.4;
+/// Share of the returns that lie on the map, at least; the rest may be of what was not seen before.
+const LEAST_SHARE: f64 = 0.3;
+/// A scan of which less than this share is on the map is kept, unless the nearest that is kept was taken from as near as
+/// this, m and rad.
+const NEW_SHARE: f64 = 0.7;
+const SAME_VIEW: (f64, f64) = (0.3, 0.3);
 /// A match does not move further from where the motion since the last leads, m and rad.
 const FURTHEST_STEP: (f64, f64) = (0.8, 0.25);
 /// The map is drawn anew when the vehicle has moved so far, m.
 const REDRAW_M: f64 = 1.0;
 /// Scans in a row that fit nowhere before the place is lost.
 const MISSES: u32 = 4;
-/// Scans in a row that fit nowhere before a new map is begun beside the old.
-const GIVE_UP: u32 = 60;
 /// What a match adds to the errors of the frames' poses at least, m² and rad²: surfaces are not quite as they are drawn.
 const LEAST_EDGE: (f64, f64) = (0.004 * 0.004, 0.0004 * 0.0004);
 
@@ -47,7 +49,7 @@ impl Default for SlamConfig {
             spacing_m: 1.5,
             most_key_frames: 1000,
             odometry_share: 0.05,
-            search_per_step: 3000,
+            search_per_step: 1000,
             products_per_step: 4000,
         }
     }
@@ -212,9 +214,7 @@ impl Slam {
         self.last = self.last.map(|last| Last { pose: found.pose, ..last });
         let position = found.pose.translation.vector;
         let fix = self.fix(scan, found);
-        let nearest_m = self.nearest_m(&position);
-        let is_new = nearest_m > self.config.spacing_m || found.share < 0.6 && nearest_m > 0.3;
-        if is_new {
+        if self.is_new(found) {
             self.keep(scan, found, prediction);
         } else if (position - self.drawn_at).norm() > REDRAW_M {
             self.redraw(&position);
@@ -245,9 +245,15 @@ impl Slam {
         }
     }
 
-    fn nearest_m(&self, place: &Vector2<f64>) -> f64 {
-        let off = |at: &usize| (self.frames.all()[*at].position() - place).norm();
-        self.members.iter().map(off).fold(f64::INFINITY, f64::min)
+    /// Whether a scan shows what those that are kept do not.
+    fn is_new(&self, found: &Match) -> bool {
+        let away = self.members.iter().map(|at| {
+            let moved = self.frames.all()[*at].pose.inverse() * found.pose;
+            (moved.translation.vector.norm(), moved.rotation.angle().abs())
+        });
+        let is_far = away.clone().all(|(off_m, _)| off_m > self.config.spacing_m);
+        let is_same = |(off_m, turned): (f64, f64)| off_m < SAME_VIEW.0 && turned < SAME_VIEW.1;
+        is_far || found.share < NEW_SHARE && !away.into_iter().any(is_same)
     }
 
     /// Keeps a scan where it was matched.
@@ -260,7 +266,7 @@ impl Slam {
         // Along what the match does not tell, the motion since the reference does.
         let both = sum_of_information(&matched, &moved).unwrap_or(moved);
         let (place, heading) = LEAST_EDGE;
-        let measured = if found.degenerate.is_some() { both } else { matched };
+        let measured = if found.is_whole { matched } else { both };
         let measured = measured + Matrix3::from_diagonal(&Vector3::new(place, place, heading));
         let covariance = composed(&base.pose, &base.covariance, &relative, &measured);
         self.add(scan, &found.pose, covariance, prediction, (relative, measured));
@@ -337,9 +343,10 @@ impl Slam {
         if !solve.advance(self.config.products_per_step) {
             return;
         }
+        let solve = self.solve.take();
+        let Some(solve) = solve.filter(Solve::has_settled) else { return };
         let before = self.frames.all()[self.reference].pose;
         self.frames.correct(solve.solution());
-        self.solve = None;
         let shift = self.frames.all()[self.reference].pose * before.inverse();
         self.last = self.last.map(|last| Last { pose: shift * last.pose, ..last });
         self.draw(self.reference);
@@ -347,11 +354,6 @@ impl Slam {
 
     /// Searches on for a place where the scans fit; gives up in the end and begins a map of its own.
     fn search(&mut self, scan: &LevelScan, guess: &Isometry2<f64>, prediction: &Prediction) {
-        self.misses += 1;
-        if self.misses > GIVE_UP {
-            self.begin_anew(scan, guess, prediction);
-            return;
-        }
         // It may have been something that passed by.
         let near = refine(&self.map, &scan.returns, guess).filter(|found| fits(found, guess));
         if near.is_some_and(|found| found.share > 0.6) {
@@ -363,8 +365,10 @@ impl Slam {
         let relocation = self
             .relocation
             .get_or_insert_with(|| Relocation::new(frames, scan, guess, &(prediction.covariance - base)));
-        if let Some(found) = relocation.advance(frames, guess, self.config.search_per_step) {
-            self.found_again(&found.pose, found.frame);
+        match relocation.advance(frames, guess, self.config.search_per_step) {
+            Relocated::Searching => {}
+            Relocated::At { pose, frame } => self.found_again(&pose, frame),
+            Relocated::Nowhere => self.begin_anew(scan, guess, prediction),
         }
     }
 
@@ -401,7 +405,8 @@ fn fits(found: &Match, guess: &Isometry2<f64>) -> bool {
 
 /// Covariance of what two independent measurements say together.
 fn sum_of_information(one: &Matrix3<f64>, other: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    (one.try_inverse()? + other.try_inverse()?).try_inverse()
+    let both = (one.try_inverse()? + other.try_inverse()?).try_inverse()?;
+    Some((both + both.transpose()) / 2.0)
 }
 
 #[cfg(test)]
