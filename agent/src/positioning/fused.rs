@@ -8,10 +8,12 @@
 use std::time::Duration;
 
 use nalgebra::{Matrix2, Matrix3, Matrix6, UnitQuaternion, Vector3};
-use skein_mav::{External, Landed, Measured, Stamped, Telemetry};
-use skein_positioning::PoseFix;
-use skein_positioning::ekf::{Aid, Ekf, Flow, Inertial, Measurement, Noise, Range, Rest, Satellites, Start};
+use skein_mav::{External, Landed, Measured, Stamped, Telemetry, axes};
+use skein_positioning::ekf::{
+    Aid, Ekf, Flow, Heading, Inertial, Measurement, Noise, Range, Rest, Satellites, Start,
+};
 use skein_positioning::lidar::{LevelScan, Prediction, Slam, SlamConfig, Sweep};
+use skein_positioning::{PlanarFix, PoseFix};
 
 use skein_wire::Scan;
 
@@ -41,6 +43,8 @@ const REST_EVERY: Duration = Duration::from_millis(100);
 const PLACED_M: f64 = 0.05;
 const TILT_RAD: f64 = 0.02;
 const HEADING_RAD: f64 = 0.05;
+/// So long an autopilot tells its attitude before that is believed.
+const SETTLES_FOR: Duration = Duration::from_secs(1);
 /// Standard deviation of flow of full quality, rad/s, and the quality below which it is none.
 const FLOW_RAD_S: f64 = 0.1;
 const LEAST_QUALITY: f64 = 0.2;
@@ -50,6 +54,8 @@ const BEST_RANGE_M: f64 = 0.01;
 /// Scans count from this height, m, and are this noisy, m.
 const SCANS_ABOVE_M: f64 = 0.5;
 const SCAN_SIGMA_M: f64 = 0.03;
+/// A map is begun anew when its variance is greater than that of what flies by this, m².
+const MAP_M2: f64 = 0.005;
 /// A distance to the ground is that of flow for so long.
 const RANGE_LASTS: Duration = Duration::from_millis(200);
 
@@ -67,6 +73,8 @@ pub struct Fused {
     flown: Option<PositionSource>,
     autopilot: Autopilot,
     ekf: Option<Ekf>,
+    /// Since when the autopilot tells its attitude.
+    heard: Option<Duration>,
     /// Where the vehicle was put before take-off, ENU, m; its height is the ground's.
     home: Vector3<f64>,
     range: Option<Stamped<f64>>,
@@ -94,6 +102,7 @@ impl Fused {
             flown: sources.first().copied(),
             autopilot: Autopilot::default(),
             ekf: None,
+            heard: None,
             home,
             range: None,
             newest_markers: None,
@@ -113,6 +122,10 @@ impl Fused {
     /// Begins to filter where the autopilot, or who put the vehicle there, says that it is.
     fn begin(&mut self, now: Duration, told: &Estimate, telemetry: &Telemetry) {
         let Some(attitude) = telemetry.attitude else { return };
+        // A compass takes its time.
+        if now < *self.heard.get_or_insert(now) + SETTLES_FOR {
+            return;
+        }
         let by_satellites = told.motion.filter(|_| telemetry.has_gps_fix == Some(true));
         let (position, velocity, position_sigma_m) = match by_satellites {
             Some(motion) => (motion.value.position, motion.value.velocity, motion.value.position_sigma_m()),
@@ -186,15 +199,18 @@ impl Fused {
         }
     }
 
-    /// What the autopilot tells of itself: its position by satellites, and that the vehicle stands.
+    /// What the autopilot tells of itself: its position by satellites, that the vehicle stands, and its heading, which is
+    /// its compass's as long as it does not fly by what it is told.
     fn hear(&mut self, now: Duration, told: &Estimate, telemetry: &Telemetry) {
         if telemetry.landed == Landed::OnGround && !telemetry.armed && now >= self.rest_at + REST_EVERY {
             self.rest_at = now;
+            self.compass(telemetry);
             self.take(Measurement::Rest(Rest { stamp: now, sigma_m_s: REST_M_S }));
         }
         let sound = told.motion.filter(|_| telemetry.has_gps_fix == Some(true) && told.doubt.is_none());
         if let Some(motion) = sound.filter(|motion| motion.stamp >= self.satellites_at + SATELLITES_EVERY) {
             self.satellites_at = motion.stamp;
+            self.compass(telemetry);
             self.take(Measurement::Satellites(Satellites {
                 stamp: motion.stamp,
                 position: motion.value.position,
@@ -223,6 +239,25 @@ impl Fused {
             covariance: planar,
             ground_m: self.home.z,
         })
+    }
+
+    fn compass(&mut self, telemetry: &Telemetry) {
+        if let Some(attitude) = telemetry.attitude {
+            self.take(Measurement::Heading(Heading {
+                stamp: attitude.stamp,
+                heading_rad: axes::yaw(&attitude.value),
+                sigma_rad: HEADING_RAD,
+            }));
+        }
+    }
+
+    /// Begins a new map where the old one is less sure of the world than what flies the vehicle is.
+    fn map_anew(&mut self, fix: &PlanarFix, prediction: &Prediction) {
+        let variance = |covariance: &Matrix3<f64>| covariance[(0, 0)] + covariance[(1, 1)];
+        let worse = variance(&fix.covariance) > 4.0 * variance(&prediction.covariance) + MAP_M2;
+        if self.flown == Some(PositionSource::Autopilot) && worse {
+            self.slam = Some(Slam::new(SlamConfig::default()));
+        }
     }
 
     /// Finds out which sources have come and gone.
@@ -381,6 +416,7 @@ impl Positioning for Fused {
         if let Some(fix) = slam.step(&level, &prediction) {
             self.of_lidar = fix.covariance.fixed_view::<2, 2>(0, 0).into();
             self.take(Measurement::Lidar(fix));
+            self.map_anew(&fix, &prediction);
         }
     }
 

@@ -106,7 +106,9 @@ fn without_markers_and_flow_it_holds_and_lands_before_it_has_drifted_far() {
 
 #[test]
 fn a_forest_in_which_satellites_are_lost_is_flown_by_lidar() {
-    let text = format!("position = [\"autopilot\", \"lidar\"]\n{FOREST}\n[[position_fault]]\nat_s = 12.0\ngps_lost = true\n");
+    let text = format!(
+        "position = [\"autopilot\", \"lidar\"]\n{FOREST}\n[[position_fault]]\nat_s = 12.0\ngps_lost = true\n"
+    );
     let flown = fly(Scenario::from_toml(&text, "forest.toml", Some(1), 1).unwrap());
     assert_eq!((flown.outcome, flown.crashed), (Some(Outcome::Complete), false));
     assert_eq!(flown.sources, ["lidar"]);

@@ -12,11 +12,20 @@ pub enum Aid {
     Range,
     Pressure,
     Rest,
+    Heading,
 }
 
 impl Aid {
-    pub const ALL: [Self; 7] =
-        [Self::Markers, Self::Lidar, Self::Satellites, Self::Flow, Self::Range, Self::Pressure, Self::Rest];
+    pub const ALL: [Self; 8] = [
+        Self::Markers,
+        Self::Lidar,
+        Self::Satellites,
+        Self::Flow,
+        Self::Range,
+        Self::Pressure,
+        Self::Rest,
+        Self::Heading,
+    ];
 }
 
 /// What one source has done.

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use nalgebra::{Matrix1, Matrix2, Matrix3, Matrix6, RowSVector, SMatrix, Vector1, Vector2, Vector3, Vector6};
+use nalgebra::{
+    Matrix1, Matrix2, Matrix3, Matrix6, RowSVector, RowVector3, SMatrix, Vector1, Vector2, Vector3, Vector6,
+};
 
 use super::health::{Aid, Weighed};
 use super::state::{ATTITUDE, FLOW_SCALE, POSITION, PRESSURE_OFFSET, SIZE, State, VELOCITY};
@@ -75,6 +77,15 @@ pub struct Rest {
     pub sigma_m_s: f64,
 }
 
+/// Where the nose points, as a compass tells it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Heading {
+    pub stamp: Duration,
+    /// Counter-clockwise from east, rad.
+    pub heading_rad: f64,
+    pub sigma_rad: f64,
+}
+
 /// A measurement of any sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Measurement {
@@ -85,6 +96,7 @@ pub enum Measurement {
     Range(Range),
     Pressure(Pressure),
     Rest(Rest),
+    Heading(Heading),
 }
 
 type Jacobian<const ROWS: usize> = SMatrix<f64, ROWS, SIZE>;
@@ -99,6 +111,7 @@ impl Measurement {
             Self::Range(range) => range.stamp,
             Self::Pressure(pressure) => pressure.stamp,
             Self::Rest(rest) => rest.stamp,
+            Self::Heading(heading) => heading.stamp,
         }
     }
 
@@ -111,6 +124,7 @@ impl Measurement {
             Self::Range(_) => Aid::Range,
             Self::Pressure(_) => Aid::Pressure,
             Self::Rest(_) => Aid::Rest,
+            Self::Heading(_) => Aid::Heading,
         }
     }
 
@@ -125,6 +139,7 @@ impl Measurement {
             Self::Range(range) => range_of(range, state, is_fused),
             Self::Pressure(pressure) => pressure_of(pressure, state, is_fused),
             Self::Rest(rest) => rest_of(rest, state, is_fused),
+            Self::Heading(heading) => heading_of(heading, state, is_fused),
         }
     }
 }
@@ -141,18 +156,32 @@ fn markers(fix: &PoseFix, state: &mut State, is_fused: bool) -> Option<Weighed> 
 }
 
 fn lidar(fix: &PlanarFix, state: &mut State, is_fused: bool) -> Option<Weighed> {
-    let rotation = state.body_to_world.to_rotation_matrix().into_inner();
-    let nose = rotation.column(0);
-    let turn = fix.heading_rad - nose.y.atan2(nose.x);
+    let (turn, across) = turn_to(fix.heading_rad, state);
     let off = fix.position - state.position.xy();
-    let innovation = Vector3::new(off.x, off.y, turn.sin().atan2(turn.cos()));
+    let innovation = Vector3::new(off.x, off.y, turn);
     let mut jacobian = Jacobian::<3>::zeros();
     jacobian.fixed_view_mut::<2, 2>(0, POSITION).fill_with_identity();
+    jacobian.fixed_view_mut::<1, 3>(2, ATTITUDE).copy_from(&across);
+    state.correct(&innovation, &jacobian, &fix.covariance, THREE, is_fused)
+}
+
+/// By how much the nose is to turn to this heading, rad, and how its heading changes with a small turn of the body.
+fn turn_to(heading_rad: f64, state: &State) -> (f64, RowVector3<f64>) {
+    let rotation = state.body_to_world.to_rotation_matrix().into_inner();
+    let nose = rotation.column(0);
+    let turn = heading_rad - nose.y.atan2(nose.x);
     // The nose moves by `-R [x]x` of a small turn; the heading by that across the nose.
     let moved = -rotation * Vector3::x().cross_matrix();
     let across = (moved.row(1) * nose.x - moved.row(0) * nose.y) / (nose.x * nose.x + nose.y * nose.y);
-    jacobian.fixed_view_mut::<1, 3>(2, ATTITUDE).copy_from(&across);
-    state.correct(&innovation, &jacobian, &fix.covariance, THREE, is_fused)
+    (turn.sin().atan2(turn.cos()), across)
+}
+
+fn heading_of(heading: &Heading, state: &mut State, is_fused: bool) -> Option<Weighed> {
+    let (turn, across) = turn_to(heading.heading_rad, state);
+    let mut jacobian = RowSVector::<f64, SIZE>::zeros();
+    jacobian.fixed_view_mut::<1, 3>(0, ATTITUDE).copy_from(&across);
+    let noise = Matrix1::new(heading.sigma_rad * heading.sigma_rad);
+    state.correct(&Vector1::new(turn), &jacobian, &noise, ONE, is_fused)
 }
 
 fn satellites(fix: &Satellites, state: &mut State, is_fused: bool) -> Option<Weighed> {

@@ -16,7 +16,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 pub use self::health::{Aid, Fused, Health};
 use self::history::{History, Taken};
-pub use self::measurement::{Flow, Measurement, Pressure, Range, Rest, Satellites};
+pub use self::measurement::{Flow, Heading, Measurement, Pressure, Range, Rest, Satellites};
 pub use self::state::State;
 
 /// What an inertial unit has felt on the mean since the sample before. Body FLU.

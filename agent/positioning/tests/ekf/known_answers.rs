@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector2, Vector3};
 use skein_positioning::ekf::{
-    Aid, Ekf, Flow, Inertial, Measurement, Noise, Pressure, Range, Rest, Satellites, Start,
+    Aid, Ekf, Flow, Heading, Inertial, Measurement, Noise, Pressure, Range, Rest, Satellites, Start,
 };
 use skein_positioning::{PlanarFix, PoseFix};
 
@@ -221,4 +221,17 @@ fn standing_still_teaches_the_biases_and_keeps_the_place() {
     }
     assert!((ekf.state().rate_bias - turns_too_much).norm() < 5e-4, "{}", ekf.state().rate_bias);
     assert!((ekf.state().position - start().position).norm() < 0.05);
+}
+
+#[test]
+fn a_compass_turns_the_heading_and_nothing_else() {
+    let mut ekf = hovering(ms(500));
+    let (roll, pitch, _) = ekf.state().body_to_world.euler_angles();
+    for _ in 0..100 {
+        let heading = Heading { stamp: ms(500), heading_rad: 0.1, sigma_rad: 0.05 };
+        ekf.measure(Measurement::Heading(heading), true);
+    }
+    let turned = ekf.state().body_to_world.euler_angles();
+    assert!((turned.2 - 0.1).abs() < 0.005, "{turned:?}");
+    assert!((turned.0 - roll).abs() < 1e-3 && (turned.1 - pitch).abs() < 1e-3);
 }

@@ -30,7 +30,7 @@ const MISSED: [f64; 2] = [10.0, 13.0];
 /// Time after that in which what has drifted still shows, s.
 const AFTER_S: f64 = 0.5;
 /// The ways of the fleet's other vehicles, by markers' numbers.
-const OTHERS: [&[usize]; 3] = [&[91, 51, 11], &[100, 95], &[10, 60, 90]];
+const OTHERS: [&[usize]; 3] = [&[91, 51, 11], &[100, 95], &[10, 40, 60]];
 
 #[derive(Args)]
 pub struct Indoor {
@@ -127,7 +127,9 @@ impl Seen {
         let now = swarm.now();
         let agent = swarm.agents().nth(index).map(|agent| *agent.estimate());
         let (Some(estimate), Some(truth)) = (agent, swarm.simulation().vehicle(index)) else { return };
-        let (Some(motion), Some((position, attitude))) = (estimate.motion, estimate.pose_at(now)) else { return };
+        let (Some(motion), Some((position, attitude))) = (estimate.motion, estimate.pose_at(now)) else {
+            return;
+        };
         if !truth.airborne {
             return;
         }
@@ -197,7 +199,11 @@ fn tell(report: &mut Report, name: &str, flights: &[Flight]) {
             "realtime_factor": factor,
         }),
     );
-    report.goal(&format!("{name}: flights that arrive"), arrived as f64, Bound::Exactly(flights.len() as f64));
+    report.goal(
+        &format!("{name}: flights that arrive"),
+        arrived as f64,
+        Bound::Exactly(flights.len() as f64),
+    );
     report.goal(&format!("{name}: collisions"), collided as f64, Bound::Exactly(0.0));
     report.goal(&format!("{name}: least share inside 3 sigma"), inside, Bound::AtLeast(0.99));
     report.goal(&format!("{name}: greatest step of the estimate in a tick, m"), step_m, Bound::AtMost(0.05));
@@ -217,7 +223,12 @@ fn velocity(flight: &Flight) -> Figure {
     let line = |name: &str, which: usize, style| Line {
         name: name.to_owned(),
         style,
-        points: flight.seen.track.iter().filter_map(|(at_s, _, speeds)| Some((*at_s, speeds[which]?))).collect(),
+        points: flight
+            .seen
+            .track
+            .iter()
+            .filter_map(|(at_s, _, speeds)| Some((*at_s, speeds[which]?)))
+            .collect(),
     };
     Figure {
         x: "time, s".to_owned(),
