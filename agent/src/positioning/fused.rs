@@ -36,8 +36,10 @@ const FELT_WITHIN: Duration = Duration::from_millis(300);
 /// The autopilot's estimate corrects the filter this often.
 const SATELLITES_EVERY: Duration = Duration::from_millis(200);
 const SATELLITES_M_S: f64 = 0.1;
-/// A vehicle that stands does not move: standard deviation of its velocity, m/s, and how often that is said.
+/// A vehicle that stands does not move: standard deviations of its velocity, m/s, and of its turning, rad/s, and how often
+/// that is said.
 const REST_M_S: f64 = 0.02;
+const REST_RAD_S: f64 = 0.01;
 const REST_EVERY: Duration = Duration::from_millis(100);
 /// How well a vehicle is put in its place before take-off, m, and what its autopilot knows of its attitude, rad.
 const PLACED_M: f64 = 0.05;
@@ -204,8 +206,7 @@ impl Fused {
     fn hear(&mut self, now: Duration, told: &Estimate, telemetry: &Telemetry) {
         if telemetry.landed == Landed::OnGround && !telemetry.armed && now >= self.rest_at + REST_EVERY {
             self.rest_at = now;
-            self.compass(telemetry);
-            self.take(Measurement::Rest(Rest { stamp: now, sigma_m_s: REST_M_S }));
+            self.take(Measurement::Rest(Rest { stamp: now, sigma_m_s: REST_M_S, sigma_rad_s: REST_RAD_S }));
         }
         let sound = told.motion.filter(|_| telemetry.has_gps_fix == Some(true) && told.doubt.is_none());
         if let Some(motion) = sound.filter(|motion| motion.stamp >= self.satellites_at + SATELLITES_EVERY) {

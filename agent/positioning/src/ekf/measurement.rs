@@ -7,7 +7,7 @@ use nalgebra::{
 };
 
 use super::health::{Aid, Weighed};
-use super::state::{ATTITUDE, FLOW_SCALE, POSITION, PRESSURE_OFFSET, SIZE, State, VELOCITY};
+use super::state::{ATTITUDE, FLOW_SCALE, POSITION, PRESSURE_OFFSET, RATE_BIAS, SIZE, State, VELOCITY};
 use crate::fix::{PlanarFix, PoseFix};
 
 /// Quantiles of chi-square at 99.9 %, for 1, 2, 3 and 6 degrees of freedom.
@@ -73,8 +73,9 @@ pub struct Pressure {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rest {
     pub stamp: Duration,
-    /// Standard deviation of each axis of its velocity, m/s.
+    /// Standard deviation of each axis of its velocity, m/s, and of its turning as the gyroscope tells it, rad/s.
     pub sigma_m_s: f64,
+    pub sigma_rad_s: f64,
 }
 
 /// Where the nose points, as a compass tells it.
@@ -248,8 +249,15 @@ fn pressure_of(pressure: &Pressure, state: &mut State, is_fused: bool) -> Option
 }
 
 fn rest_of(rest: &Rest, state: &mut State, is_fused: bool) -> Option<Weighed> {
-    let mut jacobian = Jacobian::<3>::zeros();
+    // What the gyroscope tells of a vehicle that does not turn is its bias.
+    let mut innovation = Vector6::zeros();
+    innovation.fixed_rows_mut::<3>(0).copy_from(&-state.velocity);
+    innovation.fixed_rows_mut::<3>(3).copy_from(&state.rate);
+    let mut jacobian = Jacobian::<6>::zeros();
     jacobian.fixed_view_mut::<3, 3>(0, VELOCITY).fill_with_identity();
-    let noise = Matrix3::from_diagonal_element(rest.sigma_m_s * rest.sigma_m_s);
-    state.correct(&-state.velocity, &jacobian, &noise, THREE, is_fused)
+    jacobian.fixed_view_mut::<3, 3>(3, RATE_BIAS).fill_with_identity();
+    let (speed, rate) = (rest.sigma_m_s, rest.sigma_rad_s);
+    let sigmas = Vector6::new(speed, speed, speed, rate, rate, rate);
+    let noise = Matrix6::from_diagonal(&sigmas.map(|sigma| sigma * sigma));
+    state.correct(&innovation, &jacobian, &noise, SIX, is_fused)
 }

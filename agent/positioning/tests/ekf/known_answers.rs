@@ -213,11 +213,11 @@ fn a_shift_moves_the_place_and_keeps_the_motion() {
 #[test]
 fn standing_still_teaches_the_biases_and_keeps_the_place() {
     let mut ekf = Ekf::new(Noise::SMALL, start());
-    let turns_too_much = Vector3::new(0.004, -0.003, 0.0);
+    let turns_too_much = Vector3::new(0.004, -0.003, 0.005);
     for step in 1..=2000 {
         let stamp = ms(10 * step);
         ekf.feel(Inertial { stamp, rate: turns_too_much, force: GRAVITY });
-        ekf.measure(Measurement::Rest(Rest { stamp, sigma_m_s: 0.02 }), true);
+        ekf.measure(Measurement::Rest(Rest { stamp, sigma_m_s: 0.02, sigma_rad_s: 0.01 }), true);
     }
     assert!((ekf.state().rate_bias - turns_too_much).norm() < 5e-4, "{}", ekf.state().rate_bias);
     assert!((ekf.state().position - start().position).norm() < 0.05);
