@@ -53,6 +53,10 @@ const LEAST_QUALITY: f64 = 0.2;
 /// A distance without an accuracy of its own has this one, m, and no distance a better one than this.
 const RANGE_M: f64 = 0.03;
 const BEST_RANGE_M: f64 = 0.01;
+/// What no covariance of a fix tells: how well the clocks of camera, autopilot and agent are compared, s, and how well
+/// sensors and markers are in their places, m.
+const CLOCKS_S: f64 = 0.01;
+const MOUNTED_M: f64 = 0.003;
 /// Scans count from this height, m, and are this noisy, m.
 const SCANS_ABOVE_M: f64 = 0.5;
 const SCAN_SIGMA_M: f64 = 0.03;
@@ -321,7 +325,9 @@ impl Fused {
         let covariance = state.covariance();
         let mut of_motion: Matrix6<f64> = covariance.fixed_view::<6, 6>(0, 0).into();
         let mut place = of_motion.fixed_view_mut::<3, 3>(0, 0);
-        place += offset * offset.transpose();
+        place += offset * offset.transpose()
+            + state.velocity * state.velocity.transpose() * (CLOCKS_S * CLOCKS_S)
+            + Matrix3::from_diagonal_element(MOUNTED_M * MOUNTED_M);
         if self.flown != Some(PositionSource::Markers) {
             let mut level = of_motion.fixed_view_mut::<2, 2>(0, 0);
             level += self.of_lidar;
