@@ -18,7 +18,9 @@ use skein_zenoh::NetworkSettings;
 use crate::airspace_table::AirspaceTable;
 use crate::autopilot_link::Address;
 use crate::bthreads::LinkLossPolicy;
-use crate::config::{AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, Planners, PositionSource};
+use crate::config::{
+    AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, Planners, PositionSource, position_sources,
+};
 use crate::errand::Errand;
 use crate::field;
 
@@ -38,8 +40,8 @@ pub struct AgentFile {
     radio_range_m: Option<f64>,
     #[serde(default)]
     pub seed: u64,
-    #[serde(default)]
-    position: PositionSource,
+    #[serde(default = "position", deserialize_with = "position_sources")]
+    position: Vec<PositionSource>,
     #[serde(default = "sigma_limit_m", deserialize_with = "field::positive")]
     sigma_limit_m: f64,
     pub autopilot: Autopilot,
@@ -129,6 +131,10 @@ fn state() -> PathBuf {
     "state".into()
 }
 
+fn position() -> Vec<PositionSource> {
+    vec![PositionSource::default()]
+}
+
 fn sigma_limit_m() -> f64 {
     DEFAULT_SIGMA_LIMIT_M
 }
@@ -208,7 +214,7 @@ impl AgentFile {
             radio_range_m: agent.radio_range_m,
             // TOML has no greater number.
             seed: agent.seed.min(i64::MAX.unsigned_abs()),
-            position: agent.position,
+            position: agent.position.clone(),
             sigma_limit_m: agent.sigma_limit_m,
             autopilot: Autopilot {
                 link,

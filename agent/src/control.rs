@@ -9,6 +9,7 @@ use skein_bp::Bound;
 use skein_dbp::NodeName;
 use skein_mav::{Companion, CompanionConfig, Landed, MavEvent, SetPoint, Station, Telemetry, Text, axes};
 use skein_planning::map::MapError;
+use skein_positioning::PoseFix;
 use skein_wire::event::Right;
 use skein_wire::{Limits, Readiness, Scan, State};
 
@@ -32,7 +33,7 @@ use crate::{
         surroundings::Surroundings,
         touchdown::Descent,
     },
-    positioning::{Estimate, Motion, Positioning, excess_m},
+    positioning::{Estimate, Motion, Positioning, Sensed, excess_m},
     preflight::{Failsafes, HandlingParameters, Others, Preflight, Situation, degrees},
     rank::goes_before,
     refuge::Refuge,
@@ -113,6 +114,7 @@ impl Control {
                 system_id: config.system_id,
                 component_id: 191,
                 datum: config.datum,
+                wants_measured: positioning.wants_measured(),
             }),
             station: Station::of(config.system_id),
             texts: Vec::new(),
@@ -156,8 +158,16 @@ impl Control {
         self.locate(now);
     }
 
+    /// Takes in a pose by markers.
+    pub fn see_markers(&mut self, now: Duration, fix: &PoseFix) {
+        self.positioning.sense(now, &Sensed::Markers(*fix));
+    }
+
     /// Takes in the newest estimate; what was placed by those before is shifted with it.
     fn locate(&mut self, now: Duration) {
+        for reading in self.companion.take_measured() {
+            self.positioning.sense(now, &Sensed::Instrument(reading));
+        }
         let before = self.estimate.frame;
         self.estimate = self.positioning.estimate(now, self.companion.telemetry());
         let shift = self.estimate.frame - before;
@@ -194,6 +204,7 @@ impl Control {
         if now.saturating_sub(scan.stamp) > FRESH_FOR {
             return;
         }
+        self.positioning.scan(scan);
         let [up_m, down_m] = [scan.up_m, scan.down_m].map(|range| range.map(f64::from));
         self.look = Some(Look { stamp: scan.stamp, up_m, down_m });
         let Some((position, attitude)) = self.estimate.pose_at(scan.stamp) else { return };
@@ -247,7 +258,11 @@ impl Control {
     pub fn observe(&mut self, now: Duration) -> Vec<Report> {
         self.companion.tick(now);
         self.locate(now);
-        let mut reports = Vec::new();
+        if let Some(external) = self.positioning.external(now) {
+            self.companion.external(now, &external);
+        }
+        let mut reports: Vec<_> =
+            self.positioning.take_news().into_iter().map(Report::PositionSource).collect();
         self.follow_autopilot(now, &mut reports);
         self.watch(now, &mut reports);
         reports.extend(self.heed_silence(now));
@@ -467,6 +482,7 @@ impl Control {
             Instruction::Land => self.settle(now),
             Instruction::EndFlight => self.guidance.forget(),
             Instruction::Hold => self.guidance.hold(),
+            Instruction::FlyBy(source) => self.positioning.fly_by(source),
             Instruction::TakeOff | Instruction::TakeBack | Instruction::Resume => {}
         }
         None
@@ -632,6 +648,12 @@ impl Control {
     #[must_use]
     pub fn guidance(&self) -> &Guidance {
         &self.guidance
+    }
+
+    /// The vehicle's state by its own belief.
+    #[must_use]
+    pub fn estimate(&self) -> &Estimate {
+        &self.estimate
     }
 
     /// Standard deviation of the position, m; 0 while there is none.

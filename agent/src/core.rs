@@ -10,6 +10,7 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_dbp::{Happened, NodeName};
 use skein_mav::{SetPoint, Text};
+use skein_positioning::PoseFix;
 use skein_wire::event::What;
 use skein_wire::{KeptScript, Link, NodeLink, Scan, Store, VehicleLink};
 
@@ -20,7 +21,7 @@ use crate::{
     control::{Control, SetPointRecord},
     mission::{Mission, Outcome},
     parts::Parts,
-    positioning::Motion,
+    positioning::{Estimate, Motion},
     scripts::RunningScript,
 };
 
@@ -143,6 +144,17 @@ impl AgentCore {
     /// Takes in a lidar scan.
     pub fn sense(&mut self, now: Duration, scan: &Scan) {
         self.side.control.sense(now, scan);
+    }
+
+    /// The vehicle's state by its own belief.
+    #[must_use]
+    pub fn estimate(&self) -> &Estimate {
+        self.side.control.estimate()
+    }
+
+    /// Takes in a pose by markers.
+    pub fn see_markers(&mut self, now: Duration, fix: &PoseFix) {
+        self.side.control.see_markers(now, fix);
     }
 
     /// One tick, every 20 ms: hears, decides, and answers with a set-point.

@@ -50,7 +50,7 @@ pub use self::{
     airspace_table::{AirspaceError, AirspaceTable},
     config::{
         AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, GlobalPlanner, LocalPlanner, Nose, Planners,
-        PositionSource, Repellers,
+        PositionSource, Repellers, position_sources,
     },
     control::SetPointRecord,
     core::{AgentCore, Status},

@@ -995,6 +995,60 @@ mod separation {
     }
 }
 
+mod choosing {
+    use skein_agent::PositionSource;
+
+    use super::*;
+
+    /// A vehicle with satellites and a lidar, the satellites preferred.
+    fn vehicle() -> Vehicle {
+        let position = vec![PositionSource::Autopilot, PositionSource::Lidar];
+        Vehicle::new(&AgentConfig { position, ..config() })
+    }
+
+    fn found(source: &str) -> Event {
+        SourceFound { source: source.into() }.at(ME)
+    }
+
+    fn lost(source: &str) -> Event {
+        SourceLost { source: source.into(), why: "silent for 0.7 s".into() }.at(ME)
+    }
+
+    /// The sources that are flown by after an event, one after another.
+    fn flown(vehicle: &mut Vehicle, event: Event) -> Vec<String> {
+        let before = vehicle.log.len();
+        vehicle.hears(event);
+        let chosen = vehicle.log.iter().skip(before).filter_map(|event| Me::new(ME).read::<FlyBy>(event));
+        chosen.map(|chosen| chosen.source.to_string()).collect()
+    }
+
+    #[test]
+    fn the_first_source_that_can_be_flown_by_is_flown_and_dead_reckoning_without_one() {
+        let mut vehicle = vehicle();
+        assert_eq!(flown(&mut vehicle, found("autopilot")), NOTHING, "it flies by that already");
+        assert_eq!(flown(&mut vehicle, found("lidar")), NOTHING);
+        assert_eq!(flown(&mut vehicle, lost("autopilot")), ["lidar"]);
+        assert_eq!(flown(&mut vehicle, lost("lidar")), ["dead_reckoning"]);
+        assert_eq!(flown(&mut vehicle, found("lidar")), ["lidar"]);
+        assert_eq!(flown(&mut vehicle, found("autopilot")), ["autopilot"]);
+    }
+
+    #[test]
+    fn before_any_source_is_found_the_vehicle_stands_where_it_was_put() {
+        assert_eq!(flown(&mut vehicle(), lost("autopilot")), NOTHING);
+    }
+
+    #[test]
+    fn a_source_that_somebody_else_chose_stays_until_it_is_lost() {
+        let mut vehicle = vehicle();
+        vehicle.hears(found("autopilot"));
+        vehicle.hears(found("lidar"));
+        let choice = FlyBy { source: "lidar".into() }.at(ME);
+        assert_eq!(flown(&mut vehicle, choice), ["lidar"], "and nothing is requested in its place");
+        assert_eq!(flown(&mut vehicle, lost("lidar")), ["autopilot"]);
+    }
+}
+
 mod positioning {
     use super::*;
 

@@ -146,9 +146,12 @@ fn what_a_vehicle_takes_and_its_own_are_as_they_were() {
     };
     let catalogue = Catalogue::standard();
     assert_eq!(named(&mut catalogue.gateway()), ["order", "handover", "load", "unload"]);
-    assert_eq!(catalogue.own().count(), 50);
+    assert_eq!(catalogue.own().count(), 52);
     let others = catalogue.of_vehicle().filter(|event| event.whose == Whose::Anyone);
-    assert_eq!(named(&mut { others }), ["takeoff", "goto", "advance", "enter", "complete", "failed"]);
+    assert_eq!(
+        named(&mut { others }),
+        ["takeoff", "goto", "advance", "enter", "fly_by", "complete", "failed"]
+    );
     assert_eq!([Launch::NAME, Abort::NAME], [What::Launch.word(), What::Abort.word()]);
 }
 

@@ -154,6 +154,11 @@ impl Swarm {
                 timed(&mut self.stopwatch, || vehicle.agent.sense(now, scan));
             }
         }
+        for (index, fix) in self.simulation.take_fixes() {
+            if let Some(vehicle) = self.vehicles.get_mut(index).filter(|vehicle| !vehicle.is_dead) {
+                timed(&mut self.stopwatch, || vehicle.agent.see_markers(now, &fix));
+            }
+        }
         if self.steps.is_multiple_of(STEPS_PER_TICK) {
             happenings.ticked = true;
             self.tick(now, &mut happenings.selections);

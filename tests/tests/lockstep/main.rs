@@ -8,6 +8,7 @@ mod determinism;
 mod explain;
 mod faults;
 mod gazebo_worlds;
+mod indoor;
 mod landing;
 mod limits;
 mod lost_inside;

@@ -123,4 +123,13 @@ skein_bp::events! {
     }
     /// It knows where it is again.
     PositionTrusted = "position_trusted", Own;
+    /// A source of position can be flown by: `autopilot`, `markers` or `lidar`.
+    SourceFound = "source_found", Own {
+        source: Text,
+    }
+    /// It cannot any more: it is silent, or disagrees.
+    SourceLost = "source_lost", Own {
+        source: Text,
+        why: Text,
+    }
 }
