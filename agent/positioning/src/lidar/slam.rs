@@ -25,6 +25,8 @@ const FURTHEST_STEP: (f64, f64) = (0.8, 0.25);
 const REDRAW_M: f64 = 1.0;
 /// Scans in a row that fit nowhere before the place is lost.
 const MISSES: u32 = 4;
+/// A lost vehicle searches so many times as much in a step as one that looks for loops.
+const LOST_TIMES: usize = 4;
 /// What a match adds to the errors of the frames' poses at least, m² and rad²: surfaces are not quite as they are drawn.
 const LEAST_EDGE: (f64, f64) = (0.004 * 0.004, 0.0004 * 0.0004);
 
@@ -49,8 +51,8 @@ impl Default for SlamConfig {
             spacing_m: 1.5,
             most_key_frames: 1000,
             odometry_share: 0.05,
-            search_per_step: 1000,
-            products_per_step: 4000,
+            search_per_step: 600,
+            products_per_step: 2000,
         }
     }
 }
@@ -77,6 +79,8 @@ pub struct Health {
     /// Share of the newest scan that lay on the map, 0 to 1.
     pub share: f64,
     pub key_frames: usize,
+    /// Whether the newest step did no more than match: it neither kept the scan nor worked on loops.
+    pub is_plain: bool,
     /// Loops closed so far. Each can move the place by what had drifted.
     pub loops: usize,
     /// Times the place was lost and found again.
@@ -157,6 +161,7 @@ impl Slam {
         if !is_sound(&predicted, &prediction.covariance) {
             return None;
         }
+        self.health.is_plain = self.solve.is_none();
         self.advance_solve();
         let fix = match self.last {
             Some(last) => {
@@ -214,12 +219,15 @@ impl Slam {
         self.last = self.last.map(|last| Last { pose: found.pose, ..last });
         let position = found.pose.translation.vector;
         let fix = self.fix(scan, found);
-        if self.is_new(found) {
+        let is_new = self.is_new(found);
+        let is_far = (position - self.drawn_at).norm() > REDRAW_M;
+        if is_new {
             self.keep(scan, found, prediction);
-        } else if (position - self.drawn_at).norm() > REDRAW_M {
+        } else if is_far {
             self.redraw(&position);
         }
         self.close_loops();
+        self.health.is_plain &= !is_new && !is_far && !self.closure.is_busy();
         Some(fix)
     }
 
@@ -365,7 +373,7 @@ impl Slam {
         let relocation = self
             .relocation
             .get_or_insert_with(|| Relocation::new(frames, scan, guess, &(prediction.covariance - base)));
-        match relocation.advance(frames, guess, self.config.search_per_step) {
+        match relocation.advance(frames, guess, LOST_TIMES * self.config.search_per_step) {
             Relocated::Searching => {}
             Relocated::At { pose, frame } => self.found_again(&pose, frame),
             Relocated::Nowhere => self.begin_anew(scan, guess, prediction),
