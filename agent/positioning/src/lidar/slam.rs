@@ -119,6 +119,7 @@ pub struct Slam {
     closure: Closure,
     relocation: Option<Relocation>,
     solve: Option<Solve>,
+    shared: Matrix3<f64>,
     health: Health,
 }
 
@@ -137,6 +138,7 @@ impl Slam {
             closure: Closure::default(),
             relocation: None,
             solve: None,
+            shared: Matrix3::zeros(),
             health: Health::default(),
         }
     }
@@ -153,6 +155,12 @@ impl Slam {
     /// Where the vehicle was at the newest scan, on the map.
     pub fn pose(&self) -> Option<&Isometry2<f64>> {
         self.last.as_ref().map(|last| &last.pose)
+    }
+
+    /// What the newest fix shares with those before and after it: the error of the map, which no number of fixes averages
+    /// out. East, north (m²) and heading (rad²). The rest of a fix's covariance is its own.
+    pub fn shared(&self) -> &Matrix3<f64> {
+        &self.shared
     }
 
     /// Takes in a scan and what was predicted for its moment. `None` while the place is not known by the scan.
@@ -240,16 +248,15 @@ impl Slam {
     }
 
     /// The place in the world: the match's own error, and that of the frame it is told from.
-    fn fix(&self, scan: &LevelScan, found: &Match) -> PlanarFix {
+    fn fix(&mut self, scan: &LevelScan, found: &Match) -> PlanarFix {
         let base = &self.frames.all()[self.reference];
         let relative = base.pose.inverse() * found.pose;
-        let covariance =
-            composed(&base.pose, &base.covariance, &relative, &Matrix3::zeros()) + found.covariance;
+        self.shared = composed(&base.pose, &base.covariance, &relative, &Matrix3::zeros());
         PlanarFix {
             stamp: scan.stamp,
             position: found.pose.translation.vector,
             heading_rad: found.pose.rotation.angle(),
-            covariance,
+            covariance: self.shared + found.covariance,
         }
     }
 
@@ -528,6 +535,7 @@ mod tests {
         assert!(health.degenerate.unwrap().x.abs() > 0.99 && flown.sigma_along_m > 10.0, "{flown:?}");
         let newest = run.slam.key_frames().last().unwrap();
         let [along_m, across_m] = [0, 1].map(|axis| newest.covariance[(axis, axis)].sqrt());
+        assert!(run.slam.shared()[(0, 0)].sqrt() < 10.0, "the map is surer than what a scan tells");
         assert!(along_m > 0.2 && across_m < 0.6 && along_m < 10.0, "{along_m} {across_m}");
         assert!(flown.beyond * 100 <= flown.fixes, "{flown:?}");
     }
