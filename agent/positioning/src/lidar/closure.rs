@@ -48,6 +48,7 @@ pub struct Closure {
     /// The frames of which it was tried whether they show one place.
     tried: BTreeSet<[usize; 2]>,
     search: Option<Box<Attempt>>,
+    is_busy: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -64,9 +65,16 @@ struct Attempt {
 const MOST_TRIED: usize = 4000;
 
 impl Closure {
+    /// Whether the newest step had a place to try.
+    pub fn is_busy(&self) -> bool {
+        self.is_busy
+    }
+
     /// Goes on searching; a loop where one has been found.
     pub fn advance(&mut self, closing: &Closing<'_>, squares: usize) -> Option<Loop> {
-        let Some(mut attempt) = self.search.take().or_else(|| self.begin(closing)) else { return None };
+        let attempt = self.search.take().or_else(|| self.begin(closing));
+        self.is_busy = attempt.is_some();
+        let mut attempt = attempt?;
         let frames = closing.frames.all();
         let Some(search) = &mut attempt.search else {
             return attempt.measure(closing.frames, &frames[attempt.from].pose);

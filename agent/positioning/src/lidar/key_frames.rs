@@ -13,7 +13,7 @@ use super::pose_graph::{Edge, composed, turned};
 /// Returns of a key frame that are nearer to one another than this are one, m.
 const SPACING_M: f64 = 0.08;
 /// Frames agree when the path between them is known to this, m².
-const AGREED_M2: f64 = 0.06 * 0.06;
+const AGREED_M2: f64 = 0.1 * 0.1;
 /// At this distance an error of the heading counts, m.
 const ARM_M: f64 = 8.0;
 /// A local map is made of the frames this near, m.

@@ -20,6 +20,8 @@ const MOST_ON_A_SIDE: usize = 6;
 const LONE_RAD2: f64 = 0.05;
 /// Returns nearer to one another than this are one, m.
 const FINEST_M: f64 = 0.04;
+/// From a ray to the next, ranges along a wall grow by up to so many times the distance between both rays.
+const ALONG_A_WALL: f64 = 12.0;
 /// Cosine between the directions of two returns of one surface, at least.
 const ONE_SURFACE: f64 = 0.7;
 /// No scan has more returns than this; of more rays every second, third ... is used.
@@ -211,12 +213,13 @@ impl Surfaces<'_> {
         Some(Return { point: hit.point, normal, normal_variance, variance })
     }
 
-    /// Whether what stands beside it is further away on both sides, so that it is narrow, and no wall seen along it.
+    /// Whether what stands beside it is far behind it on both sides, so that it is narrow, and no wall seen along it.
     fn stands_out(&self, at: usize) -> bool {
         let range_m = self.hits[at].range_m;
+        let behind_m = range_m + f64::max(1.0, ALONG_A_WALL * self.step * range_m);
         [true, false].into_iter().all(|up| {
             let beyond = (0..=self.side(at, up).len()).try_fold(at, |last, _| self.neighbour(last, up));
-            beyond.is_none_or(|beyond| self.hits[beyond].range_m > range_m)
+            beyond.is_none_or(|beyond| self.hits[beyond].range_m > behind_m)
         })
     }
 

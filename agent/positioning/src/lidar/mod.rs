@@ -2,6 +2,7 @@
 //!
 //! [`Slam`] is what a vehicle uses. Budgets count work, never time, so one input gives one output.
 
+mod agreement;
 mod closure;
 mod key_frames;
 mod level;
@@ -15,6 +16,7 @@ mod slam;
 #[cfg(test)]
 mod synthetic;
 
+pub use self::agreement::{Agreement, Sighting};
 pub use self::key_frames::KeyFrame;
 pub use self::level::{LevelScan, Prediction, Return, Sweep};
 pub use self::place::Place;

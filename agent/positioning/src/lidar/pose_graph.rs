@@ -200,10 +200,9 @@ impl Solve {
         let steps = self.factor.solve();
         self.last_step = 0.0;
         for (pose, step) in self.poses.iter_mut().zip(&steps) {
-            // Not `max`, which passes over what is no number.
-            if !(step.norm() <= self.last_step) {
-                self.last_step = step.norm();
-            }
+            // `max` passes over what is no number.
+            let length = if step.norm().is_nan() { f64::INFINITY } else { step.norm() };
+            self.last_step = self.last_step.max(length);
             pose.translation.vector += step.xy();
             pose.rotation *= nalgebra::UnitComplex::new(step.z);
         }

@@ -25,6 +25,8 @@ const FURTHEST_STEP: (f64, f64) = (0.8, 0.25);
 const REDRAW_M: f64 = 1.0;
 /// Scans in a row that fit nowhere before the place is lost.
 const MISSES: u32 = 4;
+/// A lost vehicle searches so many times as much in a step as one that looks for loops.
+const LOST_TIMES: usize = 4;
 /// What a match adds to the errors of the frames' poses at least, m² and rad²: surfaces are not quite as they are drawn.
 const LEAST_EDGE: (f64, f64) = (0.004 * 0.004, 0.0004 * 0.0004);
 
@@ -49,8 +51,8 @@ impl Default for SlamConfig {
             spacing_m: 1.5,
             most_key_frames: 1000,
             odometry_share: 0.05,
-            search_per_step: 1000,
-            products_per_step: 4000,
+            search_per_step: 600,
+            products_per_step: 2000,
         }
     }
 }
@@ -77,6 +79,8 @@ pub struct Health {
     /// Share of the newest scan that lay on the map, 0 to 1.
     pub share: f64,
     pub key_frames: usize,
+    /// Whether the newest step did no more than match: it neither kept the scan nor worked on loops.
+    pub is_plain: bool,
     /// Loops closed so far. Each can move the place by what had drifted.
     pub loops: usize,
     /// Times the place was lost and found again.
@@ -115,6 +119,7 @@ pub struct Slam {
     closure: Closure,
     relocation: Option<Relocation>,
     solve: Option<Solve>,
+    shared: Matrix3<f64>,
     health: Health,
 }
 
@@ -133,6 +138,7 @@ impl Slam {
             closure: Closure::default(),
             relocation: None,
             solve: None,
+            shared: Matrix3::zeros(),
             health: Health::default(),
         }
     }
@@ -151,12 +157,19 @@ impl Slam {
         self.last.as_ref().map(|last| &last.pose)
     }
 
+    /// What the newest fix shares with those before and after it: the error of the map, which no number of fixes averages
+    /// out. East, north (m²) and heading (rad²). The rest of a fix's covariance is its own.
+    pub fn shared(&self) -> &Matrix3<f64> {
+        &self.shared
+    }
+
     /// Takes in a scan and what was predicted for its moment. `None` while the place is not known by the scan.
     pub fn step(&mut self, scan: &LevelScan, prediction: &Prediction) -> Option<PlanarFix> {
         let predicted = prediction.planar();
         if !is_sound(&predicted, &prediction.covariance) {
             return None;
         }
+        self.health.is_plain = self.solve.is_none();
         self.advance_solve();
         let fix = match self.last {
             Some(last) => {
@@ -214,12 +227,15 @@ impl Slam {
         self.last = self.last.map(|last| Last { pose: found.pose, ..last });
         let position = found.pose.translation.vector;
         let fix = self.fix(scan, found);
-        if self.is_new(found) {
+        let is_new = self.is_new(found);
+        let is_far = (position - self.drawn_at).norm() > REDRAW_M;
+        if is_new {
             self.keep(scan, found, prediction);
-        } else if (position - self.drawn_at).norm() > REDRAW_M {
+        } else if is_far {
             self.redraw(&position);
         }
         self.close_loops();
+        self.health.is_plain &= !is_new && !is_far && !self.closure.is_busy();
         Some(fix)
     }
 
@@ -232,16 +248,15 @@ impl Slam {
     }
 
     /// The place in the world: the match's own error, and that of the frame it is told from.
-    fn fix(&self, scan: &LevelScan, found: &Match) -> PlanarFix {
+    fn fix(&mut self, scan: &LevelScan, found: &Match) -> PlanarFix {
         let base = &self.frames.all()[self.reference];
         let relative = base.pose.inverse() * found.pose;
-        let covariance =
-            composed(&base.pose, &base.covariance, &relative, &Matrix3::zeros()) + found.covariance;
+        self.shared = composed(&base.pose, &base.covariance, &relative, &Matrix3::zeros());
         PlanarFix {
             stamp: scan.stamp,
             position: found.pose.translation.vector,
             heading_rad: found.pose.rotation.angle(),
-            covariance,
+            covariance: self.shared + found.covariance,
         }
     }
 
@@ -365,7 +380,7 @@ impl Slam {
         let relocation = self
             .relocation
             .get_or_insert_with(|| Relocation::new(frames, scan, guess, &(prediction.covariance - base)));
-        match relocation.advance(frames, guess, self.config.search_per_step) {
+        match relocation.advance(frames, guess, LOST_TIMES * self.config.search_per_step) {
             Relocated::Searching => {}
             Relocated::At { pose, frame } => self.found_again(&pose, frame),
             Relocated::Nowhere => self.begin_anew(scan, guess, prediction),
@@ -520,6 +535,7 @@ mod tests {
         assert!(health.degenerate.unwrap().x.abs() > 0.99 && flown.sigma_along_m > 10.0, "{flown:?}");
         let newest = run.slam.key_frames().last().unwrap();
         let [along_m, across_m] = [0, 1].map(|axis| newest.covariance[(axis, axis)].sqrt());
+        assert!(run.slam.shared()[(0, 0)].sqrt() < 10.0, "the map is surer than what a scan tells");
         assert!(along_m > 0.2 && across_m < 0.6 && along_m < 10.0, "{along_m} {across_m}");
         assert!(flown.beyond * 100 <= flown.fixes, "{flown:?}");
     }

@@ -7,6 +7,7 @@ mod link;
 mod mesh;
 mod nav;
 pub mod plan;
+mod slam;
 
 use crate::task::Entry;
 
@@ -15,6 +16,7 @@ pub const TASKS: &[Entry] = &[
     Entry::of::<plan::Plan>(),
     Entry::of::<nav::Nav>(),
     Entry::of::<mesh::Meshes>(),
+    Entry::of::<slam::Slams>(),
     Entry::of::<fleet::Sizes>(),
     Entry::of::<fleet::OneSize>(),
     Entry::of::<link::Extent>(),
