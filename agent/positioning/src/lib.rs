@@ -4,5 +4,6 @@
 //! chooses.
 
 mod fix;
+pub mod markers;
 
 pub use self::fix::{PlanarFix, PoseFix};
