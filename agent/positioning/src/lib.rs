@@ -6,5 +6,6 @@
 pub mod ekf;
 mod fix;
 pub mod lidar;
+pub mod markers;
 
 pub use self::fix::{PlanarFix, PoseFix};
