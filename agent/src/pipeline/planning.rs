@@ -120,7 +120,7 @@ impl Planning {
         map: &mut ClearanceMap,
     ) -> Option<Report> {
         let Some(waypoint) = &mut course.waypoint else {
-            return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() });
+            return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned(), zone: None });
         };
         self.extends = false;
         self.prepare(in_the_way, waypoint, within, motion, map);
@@ -210,7 +210,7 @@ impl Planning {
             }
             Err(error) => {
                 course.following = None;
-                Report::Unplannable { leg, why: error.to_string() }
+                Report::Unplannable { leg, why: error.to_string(), zone: None }
             }
         })
     }

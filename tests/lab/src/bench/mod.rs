@@ -7,6 +7,7 @@ mod link;
 mod mesh;
 mod nav;
 pub mod plan;
+mod zone;
 
 use crate::task::Entry;
 
@@ -20,4 +21,5 @@ pub const TASKS: &[Entry] = &[
     Entry::of::<link::Extent>(),
     Entry::of::<link::peer::Part>(),
     Entry::of::<hold::Holds>(),
+    Entry::of::<zone::Zones>(),
 ];
