@@ -136,9 +136,11 @@ fn one_that_was_cut_short_is_played_as_far_as_it_goes() {
     let path = folder.path().join("mission.mcap");
     record(&path);
     let whole = std::fs::read(&path).unwrap();
-    let cut = Recorded::read(&whole[..whole.len() * 6 / 10], &path).unwrap();
-    let digest = Digest::of(&cut).unwrap();
-    assert!(!digest.complete && digest.to_s > 1.0 && digest.to_s < 10.0, "{digest:?}");
+    // What comes last are schemas and an index.
+    let parts = (1..100).map(|percent| Recorded::read(&whole[..whole.len() * percent / 100], &path));
+    let mut began = parts.filter_map(Result::ok).filter_map(|cut| Some((Digest::of(&cut)?, cut)));
+    let (digest, cut) = began.find(|(digest, _)| digest.to_s >= 3.0).unwrap();
+    assert!(!digest.complete && digest.to_s < 10.0, "{digest:?}");
     let mut replay = Replay::new(cut).unwrap();
     replay.seek(s(10.0));
     assert!((replay.at().as_secs_f64() - digest.to_s).abs() < 1e-6 && !replay.is_complete());
