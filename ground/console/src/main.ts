@@ -377,7 +377,7 @@ function showConnection(): void {
   const live = document.body.dataset.connection === 'live';
   const stale = live && silence > STALE_MS;
   document.body.classList.toggle('stale', !live || stale);
-  setText(part('connection'), !live ? (everLive ? 'Disconnected' : 'Connecting') : stale ? 'Silent' : 'Live');
+  setText(part('connection'), !live ? (everLive ? 'Disconnected' : 'Connecting') : stale ? 'Silent' : replay.active ? 'Recording' : 'Live');
   if (!live && fleet.outcome) {
     setText(part('connection'), 'Over');
     connectionBanner.show(overWords(fleet.outcome, names().length, recording), fleet.outcome.succeeded ? 'good' : 'warn');
