@@ -254,6 +254,8 @@ pub struct AgentConfig {
     /// Whether the vehicle has a lidar: without scans younger than 200 ms it then stands still.
     pub lidar: bool,
     pub fence: Fence,
+    /// The time since 1970 at this agent's time zero, by its computer's clock: zones that are drawn may have hours.
+    pub epoch: Duration,
     /// Terrain, threats and no-fly zones that are known; its box counts for nothing, the fence does.
     pub airspace: Airspace,
     pub envelope: Envelope,

@@ -285,6 +285,7 @@ impl AgentFile {
             sigma_limit_m: self.sigma_limit_m,
             lidar: lidar.is_some(),
             fence: self.fence,
+            epoch: Duration::ZERO,
             airspace,
             envelope: self.envelope,
             planners: self.planners,

@@ -11,7 +11,7 @@ use skein_mav::{Companion, CompanionConfig, Landed, MavEvent, SetPoint, Station,
 use skein_planning::map::MapError;
 use skein_positioning::PoseFix;
 use skein_wire::event::Right;
-use skein_wire::{Limits, Readiness, Scan, State};
+use skein_wire::{Limits, Readiness, Scan, State, Zone};
 
 use crate::{
     apart::decisions::{Decisions, Standing, is_too_late},
@@ -20,6 +20,7 @@ use crate::{
     energy::{Energy, known_charge},
     flight::{Flight, FlightPhase},
     instruction::{Instruction, Waypoint},
+    living_airspace::LivingAirspace,
     neighbours::{Neighbour, Neighbours},
     pipeline::{
         allowed::Allowed,
@@ -28,7 +29,7 @@ use crate::{
         heading::Heading,
         headroom::{Headroom, Look},
         layers::Layers,
-        perception::{Other, Perception, Pose},
+        perception::{Other, Perception, Pose, ZONE_MARGIN_M},
         set_point::{FRESH_FOR, KeepAlive, keep_alive, oldest_age},
         surroundings::Surroundings,
         touchdown::Descent,
@@ -85,6 +86,9 @@ pub struct Control {
     /// Why the estimate is none to fly by, if so.
     doubt: Option<String>,
     perception: Perception,
+    living: LivingAirspace,
+    /// The limits that its b-threads state.
+    stated: Limits,
     neighbours: Neighbours,
     watches: Watches,
     refuge: Refuge,
@@ -130,6 +134,8 @@ impl Control {
             estimate: Estimate::default(),
             doubt: None,
             perception: Perception::of_mission(&config)?,
+            living: LivingAirspace::new(&config),
+            stated: Limits::default(),
             neighbours: Neighbours::new(name.clone(), config.incarnation, config.roster.len())
                 .within_radio_range(config.radio_range_m),
             watches: Watches::default(),
@@ -258,6 +264,7 @@ impl Control {
     pub fn observe(&mut self, now: Duration) -> Vec<Report> {
         self.companion.tick(now);
         self.locate(now);
+        self.look_at_airspace(now);
         if let Some(external) = self.positioning.external(now) {
             self.companion.external(now, &external);
         }
@@ -266,8 +273,44 @@ impl Control {
         self.follow_autopilot(now, &mut reports);
         self.watch(now, &mut reports);
         reports.extend(self.heed_silence(now));
-        reports.extend(self.guidance.go_on_planning(self.perception.map_mut()));
+        let planned = self.guidance.go_on_planning(self.perception.map_mut());
+        reports.extend(planned.map(|report| self.with_zone(report)));
         reports
+    }
+
+    /// Has regard for these zones from now on, and for no others that are drawn.
+    pub fn draw(&mut self, now: Duration, zones: Vec<Zone>) {
+        self.living.draw(zones);
+        self.look_at_airspace(now);
+    }
+
+    fn look_at_airspace(&mut self, now: Duration) {
+        let position = self.motion().map(|motion| motion.position);
+        if !self.living.look(now, position.as_ref()) {
+            return;
+        }
+        self.perception.close(self.living.closed().clone());
+        self.guidance.steering.look_for_a_place();
+        self.perception.reach(self.living.rally().map(|[.., z]| z));
+        self.refuge.set_rally(self.config.rally.iter().copied().chain(self.living.rally()));
+        self.keep_to_limits();
+    }
+
+    fn keep_to_limits(&mut self) {
+        let limits = self.living.limits(&self.stated);
+        let ([.., low_m], [.., high_m]) = limits.region();
+        self.perception.reach([low_m, high_m]);
+        self.guidance.limit(Allowed::from(&limits));
+    }
+
+    /// Where there is no path, the zone that is in the way.
+    fn with_zone(&self, report: Report) -> Report {
+        let Report::Unplannable { leg, why, .. } = report else { return report };
+        let ends = self.motion().zip(self.guidance.course.waypoint);
+        let zone = ends.and_then(|(motion, waypoint)| {
+            self.living.in_the_way(&motion.position, &waypoint.target, ZONE_MARGIN_M)
+        });
+        Report::Unplannable { leg, why, zone: zone.map(str::to_owned) }
     }
 
     fn follow_autopilot(&mut self, now: Duration, reports: &mut Vec<Report>) {
@@ -299,7 +342,7 @@ impl Control {
     fn watch(&mut self, now: Duration, reports: &mut Vec<Report>) {
         let charge = known_charge(now, self.companion.telemetry().battery);
         self.watch_energy(now, charge, reports);
-        let AgentConfig { fence, airspace, .. } = &*self.config;
+        let fence = &self.config.fence;
         let (telemetry, estimate) = (self.companion.telemetry(), self.estimate);
         let around = self.neighbours.around();
         reports.extend(self.preflight.update(&Situation {
@@ -326,7 +369,8 @@ impl Control {
             let position = motion.value.position;
             let sigma_m = motion.value.position_sigma_m();
             reports.extend(self.watches.doubt(self.doubt.as_deref(), sigma_m));
-            reports.extend(self.watches.fence(&motion.value, fence, &airspace.stay_inside));
+            reports.extend(self.watches.fence(&motion.value, fence, &self.living.closed().stay_inside));
+            reports.extend(self.living.watch(&position));
             reports.extend(self.watches.separation(position, around));
             reports.extend(self.refuge.look(&self.name, &position, around, self.guidance.goes_home()));
         } else {
@@ -418,9 +462,8 @@ impl Control {
 
     /// Keeps to these limits from now on.
     pub fn limit(&mut self, limits: &Limits) {
-        let ([.., low_m], [.., high_m]) = limits.region();
-        self.perception.reach([low_m, high_m]);
-        self.guidance.limit(Allowed::from(limits));
+        self.stated = limits.clone();
+        self.keep_to_limits();
     }
 
     /// The mission has decided at this time, even if it was that nothing is to be done.
@@ -472,7 +515,8 @@ impl Control {
             Instruction::GoTo(waypoint) => self.guidance.head_for(waypoint),
             Instruction::Plan { is_stuck } => {
                 let (motion, map) = (self.motion()?, self.perception.map_mut());
-                return self.guidance.plan(is_stuck, &motion, map, self.neighbours.around());
+                let report = self.guidance.plan(is_stuck, &motion, map, self.neighbours.around());
+                return report.map(|report| self.with_zone(report));
             }
             Instruction::GrantLeave => self.guidance.grant_leave(at),
             Instruction::MakeWay => {

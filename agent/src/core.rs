@@ -241,6 +241,9 @@ impl AgentCore {
         if let Some(limits) = self.mission.changed_limits() {
             control.limit(limits);
         }
+        if let Some(zones) = self.mission.changed_zones() {
+            control.draw(now, zones);
+        }
     }
 
     /// Whether this agent has the vehicle in the air, or on its way there.

@@ -10,7 +10,7 @@ use skein_wire::event::{
     Airborne, Arrived, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed, Cornered,
     FenceBreached, FoundAirborne, InTheWay, Landed, Leave, OrderTaken, OutOfTheWay, PathBlocked, PilotTook,
     PlaceFree, PlaceTaken, Planned, PositionDoubted, PositionTrusted, Ready, Refuge, Right, Slept,
-    SourceFound, SourceLost, Stuck, TooClose, Unplannable, Unready, What,
+    SourceFound, SourceLost, Stuck, TooClose, Unplannable, Unready, What, ZoneNews, ZoneState,
 };
 
 use crate::energy::Changed;
@@ -72,7 +72,13 @@ pub enum Report {
     Unplannable {
         leg: i64,
         why: String,
+        /// The zone in the way, if one is.
+        zone: Option<String>,
     },
+    /// The vehicle is in a zone of this name, that was drawn about it or that it was carried into.
+    InZone(String),
+    /// It is in that no more.
+    OutOfZone(String),
     /// The waypoint of this leg is reached.
     Arrived {
         leg: i64,
@@ -137,7 +143,15 @@ impl Report {
             Self::TooClose(other) => me.event(TooClose { other: other.as_str().into() }),
             Self::Clear => me.event(Clear),
             Self::Planned { leg, length_m } => me.event(Planned { leg, length_m }),
-            Self::Unplannable { leg, why } => me.event(Unplannable { leg, why: why.into() }),
+            Self::Unplannable { leg, why, zone } => {
+                me.event(Unplannable { leg, why: why.into(), zone: zone.map(Into::into) })
+            }
+            Self::InZone(name) => {
+                me.event(ZoneNews { name: name.into(), state: ZoneState::Inside, of: None })
+            }
+            Self::OutOfZone(name) => {
+                me.event(ZoneNews { name: name.into(), state: ZoneState::Outside, of: None })
+            }
             Self::Arrived { leg } => me.event(Arrived { leg }),
             Self::PlaceTaken { leg, by, leaves } => {
                 me.event(PlaceTaken { leg, by: by.as_str().into(), leaves })

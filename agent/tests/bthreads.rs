@@ -336,7 +336,7 @@ mod path {
     use super::*;
 
     fn unplannable() -> Event {
-        Unplannable { leg: 0, why: "walled in".into() }.at(ME)
+        Unplannable { leg: 0, why: "walled in".into(), zone: None }.at(ME)
     }
 
     #[test]
@@ -1309,7 +1309,7 @@ mod reposition {
     fn a_point_without_a_way_is_declined_and_the_vehicle_stays_in_the_air() {
         let mut vehicle = Vehicle::on_its_way();
         vehicle.hears(goto());
-        let unplannable = || Unplannable { leg: -2, why: "walled in".into() }.at(ME);
+        let unplannable = || Unplannable { leg: -2, why: "walled in".into(), zone: None }.at(ME);
         for _ in 0..2 {
             vehicle.hears(unplannable());
             vehicle.after(SECOND);

@@ -34,6 +34,7 @@ pub fn config() -> AgentConfig {
         sigma_limit_m: 2.0,
         lidar: true,
         fence: Fence { min: [-60.0, -60.0, -1.0], max: [60.0, 60.0, 20.0] },
+        epoch: Duration::ZERO,
         airspace: Default::default(),
         envelope: Envelope::default(),
         planners: Planners::default(),

@@ -123,7 +123,7 @@ impl Planning {
         map: &mut ClearanceMap,
     ) -> Option<Report> {
         let Some(waypoint) = &mut course.waypoint else {
-            return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() });
+            return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned(), zone: None });
         };
         self.extends = false;
         self.prepare(in_the_way, waypoint, within, motion, map);
@@ -214,7 +214,7 @@ impl Planning {
             }
             Err(error) => {
                 course.following = None;
-                Report::Unplannable { leg, why: format!("{error}{}", self.silent) }
+                Report::Unplannable { leg, why: format!("{error}{}", self.silent), zone: None }
             }
         })
     }

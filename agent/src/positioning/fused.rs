@@ -421,7 +421,7 @@ impl Positioning for Fused {
         };
         let level = LevelScan::new(&sweep, &prediction, |_| false);
         if let Some(fix) = slam.step(&level, &prediction) {
-            self.of_lidar = fix.covariance.fixed_view::<2, 2>(0, 0).into();
+            self.of_lidar = slam.shared().fixed_view::<2, 2>(0, 0).into();
             self.take(Measurement::Lidar(fix));
             self.map_anew(&fix, &prediction);
         }

@@ -93,6 +93,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             sigma_limit_m: DEFAULT_SIGMA_LIMIT_M,
             lidar: plan.model.lidar.is_some(),
             fence,
+            epoch: Duration::ZERO,
             airspace: scenario.airspace.clone(),
             envelope: Envelope {
                 cruise_m_s: scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),

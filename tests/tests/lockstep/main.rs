@@ -24,3 +24,4 @@ mod solids_of_many_kinds;
 mod tasks;
 mod thin_solids;
 mod wind;
+mod zones;

@@ -43,6 +43,8 @@ skein_bp::events! {
         /// As in `goto`.
         leg: i64,
         why: Text,
+        /// The zone in the way, if one is: the vehicle waits for its end.
+        zone: Option<Text>,
     }
     /// The path ahead runs into an obstacle that was not known when it was planned.
     PathBlocked = "path_blocked", Own;

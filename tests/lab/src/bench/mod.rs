@@ -8,6 +8,7 @@ mod mesh;
 mod nav;
 pub mod plan;
 mod slam;
+mod zone;
 
 use crate::task::Entry;
 
@@ -22,4 +23,5 @@ pub const TASKS: &[Entry] = &[
     Entry::of::<link::Extent>(),
     Entry::of::<link::peer::Part>(),
     Entry::of::<hold::Holds>(),
+    Entry::of::<zone::Zones>(),
 ];
