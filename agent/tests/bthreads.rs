@@ -51,6 +51,7 @@ fn config() -> AgentConfig {
         behaviours: Default::default(),
         lease: SECOND,
         radio_range_m: None,
+        epoch: Duration::ZERO,
         authority: skein_wire::standard_authority(),
         kept: skein_dbp::Kept::default(),
         seed: 1,

@@ -72,7 +72,7 @@ const SAME_PLACE_M: f64 = 0.1;
 /// Distances that differ by no more than this are equal, in metres.
 const ROUNDING_M: f64 = 1e-9;
 
-const BUILT_IN: [(&str, &str); 8] = [
+const BUILT_IN: [(&str, &str); 10] = [
     ("forest", include_str!("../../scenarios/forest.toml")),
     ("antipodal", include_str!("../../scenarios/antipodal.toml")),
     ("window", include_str!("../../scenarios/window.toml")),
@@ -81,6 +81,8 @@ const BUILT_IN: [(&str, &str); 8] = [
     ("geese", include_str!("../../scenarios/geese.toml")),
     ("valley", include_str!("../../scenarios/valley.toml")),
     ("indoor", include_str!("../../scenarios/indoor.toml")),
+    ("warehouse", include_str!("../../scenarios/warehouse.toml")),
+    ("canyon", include_str!("../../scenarios/canyon.toml")),
 ];
 
 /// A world, a swarm in it, and what is asked of the swarm. World frame ENU, metres, seconds.
