@@ -42,7 +42,10 @@ fn cross(scenario: &Scenario, a: usize, b: usize) -> bool {
 fn every_built_in_scenario_is_listed_with_what_it_is() {
     let names = Scenario::names();
     let only_names: Vec<_> = names.iter().map(|(name, _)| *name).collect();
-    assert_eq!(only_names, ["forest", "antipodal", "window", "open", "survey", "geese", "valley"]);
+    let built_in = [
+        "forest", "antipodal", "window", "open", "survey", "geese", "valley", "indoor", "warehouse", "canyon",
+    ];
+    assert_eq!(only_names, built_in);
     assert!(names.iter().all(|(_, about)| about.len() > 20));
 }
 
