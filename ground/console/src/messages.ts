@@ -59,7 +59,33 @@ state: string, value: string, advice: string, };
 /**
  * A message of a browser.
  */
-export type ClientMessage = { "type": "hello", tag: string | null, name: string, } | { "type": "order" } & OrderMessage | { "type": "why", vehicle: string | null, } | { "type": "read_script", tag: string | null, file: string, text: string, };
+export type ClientMessage = { "type": "hello", tag: string | null, name: string, } | { "type": "order" } & OrderMessage | { "type": "why", vehicle: string | null, } | { "type": "read_script", tag: string | null, file: string, text: string, } | { "type": "plan", tag: string | null, to: To, targets: Array<[number, number, number]>, };
+
+/**
+ * A route's cost, and what it is made of before that is weighed.
+ */
+export type CostView = { cost_m: number, length_m: number,
+/**
+ * At cruise.
+ */
+time_s: number, height_m: number, repulsion_m: number,
+/**
+ * Share of what is in the battery.
+ */
+energy: number, turning: number, };
+
+/**
+ * Two vehicles that would come nearer to one another than a plan keeps.
+ */
+export type Encounter = { who: [string, string],
+/**
+ * After the vehicles have set out, s.
+ */
+at_s: number, distance_m: number,
+/**
+ * ENU, metres.
+ */
+place: [number, number, number], };
 
 /**
  * An event that has happened.
@@ -84,7 +110,26 @@ choice: string | null, };
 
 export type EventView = { time_s: number, home: string, seq: number, name: string, data: Record<string, unknown>, requested_by: Array<string>, blocked_by: Array<string>, };
 
+export type JourneyView = { vehicle: string,
+/**
+ * The numbers of its targets, from 1.
+ */
+targets: Array<number>,
+/**
+ * The points to send it as its route, metres ENU.
+ */
+points: Array<[number, number, number]>, by: Method, cost: CostView, second: SecondView | null,
+/**
+ * Factor by which it flies slower than at cruise.
+ */
+slowed: number, };
+
 export type LinkView = { alive: boolean, age_ms: number | null, };
+
+/**
+ * A planner of routes. Both have the same cost.
+ */
+export type Method = "swarm" | "lattice";
 
 export type MissionView = "under_way" | "complete" | "failed";
 
@@ -134,6 +179,8 @@ blocked_by: Array<Blocker>, };
  */
 export type Role = "observer" | "safety" | "operator";
 
+export type SecondView = { by: Method, cost: CostView, points: Array<[number, number, number]>, };
+
 /**
  * A message for browsers.
  */
@@ -169,7 +216,19 @@ doubts: Array<string>, } | { "type": "you", tag: string | null, name: string | n
 /**
  * Whether a certificate says so; otherwise whoever sits there does.
  */
-certified: boolean, } | { "type": "offer", tag: string | null, token: string, what: string, lasts_s: number, vehicles: Array<CandidateView>, } | { "type": "ordered", tag: string | null, id: number, } | { "type": "script", tag: string | null, script: unknown, } | { "type": "error", tag: string | null, message: string, };
+certified: boolean, } | { "type": "offer", tag: string | null, token: string, what: string, lasts_s: number, vehicles: Array<CandidateView>, } | { "type": "ordered", tag: string | null, id: number, } | { "type": "plan", tag: string | null, journeys: Array<JourneyView>,
+/**
+ * The vehicles that no route was made for, and why.
+ */
+left_out: { [key in string]: string },
+/**
+ * When all arrive, seconds after they have set out.
+ */
+arrival_s: number, cost_m: number,
+/**
+ * Who would come too near to whom: a plan with any is not to be sent.
+ */
+encounters: Array<Encounter>, } | { "type": "script", tag: string | null, script: unknown, } | { "type": "error", tag: string | null, message: string, };
 
 /**
  * Where a vehicle is and what it does.

@@ -4,6 +4,7 @@ mod caller;
 mod certificates;
 mod explain;
 mod order;
+mod plan;
 mod recording;
 mod serve;
 mod status;
@@ -51,6 +52,9 @@ enum Command {
     Certificates(certificates::Certificates),
     #[command(flatten)]
     Order(order::OrderCommand),
+    /// Plan for the fleet: who reaches which target by what way, so that all arrive together. Without `--send` nobody is
+    /// ordered anything.
+    Plan(plan::PlanCommand),
     /// Say where each vehicle of a station that runs is, what it does and for whom it waits.
     Status(caller::Call),
     /// Explain why vehicles of a recorded mission moved or stood still: who requested what, who blocked it, and what
@@ -81,6 +85,7 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
         Command::Certificates(args) => certificates::run(args, cli.json),
         Command::Status(call) => status::run(call, cli.json),
         Command::Order(order) => order::run(order, cli.json),
+        Command::Plan(command) => plan::run(command, cli.json),
         Command::Explain { file, at, vehicle } => explain::run(file, *at, vehicle.as_deref(), cli.json),
     };
     match outcome {

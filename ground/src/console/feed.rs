@@ -16,6 +16,7 @@ use skein_dbp::{Happened, NodeName, Peer};
 use skein_wire::event::{Advance, Declared as _, Homeward, What};
 use skein_wire::{Check, Form, MissionState, Scene, SenderStats, State};
 
+use super::plan_view::PlanView;
 use super::session::{Role, Session};
 use super::subscription::{Broadcast, Subscription, Text};
 use crate::core::GroundCore;
@@ -90,6 +91,12 @@ pub(super) enum Message<'a> {
     Ordered {
         tag: Option<String>,
         id: u64,
+    },
+    /// A plan, as far as it was asked for.
+    Plan {
+        tag: Option<String>,
+        #[serde(flatten)]
+        plan: PlanView<'a>,
     },
     /// A script as its file says it.
     Script {

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 
+use nalgebra::Vector3;
 use serde::Deserialize;
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_dbp::NodeName;
@@ -14,6 +15,7 @@ use crate::core::GroundCore;
 use crate::giver::Giver;
 use crate::launch_offer::LaunchOffer;
 use crate::order::{Destination, Order, SentScript, Who};
+use crate::planning::{FleetPlan, FleetProblem};
 use crate::refusal::Refusal;
 
 /// What somebody wants of the station.
@@ -24,6 +26,8 @@ pub(super) enum Wanted {
     Offer(What, String),
     /// The launch that was offered under this token.
     Launch(String),
+    /// What is to be known to plan for these vehicles to these targets.
+    Survey(Who, Vec<Vector3<f64>>),
 }
 
 /// What somebody wants, on its way to the station.
@@ -42,6 +46,7 @@ pub(super) enum Granted {
     /// The number under which it has given an order.
     Ordered(u64),
     Offered(LaunchOffer),
+    Surveyed(Box<FleetProblem>),
 }
 
 impl Wish {
@@ -52,6 +57,9 @@ impl Wish {
             Wanted::Order(order) => station.order(&by, &order).map(Granted::Ordered),
             Wanted::Offer(what, token) => station.offer_launch(&by, what, token).map(Granted::Offered),
             Wanted::Launch(token) => station.launch(&by, &token).map(Granted::Ordered),
+            Wanted::Survey(who, targets) => {
+                station.survey(&who, targets).map(Box::new).map(Granted::Surveyed)
+            }
         };
         // Who asked may have closed the page.
         let _ = answer.send(granted);
@@ -64,6 +72,7 @@ impl std::fmt::Display for Wish {
             Wanted::Order(order) => write!(f, "{} orders {} for {}", self.by, order.what(), order.who()),
             Wanted::Offer(what, _) => write!(f, "{} asks what {what} would launch", self.by),
             Wanted::Launch(_) => write!(f, "{} confirms a launch", self.by),
+            Wanted::Survey(who, _) => write!(f, "{} asks for a plan for {who}", self.by),
         }
     }
 }
@@ -100,6 +109,10 @@ pub(super) enum Request {
     Why(Option<NodeName>),
     /// To be told what a script's file says: its purpose and its parameters.
     Script(Box<ScriptFile>),
+    /// To be shown how these vehicles would reach these targets together; nobody is ordered anything.
+    Plan(Who, Vec<Vector3<f64>>),
+    /// The same, made.
+    Planned(Box<FleetPlan>),
 }
 
 /// A message of a browser.
@@ -123,6 +136,13 @@ pub(super) enum Message {
         file: String,
         text: String,
     },
+    /// Asks for a plan: so that these vehicles reach these targets (ENU, metres) together. Each route of it is sent as
+    /// the order `route`.
+    Plan {
+        tag: Option<String>,
+        to: To,
+        targets: Vec<[f64; 3]>,
+    },
 }
 
 #[derive(Debug, Deserialize)]
@@ -141,6 +161,10 @@ pub(super) struct OrderMessage {
     #[serde(default)]
     #[cfg_attr(test, ts(optional))]
     points: Option<Vec<[f64; 3]>>,
+    /// The numbers, from 0, of the points that are targets, if the others are only the way there.
+    #[serde(default)]
+    #[cfg_attr(test, ts(optional))]
+    stops: Option<Vec<usize>>,
     /// For `load`: a script with values for its parameters.
     #[serde(default)]
     #[cfg_attr(test, ts(optional, type = "{ script: unknown, with: Record<string, unknown> }"))]
@@ -158,9 +182,23 @@ pub(super) struct OrderMessage {
 #[derive(Debug, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(untagged)]
-enum To {
+pub(super) enum To {
     Word(String),
     Names(Vec<String>),
+}
+
+impl To {
+    fn who(self) -> Result<Who, String> {
+        match self {
+            Self::Word(word) if word == OrderGiven::ALL => Ok(Who::All),
+            Self::Word(word) => Err(format!("`to` is {word:?}: expected \"all\" or a list of vehicles")),
+            Self::Names(names) if names.is_empty() => Err("`to` names no vehicle".into()),
+            Self::Names(names) => {
+                let names = names.iter().map(|name| NodeName::new(name)).collect::<Result<_, _>>();
+                names.map(Who::These).map_err(|error| error.to_string())
+            }
+        }
+    }
 }
 
 /// The beginning of a message: enough to know how long it may take to read the rest.
@@ -195,6 +233,10 @@ pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
     match serde_json::from_str::<Message>(text) {
         Ok(Message::Hello { tag, name }) => (tag, Ok(Request::Hello(name))),
         Ok(Message::Order(message)) => (message.tag.clone(), Ok(Request::Order(message))),
+        Ok(Message::Plan { tag, to, targets }) => {
+            let targets = targets.into_iter().map(Vector3::from).collect();
+            (tag, to.who().map(|who| Request::Plan(who, targets)))
+        }
         Ok(Message::Why { vehicle }) => (None, Ok(Request::Why(vehicle))),
         Ok(Message::ReadScript { tag, file, text }) => {
             let script = ScriptFile::parse(&file, &text).map_err(|error| error.to_string());
@@ -230,16 +272,10 @@ impl OrderMessage {
     }
 }
 
-fn order(OrderMessage { what, to, point, points, script, name, .. }: OrderMessage) -> Result<Order, String> {
-    let who = match to {
-        To::Word(word) if word == OrderGiven::ALL => Who::All,
-        To::Word(word) => return Err(format!("`to` is {word:?}: expected \"all\" or a list of vehicles")),
-        To::Names(names) if names.is_empty() => return Err("`to` names no vehicle".into()),
-        To::Names(names) => {
-            let names = names.iter().map(|name| NodeName::new(name)).collect::<Result<_, _>>();
-            Who::These(names.map_err(|error| error.to_string())?)
-        }
-    };
+fn order(
+    OrderMessage { what, to, point, points, stops, script, name, .. }: OrderMessage,
+) -> Result<Order, String> {
+    let who = to.who()?;
     Ok(match what {
         What::Launch if who != Who::All => {
             return Err("a launch is for all: vehicles take off in turn".into());
@@ -270,7 +306,8 @@ fn order(OrderMessage { what, to, point, points, script, name, .. }: OrderMessag
                 return Err("a route is for one vehicle: name it in `to`".into());
             }
             let points = points.ok_or("`route` needs `points`: [[x, y, z], ...], metres")?;
-            Order::Route(who, Route::new(points).map_err(|error| error.to_string())?)
+            let route = Route::new(points).map_err(|error| error.to_string())?;
+            Order::Route(who, if let Some(stops) = stops { route.with_targets(&stops) } else { route })
         }
         what => Order::plain(what, who).ok_or("this order needs more than its word")?,
     })
@@ -372,6 +409,9 @@ mod tests {
             (r#"{"type":"order","what":"give","to":"all","name":"a/b"}"#, "names no person"),
             (r#"{"type":"order","what":"hold","to":"all","token":"7"}"#, "takes no `token`"),
             (r#"{"type":"hello"}"#, "`name`"),
+            (r#"{"type":"plan","to":"some","targets":[]}"#, "`to`"),
+            (r#"{"type":"plan","to":"all"}"#, "`targets`"),
+            (r#"{"type":"plan","to":"all","targets":[[1,2]]}"#, "length 3"),
             (
                 r#"{"type":"order","what":"load","to":"all","script":{"script":{"name":"a","about":"","body":[{"dance":1}]}}}"#,
                 "a: `body[0]` unknown field `dance`",

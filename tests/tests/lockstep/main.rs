@@ -13,6 +13,7 @@ mod limits;
 mod moving;
 mod narrow_alone;
 mod no_lidar;
+mod planning;
 mod positions;
 mod preflight;
 mod routes;

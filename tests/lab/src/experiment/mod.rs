@@ -3,6 +3,7 @@
 mod ablation;
 mod autopilots;
 mod circle;
+mod cooperative;
 mod dstar_grid;
 mod feasibility;
 mod lsc;
@@ -34,4 +35,5 @@ pub const TASKS: &[Entry] = &[
     Entry::of::<Reported<dstar_grid::DstarGrid>>(),
     Entry::of::<Reported<lsc::Lsc>>(),
     Entry::of::<Reported<swarm_planning::SwarmPlanning>>(),
+    Entry::of::<Reported<cooperative::Cooperative>>(),
 ];
