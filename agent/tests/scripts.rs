@@ -58,6 +58,8 @@ fn config() -> AgentConfig {
         scripts: Vec::new(),
         behaviours: Default::default(),
         lease: Duration::from_secs(1),
+        radio_range_m: None,
+        epoch: Duration::ZERO,
         authority: skein_wire::standard_authority(),
         kept: skein_dbp::Kept::default(),
         seed: 1,

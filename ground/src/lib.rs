@@ -39,6 +39,8 @@ mod order_log;
 pub mod planning;
 pub mod recorder;
 mod refusal;
+pub mod replay;
+mod zone_log;
 
 pub use crate::core::GroundCore;
 pub use bthreads::MissionOutcome;
@@ -50,3 +52,4 @@ pub use launch_offer::{Candidate, LaunchOffer, OFFER_LASTS};
 pub use order::{Destination, Order, SentScript, UnfitScript, Who};
 pub use order_log::{Answer, OrderRecord};
 pub use refusal::Refusal;
+pub use zone_log::ZoneRecord;

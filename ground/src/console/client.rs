@@ -155,7 +155,7 @@ async fn survey(
     mailbox: &Mailbox,
 ) -> Result<Granted, String> {
     let by = session.giver(What::Route)?;
-    carried_out(by, Wanted::Survey(who, targets), mailbox).await
+    granted(by, Wanted::Survey(who, targets), mailbox).await
 }
 
 /// Plans on a thread that has time for it.
@@ -199,6 +199,15 @@ async fn answer(
         Ok(Request::Plan(..)) => Ok(()),
         Ok(Request::Script(script)) => say(socket, &Message::Script { tag, script }).await,
         Ok(Request::Order(order)) => give(socket, session, tag, *order, mailbox).await,
+        Ok(Request::Map(wanted)) => change_map(socket, session, tag, wanted, mailbox).await,
+        Ok(Request::Replay(message)) => {
+            let by = session.name().cloned().unwrap_or_else(Giver::looking_on);
+            let granted = granted(by, Wanted::Replay(message), mailbox).await;
+            match granted {
+                Ok(granted) => say(socket, &Message::granted(tag, &granted)).await,
+                Err(message) => say(socket, &Message::Error { tag, message }).await,
+            }
+        }
         Ok(Request::Hello(name)) => {
             let answer = match session.introduce(&name) {
                 Ok(()) => Message::you(session, tag),
@@ -218,9 +227,24 @@ async fn give(
     mailbox: &Mailbox,
 ) -> Result<(), Gone> {
     match wish(session, order, mailbox).await {
-        Ok(Granted::Ordered(id)) => say(socket, &Message::Ordered { tag, id }).await,
-        Ok(Granted::Surveyed(_)) => Ok(()),
-        Ok(Granted::Offered(offer)) => say(socket, &Message::offer(tag, &offer)).await,
+        Ok(granted) => say(socket, &Message::granted(tag, &granted)).await,
+        Err(message) => say(socket, &Message::Error { tag, message }).await,
+    }
+}
+
+async fn change_map(
+    socket: &mut WebSocket,
+    session: &Session,
+    tag: Option<String>,
+    wanted: Wanted,
+    mailbox: &Mailbox,
+) -> Result<(), Gone> {
+    let granted = match session.drawer() {
+        Ok(by) => granted(by, wanted, mailbox).await,
+        Err(message) => Err(message),
+    };
+    match granted {
+        Ok(granted) => say(socket, &Message::granted(tag, &granted)).await,
         Err(message) => say(socket, &Message::Error { tag, message }).await,
     }
 }
@@ -228,10 +252,10 @@ async fn give(
 /// What the station makes of a request. Rights are looked at before anything else is.
 async fn wish(session: &Session, order: OrderMessage, mailbox: &Mailbox) -> Result<Granted, String> {
     let by = session.giver(order.what)?;
-    carried_out(by, order.wanted(token::random)?, mailbox).await
+    granted(by, order.wanted(token::random)?, mailbox).await
 }
 
-async fn carried_out(by: Giver, wanted: Wanted, mailbox: &Mailbox) -> Result<Granted, String> {
+async fn granted(by: Giver, wanted: Wanted, mailbox: &Mailbox) -> Result<Granted, String> {
     let given = mailbox.put(by, wanted)?.await;
     given.map_err(|_| "the station is ending".to_owned())?.map_err(|refusal| refusal.to_string())
 }

@@ -7,6 +7,7 @@ mod closed_loop;
 mod cost;
 mod csv;
 mod flight;
+mod floor_camera;
 mod geometry;
 mod lidar;
 mod position_error;

@@ -6,8 +6,9 @@ mod circle;
 mod cooperative;
 mod dstar_grid;
 mod feasibility;
+mod indoor;
 mod lsc;
-mod naive_right_of_way;
+pub mod naive_right_of_way;
 mod narrow;
 mod performance;
 mod potential;
@@ -33,6 +34,7 @@ pub const TASKS: &[Entry] = &[
     Entry::of::<Reported<narrow::Narrow>>(),
     Entry::of::<Reported<sphere::Sphere>>(),
     Entry::of::<Reported<dstar_grid::DstarGrid>>(),
+    Entry::of::<Reported<indoor::Indoor>>(),
     Entry::of::<Reported<lsc::Lsc>>(),
     Entry::of::<Reported<swarm_planning::SwarmPlanning>>(),
     Entry::of::<Reported<cooperative::Cooperative>>(),
