@@ -11,11 +11,10 @@ use skein_bp::configuration;
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_dbp::{Authority, Kept};
 use skein_mav::Datum;
-use skein_planning::airspace::{Airspace, KeepOut};
+use skein_planning::airspace::{Airspace, AirspaceTable, KeepOut};
 use skein_wire::{NodeName, standard_authority};
 use skein_zenoh::NetworkSettings;
 
-use crate::airspace_table::AirspaceTable;
 use crate::autopilot_link::Address;
 use crate::bthreads::LinkLossPolicy;
 use crate::config::{

@@ -6,9 +6,8 @@
 //! same agent flies on a vehicle, over Zenoh on one host, and in lockstep.
 
 mod agent_error;
-mod airspace_table;
 pub mod apart;
-mod arrival;
+pub mod arrival;
 #[cfg(feature = "zenoh")]
 pub mod autopilot_link;
 pub mod bthreads;
@@ -44,12 +43,12 @@ pub mod scripts;
 pub mod stretch;
 pub mod verify;
 mod watches;
+pub mod way_on;
 
 #[cfg(feature = "zenoh")]
 pub use self::cli::main;
 pub use self::{
     agent_error::AgentError,
-    airspace_table::{AirspaceError, AirspaceTable},
     config::{
         AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, GlobalPlanner, LocalPlanner, Nose, Planners,
         PositionSource, Repellers, position_sources,

@@ -8,6 +8,7 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_bp::script::Assignment;
 use skein_bp::{Event, Program, ProgramConfig};
+use skein_dbp::facts::{PeerJoined, PeerLost};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_wire::event::{
     self, Advance, Arrived, Complete, Declared as _, Declined, Enter, Failed, Goto, Hold, Land, Load,
@@ -34,6 +35,7 @@ use crate::{
     safety::safety_events,
     scripts::{Begins, CONFIGURATION, Circumstances, Loaded, ScriptFacts, Scripts},
     verify::check_script,
+    way_on::WayOn,
 };
 
 /// How many states of a script and the vehicle's program are looked at before it runs: no more than there is
@@ -73,6 +75,11 @@ pub struct Mission {
     /// configuration.
     waypoints: Vec<[f64; 3]>,
     sent_by: Option<Text>,
+    /// The route that it was sent, and the number of the point that it flies to.
+    route: Option<Route>,
+    next: usize,
+    /// The ground station has just been lost: what is left of the route is the vehicle's own to plan.
+    is_left_alone: bool,
     /// The last that has sent the vehicle elsewhere.
     pointed_by: Text,
     /// Where others stay, or mean to, metres ENU.
@@ -164,6 +171,9 @@ impl Mission {
             task: "on the ground".to_owned(),
             waypoints: config.waypoints.clone(),
             sent_by: None,
+            route: None,
+            next: 0,
+            is_left_alone: false,
             pointed_by: "an operator".into(),
             ends: Vec::new(),
             outcome: None,
@@ -275,6 +285,7 @@ impl Mission {
     pub fn tell_scripts(&mut self, circumstances: &Circumstances<'_>) {
         self.ends.clear();
         self.ends.extend(circumstances.neighbours.iter().map(|other| (other.node.clone(), other.end())));
+        self.go_on_alone(circumstances);
         let is_heard =
             |fact: &str| self.scripts.listen_to(fact) || self.config.behaviours.hear(self.me.name(), fact);
         for event in self.script_facts.tell(&self.me, is_heard, circumstances) {
@@ -350,6 +361,7 @@ impl Mission {
         self.look_after_scripts(happened);
         match Instruction::of(&self.me, &happened.event)? {
             Instruction::GoTo(waypoint) => {
+                self.next = usize::try_from(waypoint.leg).unwrap_or(self.next);
                 let beyond_s = self.beyond_s(waypoint.leg);
                 Some(Instruction::GoTo(Waypoint { beyond_s, ..waypoint }))
             }
@@ -378,7 +390,34 @@ impl Mission {
             && let Ok(route) = way.parse::<Route>()
         {
             self.waypoints = route.points().to_vec();
+            (self.route, self.next) = (Some(route), 0);
             self.sent_by = Some(by);
+        } else if let Some(lost) = self.me.read::<PeerLost>(event) {
+            self.is_left_alone |= lost.node.as_str() == self.config.ground;
+        } else if let Some(joined) = self.me.read::<PeerJoined>(event) {
+            self.is_left_alone &= joined.node.as_str() != self.config.ground;
+        }
+    }
+
+    /// Looks for a better way for what is left of its route, once the ground station that has planned it is lost. The
+    /// station's next route takes its place.
+    fn go_on_alone(&mut self, here: &Circumstances<'_>) {
+        if !(self.is_left_alone && here.is_flown) {
+            return;
+        }
+        self.is_left_alone = false;
+        let program = self.node.node().program();
+        let mission = program.state_of::<bthreads::Mission>(bthreads::Mission::NAME);
+        let is_on_its_way = mission.is_some_and(|mission| mission.objects_to_routes().is_none());
+        let Some(route) = self.route.as_ref().filter(|_| is_on_its_way) else { return };
+        let way_on = WayOn::new(here.neighbours, here.battery.unwrap_or(1.0), &self.config);
+        let better = way_on.better(route, self.next, here.position);
+        let drawn: Vec<_> = self.drawn.zones().cloned().collect();
+        let may_be_flown = |way: &Route| reroute::objection(way, &self.config, &drawn, &self.ends).is_none();
+        if let Some(better) = better.filter(may_be_flown) {
+            let by = self.name.as_str().into();
+            let rerouted = Rerouted { way: better.to_string().as_str().into(), by };
+            self.node.node_mut().enqueue(self.me.event(rerouted));
         }
     }
 

@@ -8,6 +8,7 @@ use skein_wire::{Fleet, KeptZone, standard_authority};
 
 use crate::giver::Giver;
 use crate::order::Order;
+use crate::planning::Theatre;
 
 /// The configuration of a ground station.
 #[derive(Clone, Debug)]
@@ -31,6 +32,8 @@ pub struct GroundConfig {
     pub muster: bool,
     /// The behaviours that are switched on; those for other nodes count for nothing.
     pub behaviours: Chosen,
+    /// What the station plans with for the fleet; without it, it makes no plans.
+    pub theatre: Option<Theatre>,
     /// Lease of the station's bids.
     pub lease: Duration,
     /// The rights of other nodes to request and block events here.
@@ -61,6 +64,7 @@ impl GroundConfig {
             launch_on_order: false,
             muster: false,
             behaviours: Chosen::default(),
+            theatre: None,
             lease,
             authority: standard_authority(),
             kept: Kept::default(),

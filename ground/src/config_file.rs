@@ -11,11 +11,14 @@ use serde::{Deserialize, Serialize};
 use skein_bp::behaviour::{Behaviours, Settings};
 use skein_bp::configuration;
 use skein_dbp::{Authority, NodeName};
+use skein_planning::airspace::AirspaceTable;
+use skein_swarm::route::Craft;
 use skein_wire::{Fleet, standard_authority};
 use skein_zenoh::{NetworkSettings, Security};
 
 use crate::config::GroundConfig;
 use crate::console::{ConsoleSecurity, Role};
+use crate::planning::Theatre;
 
 /// Everything that the station must know, checked.
 pub struct Config {
@@ -57,6 +60,8 @@ pub struct GroundFile {
     lease_ms: u64,
     #[serde(default, skip_serializing_if = "Settings::is_empty")]
     pub behaviours: Settings,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    planning: Option<PlanningFile>,
     pub network: NetworkSettings,
     #[serde(skip_serializing)]
     authority: Option<Authority>,
@@ -167,6 +172,32 @@ fn lease_ms() -> u64 {
     1000
 }
 
+/// The `[planning]` table: what the station plans with.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlanningFile {
+    min_m: [f64; 3],
+    max_m: [f64; 3],
+    #[serde(default)]
+    craft: Craft,
+    #[serde(default)]
+    airspace: AirspaceTable,
+}
+
+impl PlanningFile {
+    fn of(theatre: &Theatre) -> Self {
+        let airspace = &theatre.airspace;
+        let (min_m, max_m) = (airspace.lower.into(), airspace.upper.into());
+        Self { min_m, max_m, craft: theatre.craft, airspace: AirspaceTable::of(airspace) }
+    }
+
+    fn check(self) -> anyhow::Result<Theatre> {
+        let airspace = self.airspace.check().context("`planning`")?;
+        let space = (self.min_m.into(), self.max_m.into());
+        Theatre::new(airspace, space, self.craft).context("`planning`")
+    }
+}
+
 impl Config {
     /// Reads and checks a configuration file for a program with these behaviours.
     pub fn read(path: &Path, known: &Behaviours) -> anyhow::Result<Self> {
@@ -198,6 +229,7 @@ impl GroundFile {
             state: state(),
             lease_ms: lease_ms(),
             behaviours: station.behaviours.settings(station.name.as_str()),
+            planning: station.theatre.as_ref().map(PlanningFile::of),
             network,
             authority: None,
         }
@@ -223,6 +255,7 @@ impl GroundFile {
             muster: self.muster,
             operators,
             behaviours: known.choose_for(&self.node, &self.behaviours)?,
+            theatre: self.planning.map(PlanningFile::check).transpose()?,
             lease: Duration::from_millis(self.lease_ms),
             authority: self.authority.unwrap_or_else(standard_authority),
             ..GroundConfig::new(fleet, node, vehicles)
@@ -266,6 +299,7 @@ mod tests {
         assert_eq!(full.station.lease, config.station.lease);
         assert_eq!(full.station.operators, config.station.operators);
         assert_eq!(full.station.authority, config.station.authority);
+        assert_eq!(full.station.theatre.unwrap().craft, Craft::default());
     }
 
     #[test]
@@ -312,6 +346,12 @@ mod tests {
             ("[console]", "[console.roles]\nanna = \"king\"", "unknown variant `king`"),
             ("[console]\n", "console = \"here\"\n", "an address such as"),
             ("[network]", "[behaviours]\nwell = {}\n[network]", "`behaviours.well`"),
+            ("[network]", "[planning]\nmin_m = [0, 0, 0]\nmax_m = [9, 9, 0]\n[network]", "are no box"),
+            (
+                "[network]",
+                "[planning]\nmin_m = [0, 0, 0]\nmax_m = [9, 9, 9]\ncraft = { climb_m_s = -1.0 }\n[network]",
+                "`climb_m_s` is -1",
+            ),
         ] {
             let text = EXAMPLE.replace(from, to);
             assert_ne!(text, EXAMPLE, "{from} is not in the example");

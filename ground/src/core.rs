@@ -3,12 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use nalgebra::Vector3;
 use skein_bp::catalogue::Whose;
 use skein_bp::{Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Board, Happened, Node, NodeConfig, NodeError, NodeName};
 use skein_wire::event::{Declared as _, Drawn, Erased, Heard, Held, Situation, What};
 use skein_wire::{
-    KeptZone, Link, MissionState, NodeLink, Readiness, Saver, State, Store, Zone, joint_roster,
+    KeptZone, Link, MissionState, NodeLink, Readiness, Route, Saver, State, Store, Zone, joint_roster,
 };
 
 use crate::bthreads::{self, GOING_LASTS, LiftZone, MissionOutcome, Watch, ZoneBlock};
@@ -18,6 +19,7 @@ use crate::giver::Giver;
 use crate::launch_offer::{Candidate, LaunchOffer, LaunchOffers};
 use crate::order::{Order, Who};
 use crate::order_log::{Answer, OrderLog, OrderRecord};
+use crate::planning::{CalledOff, FleetProblem, Flyer, Orphaned, Other, StandIns, Theatre, plan};
 use crate::refusal::Refusal;
 use crate::zone_log::{ZoneLog, ZoneRecord};
 
@@ -48,6 +50,9 @@ pub struct GroundCore {
     zone_store: Option<Saver<Vec<KeptZone>>>,
     evidence: Evidence,
     selections: Vec<Happened>,
+    theatre: Option<Theatre>,
+    stand_ins: StandIns,
+    seed: u64,
 }
 
 impl GroundCore {
@@ -91,6 +96,7 @@ impl GroundCore {
         };
         let mut core = Self {
             node: node.reading_boards(),
+            stand_ins: StandIns::new(config.name.clone()),
             name: config.name,
             planners: config.orders.iter().map(|(_, by, _)| by.clone()).collect(),
             orders: config.orders,
@@ -107,6 +113,8 @@ impl GroundCore {
             zone_store: None,
             evidence,
             selections: Vec::new(),
+            theatre: config.theatre,
+            seed: config.seed,
         };
         config.zones.into_iter().for_each(|kept| core.take_up(kept));
         core
@@ -246,13 +254,48 @@ impl GroundCore {
         self.present = present;
     }
 
+    /// The fleet as it is, to be planned for: those of `who` that fly, or wait to, and the others in their way.
+    ///
+    /// # Errors
+    /// [`Refusal`]: a vehicle is none of this station's, or it was not told what to plan with.
+    pub fn survey(&self, who: &Who, targets: Vec<Vector3<f64>>) -> Result<FleetProblem, Refusal> {
+        let theatre = self.theatre.clone().ok_or(Refusal::NoTheatre)?;
+        self.refuse_strangers(who)?;
+        let is_out = |state: &State| state.mission == MissionState::UnderWay && self.is_alive(&state.node);
+        let known = self.vehicles.iter().filter_map(|vehicle| self.roster.get(vehicle));
+        let (planned, others): (Vec<&State>, Vec<_>) =
+            known.partition(|state| who.includes(&state.node) && is_out(state));
+        let flyer = |state: &State| Flyer {
+            node: state.node.clone(),
+            position: state.position,
+            battery: state.battery,
+            stops: Vec::new(),
+        };
+        let other = |state: &State| Other {
+            node: state.node.clone(),
+            way: std::iter::once(state.position).chain(state.path.iter().copied()).collect(),
+        };
+        Ok(FleetProblem {
+            theatre,
+            flyers: planned.into_iter().map(flyer).collect(),
+            others: others.into_iter().map(other).collect(),
+            targets,
+            one_to_each: false,
+            seed: self.seed,
+        })
+    }
+
+    fn refuse_strangers(&self, who: &Who) -> Result<(), Refusal> {
+        let Who::These(named) = who else { return Ok(()) };
+        match named.iter().find(|name| !self.vehicles.contains(name)) {
+            Some(stranger) => Err(Refusal::UnknownVehicle { name: stranger.clone() }),
+            None => Ok(()),
+        }
+    }
+
     fn give(&mut self, by: &Giver, order: &Order) -> Result<u64, Refusal> {
         let (who, what) = (order.who(), order.what());
-        if let Who::These(named) = who
-            && let Some(stranger) = named.iter().find(|name| !self.vehicles.contains(name))
-        {
-            return Err(Refusal::UnknownVehicle { name: stranger.clone() });
-        }
+        self.refuse_strangers(who)?;
         let (mut concerned, mut answers) = (Vec::new(), BTreeMap::new());
         for vehicle in self.vehicles.iter().filter(|vehicle| who.includes(vehicle)) {
             match self.objection(by, what, vehicle) {
@@ -390,10 +433,65 @@ impl GroundCore {
         for overruled in self.order_log.update(now, self.node.node(), &happened, &self.holders) {
             self.node.node_mut().enqueue(overruled.at(&self.name));
         }
+        self.look_after_targets(&happened);
         self.look_at_zones(&happened);
         self.keep_holders();
         self.selections.extend(happened);
         outcome
+    }
+
+    /// Sends others to the targets of vehicles that are lost or have failed, and calls that off when they are back.
+    fn look_after_targets(&mut self, happened: &[Happened]) {
+        for happened in happened {
+            for CalledOff { vehicle, left, by } in self.stand_ins.returned(happened) {
+                let left = Route::new(left.into_iter().map(Into::into).collect());
+                if let (Ok(by), Ok(left)) = (Giver::new(&by), left) {
+                    // Whoever holds it otherwise by now keeps it from that.
+                    let _ = self.give(&by, &Order::Route(Who::only(vehicle), left));
+                }
+            }
+            if let Some(orphaned) = self.stand_ins.note(self.now, happened) {
+                self.replace(orphaned);
+            }
+        }
+        for orphaned in self.stand_ins.due(self.now) {
+            self.replace(orphaned);
+        }
+    }
+
+    /// An operator has brought it down, and with it what it was to do.
+    fn was_brought_down(&self, vehicle: &NodeName) -> bool {
+        let told = |order: &&OrderRecord| {
+            order.answers.contains_key(vehicle) && !order.order.what().is_beside_flight()
+        };
+        let newest = self.order_log.records().filter(told).last();
+        newest.is_some_and(|newest| matches!(newest.order.what(), What::Land | What::Return | What::Abort))
+    }
+
+    fn replace(&mut self, Orphaned { of, targets, by }: Orphaned) {
+        if self.was_brought_down(&of) {
+            return;
+        }
+        let able = |vehicle: &&NodeName| **vehicle != of && self.stand_ins.knows(vehicle);
+        let able: Vec<_> = self.vehicles.iter().filter(able).cloned().collect();
+        let (Ok(by), Ok(mut problem)) = (Giver::new(&by), self.survey(&Who::These(able), targets)) else {
+            return;
+        };
+        problem.one_to_each = true;
+        problem.others.retain(|other| other.node != of);
+        for flyer in &mut problem.flyers {
+            flyer.stops = self.stand_ins.ahead(&flyer.node);
+            let way = std::iter::once(flyer.position).chain(flyer.stops.iter().copied()).collect();
+            problem.others.push(Other { node: flyer.node.clone(), way });
+        }
+        let Ok(plan) = plan(&problem) else { return };
+        for journey in plan.journeys {
+            let Ok(route) = journey.sent() else { continue };
+            if self.give(&by, &Order::Route(Who::only(journey.node.clone()), route)).is_ok() {
+                let places = journey.targets.iter().map(|number| problem.targets[*number]).collect();
+                self.stand_ins.stands_in(journey.node, of.clone(), places);
+            }
+        }
     }
 
     fn note(&mut self, state: State) {

@@ -36,6 +36,7 @@ mod giver;
 mod launch_offer;
 mod order;
 mod order_log;
+pub mod planning;
 pub mod recorder;
 mod refusal;
 pub mod replay;

@@ -23,6 +23,8 @@ pub enum Refusal {
         OFFER_LASTS.as_secs()
     )]
     LaunchUnasked,
+    #[error("this station was not told what to plan with: its configuration needs the table [planning]")]
+    NoTheatre,
     #[error("nobody is on the ground with a mission before it: there is nothing to launch")]
     NobodyToLaunch,
     #[error(

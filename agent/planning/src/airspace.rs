@@ -2,8 +2,10 @@
 
 mod height_grid;
 mod keep_out;
+mod keeping_off;
 mod prism;
 mod stay_inside;
+mod table;
 
 use nalgebra::{Vector2, Vector3};
 
@@ -11,6 +13,7 @@ pub use height_grid::{HeightGrid, HeightGridError};
 pub use keep_out::{KeepOut, places_around};
 pub use prism::NoFlyPrism;
 pub use stay_inside::{Area, StayInside};
+pub use table::{AirspaceError, AirspaceTable};
 
 /// Beyond this many slopes from its peak a mountain has ended: 2 mm are left there of 400 m.
 const FOOT_SLOPES: f64 = 3.5;

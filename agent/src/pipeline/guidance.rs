@@ -138,7 +138,8 @@ impl Guidance {
     }
 
     fn has_leave(&self, now: Duration) -> bool {
-        now <= self.leave_until && !self.allowed().nowhere
+        let allowed = self.allowed();
+        now <= self.leave_until && !allowed.nowhere && allowed.speed_m_s > 0.0
     }
 
     /// Where a vehicle that moves like this would come to a stop if it were told to now, metres ENU, at its height.

@@ -435,7 +435,7 @@ mod tests {
     /// The zone that begins 2 m above the origin.
     fn zone_above() -> KeepOut {
         let zone = "[[no_fly]]\ncentre_m = [0.0, 0.0]\nradius_m = 3.0\nfloor_m = 2.0\nceiling_m = 6.0\n";
-        let table: crate::airspace_table::AirspaceTable = toml::from_str(zone).unwrap();
+        let table: skein_planning::airspace::AirspaceTable = toml::from_str(zone).unwrap();
         let airspace: Airspace = table.check().unwrap();
         KeepOut::new(airspace, 1.0, 1.0)
     }

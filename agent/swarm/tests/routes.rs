@@ -215,3 +215,41 @@ proptest! {
         prop_assert!((there.cost_m - back.cost_m).abs() < 1e-6 * there.cost_m);
     }
 }
+
+#[test]
+fn energy_and_turns_cost_what_they_weigh_and_nothing_as_published() {
+    let route = points([[0.0, 0.0, 200.0], [100.0, 0.0, 200.0], [100.0, 100.0, 240.0]]);
+    let published = RouteCost::default();
+    let assess = |cost: RouteCost| cost.assess(&route, &empty(), &Traffic::default());
+    let (time_s, share) = (5.0 + 107.703_296 / 20.0, 1.0 / 600.0);
+    let plain = assess(published);
+    assert!((plain.energy - (time_s + 40.0 / 5.0) * share).abs() < 1e-9, "{plain:?}");
+    assert!((plain.turning - 1.0).abs() < 1e-9, "a right angle seen from above");
+    let weighed = assess(RouteCost { energy_weight_m: 600.0, smoothness_weight_m: 7.0, ..published });
+    assert!((weighed.cost_m - plain.cost_m - 600.0 * plain.energy - 7.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_route_stays_inside_of_what_is_to_be_stayed_inside_of() {
+    use skein_planning::airspace::{Area, StayInside};
+    let yard = Area::round(Vector2::new(1000.0, 1000.0), 900.0);
+    let airspace = Airspace { stay_inside: vec![StayInside { any_of: vec![yard] }], ..empty() };
+    let ends = (Vector3::new(300.0, 1000.0, 100.0), Vector3::new(2000.0, 1000.0, 100.0));
+    let traffic = Traffic::default();
+    let problem = RouteProblem::new(&airspace, &traffic, RouteCost::default(), ends, 3).unwrap();
+    let out = problem.judge(&[ends.0, ends.1]);
+    assert!((out.violation_m - 100.0).abs() < 20.0, "it leaves at 1900 m: {out:?}");
+    assert!(problem.judge(&[ends.0, Vector3::new(1800.0, 1000.0, 100.0)]).is_feasible());
+}
+
+#[test]
+fn a_coarse_lattice_within_its_effort_finds_a_way_that_is_not_much_dearer_than_a_fine_one() {
+    use skein_swarm::route::{AnyAngleConfig, any_angle};
+    let (airspace, traffic) = (mountains(), Traffic::default());
+    let ends = (Vector3::new(0.0, 950.0, 120.0), Vector3::new(2000.0, 1000.0, 580.0));
+    let problem = RouteProblem::new(&airspace, &traffic, RouteCost::default(), ends, WAYPOINTS).unwrap();
+    let coarse = any_angle(&problem, &AnyAngleConfig::within(&airspace, 3000, 1000)).unwrap();
+    let fine = any_angle(&problem, &AnyAngleConfig::default()).unwrap();
+    assert!(coarse.assessment.is_feasible());
+    assert!(coarse.assessment.cost_m < 1.05 * fine.assessment.cost_m, "{coarse:?} beside {fine:?}");
+}

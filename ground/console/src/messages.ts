@@ -60,7 +60,33 @@ state: string, value: string, advice: string, };
 /**
  * A message of a browser.
  */
-export type ClientMessage = { "type": "hello", tag: string | null, name: string, } | { "type": "order" } & OrderMessage | { "type": "draw", tag: string | null, zone: ZoneTable, } | { "type": "erase", tag: string | null, name: string, } | { "type": "replay" } & ReplayMessage | { "type": "why", vehicle: string | null, } | { "type": "read_script", tag: string | null, file: string, text: string, };
+export type ClientMessage = { "type": "hello", tag: string | null, name: string, } | { "type": "order" } & OrderMessage | { "type": "draw", tag: string | null, zone: ZoneTable, } | { "type": "erase", tag: string | null, name: string, } | { "type": "replay" } & ReplayMessage | { "type": "why", vehicle: string | null, } | { "type": "read_script", tag: string | null, file: string, text: string, } | { "type": "plan", tag: string | null, to: To, targets: Array<[number, number, number]>, };
+
+/**
+ * A route's cost, and what it is made of before that is weighed.
+ */
+export type CostView = { cost_m: number, length_m: number,
+/**
+ * At cruise.
+ */
+time_s: number, height_m: number, repulsion_m: number,
+/**
+ * Share of what is in the battery.
+ */
+energy: number, turning: number, };
+
+/**
+ * Two vehicles that would come nearer to one another than a plan keeps.
+ */
+export type Encounter = { who: [string, string],
+/**
+ * After the vehicles have set out, s.
+ */
+at_s: number, distance_m: number,
+/**
+ * ENU, metres.
+ */
+place: [number, number, number], };
 
 /**
  * An event that has happened.
@@ -85,7 +111,30 @@ choice: string | null, };
 
 export type EventView = { time_s: number, home: string, seq: number, name: string, data: Record<string, unknown>, requested_by: Array<string>, blocked_by: Array<string>, };
 
+export type JourneyView = { vehicle: string,
+/**
+ * The numbers of its targets, from 1.
+ */
+targets: Array<number>,
+/**
+ * The points to send it as its route, metres ENU.
+ */
+points: Array<[number, number, number]>,
+/**
+ * The numbers, from 0, of those that it is to reach whatever comes: to be sent with them.
+ */
+stops: Array<number>, by: Method, cost: CostView, second: SecondView | null,
+/**
+ * Factor by which it flies slower than at cruise.
+ */
+slowed: number, };
+
 export type LinkView = { alive: boolean, age_ms: number | null, };
+
+/**
+ * A planner of routes. Both have the same cost.
+ */
+export type Method = "swarm" | "lattice";
 
 export type MissionView = "under_way" | "complete" | "failed";
 
@@ -96,6 +145,10 @@ export type OrderMessage = { tag?: string, what: What, to: To, point?: [number, 
  * For `route`: the points, metres ENU.
  */
 points?: Array<[number, number, number]>,
+/**
+ * The numbers, from 0, of the points that are targets, if the others are only the way there.
+ */
+stops?: Array<number>,
 /**
  * For `load`: a script with values for its parameters.
  */
@@ -152,6 +205,8 @@ blocked_by: Array<Blocker>, };
  */
 export type Role = "observer" | "safety" | "operator";
 
+export type SecondView = { by: Method, cost: CostView, points: Array<[number, number, number]>, };
+
 /**
  * A message for browsers.
  */
@@ -195,7 +250,19 @@ doubts: Array<string>, } | { "type": "you", tag: string | null, name: string | n
 /**
  * Whether a certificate says so; otherwise whoever sits there does.
  */
-certified: boolean, } | { "type": "offer", tag: string | null, token: string, what: string, lasts_s: number, vehicles: Array<CandidateView>, } | { "type": "ordered", tag: string | null, id: number, } | { "type": "mapped", tag: string | null, name: string, } | { "type": "replayed", tag: string | null, } | { "type": "script", tag: string | null, script: unknown, } | { "type": "error", tag: string | null, message: string, };
+certified: boolean, } | { "type": "offer", tag: string | null, token: string, what: string, lasts_s: number, vehicles: Array<CandidateView>, } | { "type": "ordered", tag: string | null, id: number, } | { "type": "plan", tag: string | null, journeys: Array<JourneyView>,
+/**
+ * The vehicles that no route was made for, and why.
+ */
+left_out: { [key in string]: string },
+/**
+ * When all arrive, seconds after they have set out.
+ */
+arrival_s: number, cost_m: number,
+/**
+ * Who would come too near to whom: a plan with any is not to be sent.
+ */
+encounters: Array<Encounter>, } | { "type": "mapped", tag: string | null, name: string, } | { "type": "replayed", tag: string | null, } | { "type": "script", tag: string | null, script: unknown, } | { "type": "error", tag: string | null, message: string, };
 
 /**
  * Where a vehicle is and what it does.

@@ -4,6 +4,7 @@ mod caller;
 mod certificates;
 mod explain;
 mod order;
+mod plan;
 mod recording;
 mod replay;
 mod serve;
@@ -54,6 +55,9 @@ enum Command {
     Certificates(certificates::Certificates),
     #[command(flatten)]
     Order(order::OrderCommand),
+    /// Plan for the fleet: who reaches which target by what way, so that all arrive together. Without `--send` nobody is
+    /// ordered anything.
+    Plan(plan::PlanCommand),
     /// Say where each vehicle of a station that runs is, what it does and for whom it waits.
     Status(caller::Call),
     /// Draw no-fly zones, fences, threats, limits of height and rally points for all vehicles, list and remove them.
@@ -97,6 +101,7 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
         Command::Replay { file, console } => replay::run(file, *console, cli.json),
         Command::Zone(command) => zone::run(command, cli.json),
         Command::Order(order) => order::run(order, cli.json),
+        Command::Plan(command) => plan::run(command, cli.json),
         Command::Explain { file, at, vehicle } => explain::run(file, *at, vehicle.as_deref(), cli.json),
     };
     match outcome {

@@ -118,7 +118,7 @@ pub(super) fn run(order: &OrderCommand, as_json: bool) -> anyhow::Result<ExitCod
         }
         OrderCommand::Route { route, vehicle, call } => {
             let points = route_points(route)?;
-            let vehicle = if vehicle.contains('/') { vehicle.clone() } else { format!("uav/{vehicle}") };
+            let vehicle = vehicle_name(vehicle);
             let what = What::Route.word();
             (call, json!({ "type": "order", "what": what, "to": [vehicle], "points": points.points() }))
         }
@@ -136,12 +136,21 @@ pub(super) fn run(order: &OrderCommand, as_json: bool) -> anyhow::Result<ExitCod
     let number = caller.ask(request, "ordered")?["id"].clone();
     let order = answered(&mut caller, &number)?;
     tell(&order, as_json);
-    let all = answers(&order).all(|(_, answer)| answer["state"] == "acknowledged");
-    Ok(ExitCode::from(u8::from(!all)))
+    Ok(ExitCode::from(u8::from(!all_acknowledged(&order))))
+}
+
+/// Every vehicle that an order is for has taken it in.
+pub(super) fn all_acknowledged(order: &Value) -> bool {
+    answers(order).all(|(_, answer)| answer["state"] == "acknowledged")
+}
+
+/// The name of the vehicle with this number or name.
+pub(super) fn vehicle_name(vehicle: &str) -> String {
+    if vehicle.contains('/') { vehicle.to_owned() } else { format!("uav/{vehicle}") }
 }
 
 /// The points that the argument names, or those of the file whose path it is.
-fn route_points(given: &str) -> anyhow::Result<Route> {
+pub(super) fn route_points(given: &str) -> anyhow::Result<Route> {
     let path = Path::new(given);
     if !path.is_file() {
         return points_in(given.split_whitespace()).with_context(|| {
@@ -162,7 +171,7 @@ fn for_all(what: What) -> Value {
 }
 
 /// The order of this number, once nobody's answer is open, or after a while.
-fn answered(caller: &mut Caller, number: &Value) -> anyhow::Result<Value> {
+pub(super) fn answered(caller: &mut Caller, number: &Value) -> anyhow::Result<Value> {
     let deadline = Instant::now() + ANSWERED_WITHIN;
     let mut newest = Value::Null;
     while Instant::now() < deadline {
@@ -177,7 +186,7 @@ fn answered(caller: &mut Caller, number: &Value) -> anyhow::Result<Value> {
     Ok(newest)
 }
 
-fn answers(order: &Value) -> impl Iterator<Item = (&String, &Value)> {
+pub(super) fn answers(order: &Value) -> impl Iterator<Item = (&String, &Value)> {
     order["answers"].as_object().into_iter().flatten()
 }
 

@@ -4,21 +4,26 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::extract::ws::{self, WebSocket};
+use nalgebra::Vector3;
+use skein_wire::event::What;
 use tokio::sync::{broadcast::error::RecvError, watch};
 use tokio::task::JoinSet;
 use tokio::time::timeout;
 
 use super::feed::Message;
+use super::plan_view::PlanView;
 use super::request::{self, Granted, Mailbox, OrderMessage, Request, Wanted};
 use super::session::Session;
 use super::subscription::{Pictures, Question, Reasons, Subscription, Text};
 use super::token;
 use crate::giver::Giver;
+use crate::order::Who;
+use crate::planning::plan;
 
 /// A browser that takes nothing for this long is let go.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// So many scripts of one browser are looked at at once.
+/// So many scripts and plans of one browser are looked at at once.
 const MOST_READINGS: usize = 2;
 
 /// A request, and the tag under which it is to be answered.
@@ -49,10 +54,15 @@ pub(super) async fn attend(
             message = socket.recv() => match message {
                 Some(Ok(message)) => match text(&message) {
                     Some(text) if request::takes_long(&text) => look_at(text, &mut readings, &mut socket).await,
-                    Some(text) => {
-                        let request = request::read(&text);
-                        answer(request, &mut socket, &mut session, &mut question, &subscription, mailbox).await
-                    }
+                    Some(text) => match request::read(&text) {
+                        (tag, Ok(Request::Plan(who, targets))) => {
+                            let surveyed = survey(&session, who, targets, mailbox).await;
+                            begin_plan(tag, surveyed, &mut readings, &mut socket).await
+                        }
+                        request => {
+                            answer(request, &mut socket, &mut session, &mut question, &subscription, mailbox).await
+                        }
+                    },
                     None if matches!(message, ws::Message::Close(_)) => Err(Gone),
                     None => Ok(()),
                 },
@@ -130,8 +140,44 @@ async fn look_at(text: String, readings: &mut JoinSet<Read>, socket: &mut WebSoc
         readings.spawn_blocking(move || request::read(&text));
         return Ok(());
     }
-    let message = format!("{MOST_READINGS} scripts are being looked at already; wait for an answer");
-    say(socket, &Message::Error { tag: request::tag(&text), message }).await
+    say(socket, &Message::Error { tag: request::tag(&text), message: too_many() }).await
+}
+
+fn too_many() -> String {
+    format!("{MOST_READINGS} scripts or plans are being looked at already; wait for an answer")
+}
+
+/// The fleet as the station knows it now, for whoever may send it somewhere.
+async fn survey(
+    session: &Session,
+    who: Who,
+    targets: Vec<Vector3<f64>>,
+    mailbox: &Mailbox,
+) -> Result<Granted, String> {
+    let by = session.giver(What::Route)?;
+    granted(by, Wanted::Survey(who, targets), mailbox).await
+}
+
+/// Plans on a thread that has time for it.
+async fn begin_plan(
+    tag: Option<String>,
+    surveyed: Result<Granted, String>,
+    readings: &mut JoinSet<Read>,
+    socket: &mut WebSocket,
+) -> Result<(), Gone> {
+    let message = match surveyed {
+        Ok(Granted::Surveyed(_)) if readings.len() >= MOST_READINGS => too_many(),
+        Ok(Granted::Surveyed(problem)) => {
+            readings.spawn_blocking(move || {
+                let planned = plan(&problem).map(|plan| Request::Planned(Box::new(plan)));
+                (tag, planned.map_err(|error| error.to_string()))
+            });
+            return Ok(());
+        }
+        Ok(_) => "the station has misunderstood what was asked".to_owned(),
+        Err(message) => message,
+    };
+    say(socket, &Message::Error { tag, message }).await
 }
 
 /// Does what a browser asks for.
@@ -148,6 +194,9 @@ async fn answer(
             *question = vehicle.map(|vehicle| subscription.ask_about(vehicle));
             Ok(())
         }
+        Ok(Request::Planned(plan)) => say(socket, &Message::Plan { tag, plan: PlanView::of(&plan) }).await,
+        // It was begun where it was heard.
+        Ok(Request::Plan(..)) => Ok(()),
         Ok(Request::Script(script)) => say(socket, &Message::Script { tag, script }).await,
         Ok(Request::Order(order)) => give(socket, session, tag, *order, mailbox).await,
         Ok(Request::Map(wanted)) => change_map(socket, session, tag, wanted, mailbox).await,

@@ -16,6 +16,7 @@ use skein_dbp::{Happened, NodeName, Peer};
 use skein_wire::event::{Advance, Declared as _, Homeward, What};
 use skein_wire::{Check, Form, MissionState, Scene, SenderStats, Solid, State, Zone};
 
+use super::plan_view::PlanView;
 use super::request::Granted;
 use super::session::{Role, Session};
 use super::subscription::{Broadcast, Subscription, Text};
@@ -112,6 +113,12 @@ pub(super) enum Message<'a> {
     Ordered {
         tag: Option<String>,
         id: u64,
+    },
+    /// A plan, as far as it was asked for.
+    Plan {
+        tag: Option<String>,
+        #[serde(flatten)]
+        plan: PlanView<'a>,
     },
     /// The zone of this name is drawn, or being removed.
     Mapped {
@@ -474,6 +481,8 @@ impl<'a> Message<'a> {
             Granted::Offered(offer) => Self::offer(tag, offer),
             Granted::Mapped(name) => Self::Mapped { tag, name },
             Granted::Replayed => Self::Replayed { tag },
+            // A plan is made of it before anybody is told.
+            Granted::Surveyed(_) => Self::Error { tag, message: "the plan is not made yet".to_owned() },
         }
     }
 

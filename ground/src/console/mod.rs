@@ -11,6 +11,7 @@
 mod client;
 mod feed;
 mod listener;
+mod plan_view;
 mod request;
 mod server;
 mod session;

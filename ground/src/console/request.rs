@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::Duration;
 
+use nalgebra::Vector3;
 use serde::Deserialize;
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_dbp::NodeName;
@@ -15,6 +16,7 @@ use crate::core::GroundCore;
 use crate::giver::Giver;
 use crate::launch_offer::LaunchOffer;
 use crate::order::{Destination, Order, SentScript, Who};
+use crate::planning::{FleetPlan, FleetProblem};
 use crate::refusal::Refusal;
 use crate::replay::Replay;
 
@@ -26,6 +28,8 @@ pub(super) enum Wanted {
     Offer(What, String),
     /// The launch that was offered under this token.
     Launch(String),
+    /// What is to be known to plan for these vehicles to these targets.
+    Survey(Who, Vec<Vector3<f64>>),
     /// That a zone is drawn.
     Draw(Zone),
     /// That the zone of this name is removed.
@@ -50,6 +54,7 @@ pub(super) enum Granted {
     /// The number under which it has given an order.
     Ordered(u64),
     Offered(LaunchOffer),
+    Surveyed(Box<FleetProblem>),
     /// The zone of this name is drawn, or being removed.
     Mapped(String),
     /// The recording goes on as wished.
@@ -69,6 +74,9 @@ impl Wish {
                 station.draw(&by, zone).map(|()| Granted::Mapped(name))
             }
             Wanted::Erase(name) => station.erase(&by, &name).map(|()| Granted::Mapped(name)),
+            Wanted::Survey(who, targets) => {
+                station.survey(&who, targets).map(Box::new).map(Granted::Surveyed)
+            }
             Wanted::Replay(_) => Err(Refusal::NotRecorded),
         };
         // Who asked may have closed the page.
@@ -102,6 +110,7 @@ impl std::fmt::Display for Wish {
             Wanted::Order(order) => write!(f, "{} orders {} for {}", self.by, order.what(), order.who()),
             Wanted::Offer(what, _) => write!(f, "{} asks what {what} would launch", self.by),
             Wanted::Launch(_) => write!(f, "{} confirms a launch", self.by),
+            Wanted::Survey(who, _) => write!(f, "{} asks for a plan for {who}", self.by),
             Wanted::Draw(zone) => write!(f, "{} draws the zone {}", self.by, zone.name()),
             Wanted::Erase(name) => write!(f, "{} removes the zone {name}", self.by),
             Wanted::Replay(_) => write!(f, "{} wants the recording to go on otherwise", self.by),
@@ -145,6 +154,10 @@ pub(super) enum Request {
     Why(Option<NodeName>),
     /// To be told what a script's file says: its purpose and its parameters.
     Script(Box<ScriptFile>),
+    /// To be shown how these vehicles would reach these targets together; nobody is ordered anything.
+    Plan(Who, Vec<Vector3<f64>>),
+    /// The same, made.
+    Planned(Box<FleetPlan>),
 }
 
 /// A message of a browser.
@@ -179,6 +192,13 @@ pub(super) enum Message {
         tag: Option<String>,
         file: String,
         text: String,
+    },
+    /// Asks for a plan: so that these vehicles reach these targets (ENU, metres) together. Each route of it is sent as
+    /// the order `route`.
+    Plan {
+        tag: Option<String>,
+        to: To,
+        targets: Vec<[f64; 3]>,
     },
 }
 
@@ -219,6 +239,10 @@ pub(super) struct OrderMessage {
     #[serde(default)]
     #[cfg_attr(test, ts(optional))]
     points: Option<Vec<[f64; 3]>>,
+    /// The numbers, from 0, of the points that are targets, if the others are only the way there.
+    #[serde(default)]
+    #[cfg_attr(test, ts(optional))]
+    stops: Option<Vec<usize>>,
     /// For `load`: a script with values for its parameters.
     #[serde(default)]
     #[cfg_attr(test, ts(optional, type = "{ script: unknown, with: Record<string, unknown> }"))]
@@ -236,9 +260,23 @@ pub(super) struct OrderMessage {
 #[derive(Debug, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(untagged)]
-enum To {
+pub(super) enum To {
     Word(String),
     Names(Vec<String>),
+}
+
+impl To {
+    fn who(self) -> Result<Who, String> {
+        match self {
+            Self::Word(word) if word == OrderGiven::ALL => Ok(Who::All),
+            Self::Word(word) => Err(format!("`to` is {word:?}: expected \"all\" or a list of vehicles")),
+            Self::Names(names) if names.is_empty() => Err("`to` names no vehicle".into()),
+            Self::Names(names) => {
+                let names = names.iter().map(|name| NodeName::new(name)).collect::<Result<_, _>>();
+                names.map(Who::These).map_err(|error| error.to_string())
+            }
+        }
+    }
 }
 
 /// The beginning of a message: enough to know how long it may take to read the rest.
@@ -273,6 +311,10 @@ pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
     match serde_json::from_str::<Message>(text) {
         Ok(Message::Hello { tag, name }) => (tag, Ok(Request::Hello(name))),
         Ok(Message::Order(message)) => (message.tag.clone(), Ok(Request::Order(message))),
+        Ok(Message::Plan { tag, to, targets }) => {
+            let targets = targets.into_iter().map(Vector3::from).collect();
+            (tag, to.who().map(|who| Request::Plan(who, targets)))
+        }
         Ok(Message::Draw { tag, zone }) => {
             let zone = Zone::try_from(zone).map_err(|error| format!("`zone`: {error}"));
             (tag, zone.map(|zone| Request::Map(Wanted::Draw(zone))))
@@ -314,16 +356,10 @@ impl OrderMessage {
     }
 }
 
-fn order(OrderMessage { what, to, point, points, script, name, .. }: OrderMessage) -> Result<Order, String> {
-    let who = match to {
-        To::Word(word) if word == OrderGiven::ALL => Who::All,
-        To::Word(word) => return Err(format!("`to` is {word:?}: expected \"all\" or a list of vehicles")),
-        To::Names(names) if names.is_empty() => return Err("`to` names no vehicle".into()),
-        To::Names(names) => {
-            let names = names.iter().map(|name| NodeName::new(name)).collect::<Result<_, _>>();
-            Who::These(names.map_err(|error| error.to_string())?)
-        }
-    };
+fn order(
+    OrderMessage { what, to, point, points, stops, script, name, .. }: OrderMessage,
+) -> Result<Order, String> {
+    let who = to.who()?;
     Ok(match what {
         What::Launch if who != Who::All => {
             return Err("a launch is for all: vehicles take off in turn".into());
@@ -354,7 +390,8 @@ fn order(OrderMessage { what, to, point, points, script, name, .. }: OrderMessag
                 return Err("a route is for one vehicle: name it in `to`".into());
             }
             let points = points.ok_or("`route` needs `points`: [[x, y, z], ...], metres")?;
-            Order::Route(who, Route::new(points).map_err(|error| error.to_string())?)
+            let route = Route::new(points).map_err(|error| error.to_string())?;
+            Order::Route(who, if let Some(stops) = stops { route.with_targets(&stops) } else { route })
         }
         what => Order::plain(what, who).ok_or("this order needs more than its word")?,
     })
@@ -456,6 +493,9 @@ mod tests {
             (r#"{"type":"order","what":"give","to":"all","name":"a/b"}"#, "names no person"),
             (r#"{"type":"order","what":"hold","to":"all","token":"7"}"#, "takes no `token`"),
             (r#"{"type":"hello"}"#, "`name`"),
+            (r#"{"type":"plan","to":"some","targets":[]}"#, "`to`"),
+            (r#"{"type":"plan","to":"all"}"#, "`targets`"),
+            (r#"{"type":"plan","to":"all","targets":[[1,2]]}"#, "length 3"),
             (r#"{"type":"draw","zone":{"name":"a","kind":"moat"}}"#, "unknown variant `moat`"),
             (
                 r#"{"type":"draw","zone":{"name":"a","kind":"threat","centre_m":[0,0],"radius_m":-1}}"#,

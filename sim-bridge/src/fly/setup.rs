@@ -6,7 +6,9 @@ use std::time::Duration;
 use skein_agent::{AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, Mind, Parts, PositionSource};
 use skein_bp::{Program, script::Assignment};
 use skein_dbp::{Kept, NodeName};
+use skein_ground::planning::Theatre;
 use skein_ground::{Giver, GroundConfig, Order, Who};
+use skein_swarm::route::Craft;
 use skein_wire::{Fleet, standard_authority};
 use skein_world::{SimulationConfig, VehicleSetup};
 
@@ -183,8 +185,25 @@ pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Control
         muster: scenario.musters(),
         behaviours: scenario.behaviours.clone(),
         operators: NodeName::new(SCRIPT).into_iter().collect(),
+        theatre: theatre(scenario),
         lease: lease(scenario),
         seed: scenario.seed,
         ..GroundConfig::new(fleet, GROUND.clone(), vehicles)
     }
+}
+
+/// What the station plans with: the scenario's bounds and airspace, and vehicles no better than its least able one.
+fn theatre(scenario: &Scenario) -> Option<Theatre> {
+    let envelopes: Vec<Envelope> = agent_configs(scenario).into_iter().map(|agent| agent.envelope).collect();
+    let least = |of: fn(&Envelope) -> f64| envelopes.iter().map(of).fold(f64::INFINITY, f64::min);
+    let most = |of: fn(&Envelope) -> f64| envelopes.iter().map(of).fold(0.0, f64::max);
+    let craft = Craft::of_body(
+        (least(|envelope| envelope.cruise_m_s), least(|envelope| envelope.climb_m_s)),
+        least(|envelope| envelope.endurance_s),
+        most(|envelope| envelope.separation_m),
+        most(|envelope| envelope.hull_m),
+        scenario.takeoff_height_m,
+    );
+    let bounds = scenario.scene.bounds();
+    Theatre::new(scenario.airspace.clone(), (bounds.min, bounds.max), craft).ok()
 }

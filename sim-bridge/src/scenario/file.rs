@@ -9,13 +9,11 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{
-    AirspaceTable, GlobalPlanner, LocalPlanner, Nose, Planners, PositionSource, Repellers, position_sources,
-};
+use skein_agent::{GlobalPlanner, LocalPlanner, Nose, Planners, PositionSource, Repellers, position_sources};
 use skein_bp::behaviour::{Behaviours, Settings};
 use skein_bp::configuration::{self, Malformed};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
-use skein_planning::airspace::Airspace;
+use skein_planning::airspace::{Airspace, AirspaceTable};
 use skein_wire::event::What;
 use skein_world::{
     Aabb, Drift, MarkerFloor, Obstacle, PositionErrors, Scene, Shape, VehicleModel, WindConfig,

@@ -1,10 +1,12 @@
 //! The planners of routes beside references that are near the best there is, and beside the swarms of P3.
 
 use nalgebra::{Vector2, Vector3};
-use skein_lab::experiment::swarm_planning::any_angle::{AnyAngleConfig, any_angle};
 use skein_lab::experiment::swarm_planning::baseline::Baseline;
 use skein_planning::airspace::{Airspace, Mountain, NoFlyZone, ThreatZone};
-use skein_swarm::route::{Effort, Plan, Planner, RouteCost, RouteError, RouteProblem, Traffic, plan_in_turn};
+use skein_swarm::route::{
+    AnyAngleConfig, Effort, Plan, Planner, RouteCost, RouteError, RouteProblem, Traffic, any_angle,
+    plan_in_turn,
+};
 
 const UPPER: Vector3<f64> = Vector3::new(2000.0, 2000.0, 1000.0);
 const WAYPOINTS: usize = 10;

@@ -15,6 +15,7 @@ mod lost_inside;
 mod moving;
 mod narrow_alone;
 mod no_lidar;
+mod planning;
 mod positions;
 mod preflight;
 mod routes;

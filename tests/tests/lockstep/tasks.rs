@@ -177,7 +177,7 @@ fn flown_s(poses: &[Vec<Point>], vehicle: usize, share: f64) -> f64 {
 #[test]
 fn who_is_held_on_the_way_is_waited_for_and_all_arrive_together() {
     let (lockstep, alone) = flown("valley");
-    for (vehicle, share) in [(0, 0.3), (4, 0.55), (7, 0.65)] {
+    for (vehicle, share) in [(0, 0.3), (4, 0.65), (7, 0.79), (2, 0.79)] {
         // Before it lands, which is no part of the way.
         let unheld_s = arrivals_s(&lockstep.scenario, &alone, [vehicle])[0];
         let from_s = flown_s(&alone[..(unheld_s * 10.0) as usize], vehicle, share);

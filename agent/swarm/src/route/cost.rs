@@ -19,6 +19,10 @@ pub struct Assessment {
     /// `H`, metres.
     pub height_m: f64,
     pub repulsion_m: f64,
+    /// Share of what is in the battery.
+    pub energy: f64,
+    /// `1 - cos` of the turns, summed.
+    pub turning: f64,
     /// Square of the share of the reserve that is used.
     pub reserve_used: f64,
     pub violation_m: f64,
@@ -52,6 +56,7 @@ impl RouteCost {
         for leg in route.windows(2) {
             self.add_way(&(leg[1] - leg[0]), &mut sum);
         }
+        sum.turning = route.windows(3).map(turn).sum();
         self.add_endurance(&mut sum);
         self.weigh(&mut sum);
         for leg in route.windows(2) {
@@ -82,13 +87,17 @@ impl RouteCost {
             + self.time_weight_m_s * sum.time_s
             + self.height_weight * sum.height_m
             + sum.repulsion_m
+            + self.energy_weight_m * sum.energy
+            + self.smoothness_weight_m * sum.turning
             + self.reserve_weight_m * sum.reserve_used
             + self.violation_weight * sum.violation_m;
     }
 
     fn add_way(&self, way: &Vector3<f64>, sum: &mut Assessment) {
+        let leg_s = self.leg_s(way);
         sum.length_m += way.norm();
-        sum.time_s += self.leg_s(way);
+        sum.time_s += leg_s;
+        sum.energy += self.energy(leg_s, way.z.max(0.0));
     }
 
     fn add_surroundings(
@@ -98,7 +107,7 @@ impl RouteCost {
         airspace: &Airspace,
         sum: &mut Assessment,
     ) {
-        sum.violation_m += airspace.intrusion_m(from, to);
+        sum.violation_m += airspace.intrusion_m(from, to) + airspace.outside_m(from, to, self.border_m);
         let terrain_m = airspace.terrain_bound_m(from, to);
         let high_m = self.comfortable_clearance_m.max(self.least_clearance_m) + terrain_m;
         if from.z.min(to.z) >= high_m {
@@ -141,4 +150,11 @@ impl RouteCost {
             sum.violation_m += (sum.time_s - self.endurance_s).max(0.0) * self.cruise_m_s;
         }
     }
+}
+
+/// `1 - cos` of the angle by which a way turns at the middle of three points.
+fn turn(points: &[Vector3<f64>]) -> f64 {
+    let (before, after) = (points[1] - points[0], points[2] - points[1]);
+    let lengths = (before.norm_squared() * after.norm_squared()).sqrt();
+    if lengths > 0.0 { 1.0 - before.dot(&after) / lengths } else { 0.0 }
 }

@@ -19,15 +19,21 @@
 //! # Ok::<(), skein_swarm::route::RouteError>(())
 //! ```
 
+mod any_angle;
 mod arrival;
+mod conflict;
 mod cost;
+mod craft;
 mod planner;
 mod problem;
 mod traffic;
 mod weights;
 
+pub use self::any_angle::{AnyAngleConfig, any_angle, refined};
 pub use self::arrival::{Arrival, arrival_slots, arrive_together};
+pub use self::conflict::{Conflict, Flight, conflicts};
 pub use self::cost::Assessment;
+pub use self::craft::{Craft, UnfitCraft};
 pub use self::planner::{Effort, Plan, Planner, plan_in_turn};
 pub use self::problem::{RouteError, RouteProblem};
 pub use self::traffic::{PARTS, Traffic};

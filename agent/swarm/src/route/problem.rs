@@ -87,6 +87,11 @@ impl<'a> RouteProblem<'a> {
         self.cost.assess(route, self.airspace, self.traffic)
     }
 
+    /// Its cost, metres, as far as it is needed to know whether it is below a limit.
+    pub(super) fn judge_below(&self, limit_m: f64, route: &[Vector3<f64>]) -> f64 {
+        self.cost.assess_below(limit_m, route, self.airspace, self.traffic).cost_m
+    }
+
     /// The route that a position is: start, waypoints, goal (ENU, metres).
     #[must_use]
     pub fn route(&mut self, position: &[f64]) -> &[Vector3<f64>] {

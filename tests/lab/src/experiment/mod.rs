@@ -3,6 +3,7 @@
 mod ablation;
 mod autopilots;
 mod circle;
+mod cooperative;
 mod dstar_grid;
 mod feasibility;
 mod indoor;
@@ -36,4 +37,5 @@ pub const TASKS: &[Entry] = &[
     Entry::of::<Reported<indoor::Indoor>>(),
     Entry::of::<Reported<lsc::Lsc>>(),
     Entry::of::<Reported<swarm_planning::SwarmPlanning>>(),
+    Entry::of::<Reported<cooperative::Cooperative>>(),
 ];

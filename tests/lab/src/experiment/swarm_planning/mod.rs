@@ -7,18 +7,18 @@
 //! cost, `Ns T = 30 x 50`. What P3 leaves open was chosen on seeds 1 to 150; the runs have the seeds from
 //! [`FIRST_SEED`] on.
 
-pub mod any_angle;
 pub mod baseline;
-mod scene;
+pub mod scene;
 
 use anyhow::Context as _;
 use clap::Args;
 use serde_json::{Value, json};
 use skein_planning::airspace::Airspace;
 use skein_swarm::particle_swarm::{Objective as _, Swarm};
-use skein_swarm::route::{Effort, Plan, Planner, RouteCost, RouteProblem, arrive_together, plan_in_turn};
+use skein_swarm::route::{
+    AnyAngleConfig, Effort, Plan, Planner, RouteCost, RouteProblem, any_angle, arrive_together, plan_in_turn,
+};
 
-use self::any_angle::{AnyAngleConfig, any_angle};
 use self::baseline::Baseline;
 use crate::cpu_time;
 use crate::figure::{Figure, Line, Style};

@@ -8,7 +8,7 @@ use skein_swarm::assignment::assign;
 use skein_swarm::route::arrival_slots;
 
 /// The targets, metres.
-const TARGETS: [[f64; 3]; 10] = [
+pub const TARGETS: [[f64; 3]; 10] = [
     [2000.0, 200.0, 300.0],
     [2000.0, 400.0, 600.0],
     [2000.0, 500.0, 500.0],
@@ -30,7 +30,7 @@ const SLOPE_M: f64 = 200.0;
 /// Chosen: height at which vehicles set out, and how much higher some do, metres.
 const START_M: (f64, f64) = (100.0, 40.0);
 /// Chosen: how far apart vehicles arrive at one target, metres.
-const SPACING_M: f64 = 60.0;
+pub const SPACING_M: f64 = 60.0;
 
 /// P3's airspace, 2000 x 2000 x 1000 m.
 pub fn airspace() -> Airspace {
@@ -52,15 +52,7 @@ pub fn airspace() -> Airspace {
 /// Start and goal of each vehicle. They set out along the western edge, each from a place of its own that is drawn
 /// from the seed, and arrive at slots around the targets, so assigned that the straight ways are shortest together.
 pub fn ends(airspace: &Airspace, vehicles: usize, seed: u64) -> Option<Vec<(Vector3<f64>, Vector3<f64>)>> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let lane_m = (airspace.upper.y - airspace.lower.y) / vehicles as f64;
-    let starts: Vec<_> = (0..vehicles)
-        .map(|k| {
-            let (aside, higher): (f64, f64) = (rng.random(), rng.random());
-            let y = airspace.lower.y + (k as f64 + 0.25 + 0.5 * aside) * lane_m;
-            Vector3::new(airspace.lower.x, y, START_M.0 + higher * START_M.1)
-        })
-        .collect();
+    let starts = starts(airspace, vehicles, seed);
 
     let at_each = vehicles.div_ceil(TARGETS.len());
     let slots: Vec<_> = TARGETS
@@ -75,4 +67,16 @@ pub fn ends(airspace: &Airspace, vehicles: usize, seed: u64) -> Option<Vec<(Vect
         starts.iter().map(|start| slots.iter().map(|slot| (slot - start).norm()).collect()).collect();
     let taken = assign(&distances)?;
     Some(starts.into_iter().zip(taken).map(|(start, slot)| (start, slots[slot])).collect())
+}
+
+/// Where vehicles set out: along the western edge, each at a place of its own that is drawn from the seed.
+pub fn starts(airspace: &Airspace, vehicles: usize, seed: u64) -> Vec<Vector3<f64>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let lane_m = (airspace.upper.y - airspace.lower.y) / vehicles as f64;
+    let start = |k: usize| {
+        let (aside, higher): (f64, f64) = (rng.random(), rng.random());
+        let y = airspace.lower.y + (k as f64 + 0.25 + 0.5 * aside) * lane_m;
+        Vector3::new(airspace.lower.x, y, START_M.0 + higher * START_M.1)
+    };
+    (0..vehicles).map(start).collect()
 }

@@ -1,12 +1,14 @@
-//! Routes by A* on a lattice, pulled taut and refined: slow, and near the best there is.
+//! Routes by A* on a lattice, pulled taut and refined: on a fine lattice slow, and near the best there is.
 
 use nalgebra::Vector3;
 
+use super::planner::Plan;
+use super::problem::RouteProblem;
+use super::weights::RouteCost;
 use skein_planning::airspace::Airspace;
 use skein_planning::global::{Effort, Search};
 use skein_planning::grid::{Lattice, MOVES, moved};
 use skein_planning::map::VoxelIndex;
-use skein_swarm::route::{Plan, RouteCost, RouteProblem};
 
 /// The parameters of [`any_angle`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,11 +19,24 @@ pub struct AnyAngleConfig {
     pub longest_leg_m: f64,
     /// The refinement ends with steps of this length, metres.
     pub finest_m: f64,
+    /// The refinement ends when it has looked at so many routes.
+    pub evaluations: usize,
+}
+
+impl AnyAngleConfig {
+    /// Of this effort in an airspace of any size: so many points of the lattice, so many routes looked at.
+    pub fn within(airspace: &Airspace, points: usize, evaluations: usize) -> Self {
+        let extent = (airspace.upper - airspace.lower).map(|edge| edge.max(f64::MIN_POSITIVE));
+        let pitch_m = (extent.product() / points.max(1) as f64).cbrt();
+        // A flat box has few layers: its pitch is what cuts its base into so many squares.
+        let pitch_m = pitch_m.max((extent.x * extent.y / points.max(1) as f64).sqrt());
+        AnyAngleConfig { pitch_m, longest_leg_m: 1.5 * pitch_m, finest_m: pitch_m / 100.0, evaluations }
+    }
 }
 
 impl Default for AnyAngleConfig {
     fn default() -> Self {
-        AnyAngleConfig { pitch_m: 50.0, longest_leg_m: 150.0, finest_m: 0.5 }
+        AnyAngleConfig { pitch_m: 50.0, longest_leg_m: 150.0, finest_m: 0.5, evaluations: usize::MAX }
     }
 }
 
@@ -39,8 +54,14 @@ impl Default for AnyAngleConfig {
 pub fn any_angle(problem: &RouteProblem<'_>, config: &AnyAngleConfig) -> Option<Plan> {
     let lattice = LegLattice::new(problem, config.pitch_m);
     let taut = lattice.pull_taut(&lattice.search()?);
-    let route = refine(subdivide(&taut, config.longest_leg_m), problem, config);
-    Some(Plan { assessment: problem.judge(&route), route, convergence_m: vec![] })
+    Some(refined(&subdivide(&taut, config.longest_leg_m), problem, config))
+}
+
+/// A route of any number of points, refined as [`any_angle`] does.
+#[must_use]
+pub fn refined(route: &[Vector3<f64>], problem: &RouteProblem<'_>, config: &AnyAngleConfig) -> Plan {
+    let route = refine(route.to_vec(), problem, config);
+    Plan { assessment: problem.judge(&route), route, convergence_m: vec![] }
 }
 
 /// Points of the airspace at equal distances, with the legs between neighbours that violate nothing.
@@ -167,13 +188,18 @@ fn refine(
 ) -> Vec<Vector3<f64>> {
     let mut best_m = problem.judge(&route).cost_m;
     let mut step_m = config.pitch_m;
-    while step_m >= config.finest_m {
+    let mut left = config.evaluations;
+    while step_m >= config.finest_m && left > 0 {
         let before_m = best_m;
         for reach in [8, 4, 2, 1] {
             for middle in 1..route.len().saturating_sub(1) {
+                if left == 0 {
+                    return route;
+                }
                 for direction in DIRECTIONS {
+                    left = left.saturating_sub(1);
                     let moved = bulge(&route, middle, reach, &(direction * step_m), problem.airspace());
-                    let moved_m = problem.judge(&moved).cost_m;
+                    let moved_m = problem.judge_below(best_m, &moved);
                     if moved_m < best_m {
                         (best_m, route) = (moved_m, moved);
                     }

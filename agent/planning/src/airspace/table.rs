@@ -2,9 +2,8 @@
 
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
-use skein_planning::airspace::{
-    Airspace, Area, HeightGrid, Mountain, NoFlyPrism, NoFlyZone, StayInside, ThreatZone,
-};
+
+use super::{Airspace, Area, HeightGrid, Mountain, NoFlyPrism, NoFlyZone, StayInside, ThreatZone};
 
 /// Terrain, threats and no-fly zones; metres east, north and up of the world's origin.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -137,7 +136,7 @@ impl AirspaceTable {
         }
         if let Some(TerrainTable { corner_m, spacing_m, heights_m }) = &self.terrain {
             let grid = HeightGrid::new((*corner_m).into(), *spacing_m, heights_m);
-            let wrong = |error: skein_planning::airspace::HeightGridError| AirspaceError {
+            let wrong = |error: super::HeightGridError| AirspaceError {
                 field: "terrain".to_owned(),
                 problem: error.to_string(),
             };
