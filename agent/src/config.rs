@@ -159,12 +159,61 @@ pub struct Planners {
 pub const DEFAULT_SIGMA_LIMIT_M: f64 = 2.0;
 
 /// What tells where the vehicle is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PositionSource {
-    /// The autopilot's own estimate.
+    /// The autopilot's own estimate, by satellites.
     #[default]
     Autopilot,
+    /// Markers that a camera sees.
+    Markers,
+    /// Scans that are matched to one another.
+    Lidar,
+}
+
+impl PositionSource {
+    pub const ALL: [Self; 3] = [Self::Autopilot, Self::Markers, Self::Lidar];
+
+    /// Its name in files and events.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Autopilot => "autopilot",
+            Self::Markers => "markers",
+            Self::Lidar => "lidar",
+        }
+    }
+
+    /// The source of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|source| source.name() == name)
+    }
+}
+
+/// One source, or several: the first is preferred.
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected \"autopilot\", \"markers\", \"lidar\", or a list of them, the preferred one first"
+)]
+enum OneOrMore {
+    One(PositionSource),
+    More(Vec<PositionSource>),
+}
+
+/// The sources of a vehicle's position, as a file states them.
+pub fn position_sources<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<PositionSource>, D::Error> {
+    let sources = match OneOrMore::deserialize(deserializer)? {
+        OneOrMore::One(source) => vec![source],
+        OneOrMore::More(sources) => sources,
+    };
+    let is_twice =
+        |(index, source): (usize, &PositionSource)| sources.iter().take(index).any(|it| it == source);
+    if sources.is_empty() || sources.iter().enumerate().any(is_twice) {
+        return Err(serde::de::Error::custom("expected at least one source of position, and none twice"));
+    }
+    Ok(sources)
 }
 
 /// The configuration of one vehicle's agent.
@@ -198,13 +247,15 @@ pub struct AgentConfig {
     pub takeoff_height_m: f64,
     /// Height in the world at which this vehicle returns, m; different for every vehicle.
     pub return_altitude_m: f64,
-    /// What tells where it is.
-    pub position: PositionSource,
+    /// What tells where it is, the preferred one first: never empty.
+    pub position: Vec<PositionSource>,
     /// A position of a greater standard deviation is none to fly by, m.
     pub sigma_limit_m: f64,
     /// Whether the vehicle has a lidar: without scans younger than 200 ms it then stands still.
     pub lidar: bool,
     pub fence: Fence,
+    /// The time since 1970 at this agent's time zero, by its computer's clock: zones that are drawn may have hours.
+    pub epoch: Duration,
     /// Terrain, threats and no-fly zones that are known; its box counts for nothing, the fence does.
     pub airspace: Airspace,
     pub envelope: Envelope,
@@ -217,6 +268,8 @@ pub struct AgentConfig {
     pub behaviours: Chosen,
     /// Lease of the bids this node sends.
     pub lease: Duration,
+    /// The distance within which vehicles are sure to hear one another, m; everywhere where there is none.
+    pub radio_range_m: Option<f64>,
     /// The rights of other nodes to request and block events here.
     pub authority: Authority,
     /// The promises of a former life of this node; see [`AgentCore::durable`](crate::AgentCore::durable).

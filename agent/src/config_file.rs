@@ -18,7 +18,9 @@ use skein_zenoh::NetworkSettings;
 use crate::airspace_table::AirspaceTable;
 use crate::autopilot_link::Address;
 use crate::bthreads::LinkLossPolicy;
-use crate::config::{AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, Planners, PositionSource};
+use crate::config::{
+    AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, Planners, PositionSource, position_sources,
+};
 use crate::errand::Errand;
 use crate::field;
 
@@ -34,10 +36,12 @@ pub struct AgentFile {
     state: PathBuf,
     #[serde(default = "lease_ms", skip_serializing, deserialize_with = "field::lease_ms")]
     lease_ms: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "field::optional_positive")]
+    radio_range_m: Option<f64>,
     #[serde(default)]
     pub seed: u64,
-    #[serde(default)]
-    position: PositionSource,
+    #[serde(default = "position", deserialize_with = "position_sources")]
+    position: Vec<PositionSource>,
     #[serde(default = "sigma_limit_m", deserialize_with = "field::positive")]
     sigma_limit_m: f64,
     pub autopilot: Autopilot,
@@ -127,6 +131,10 @@ fn state() -> PathBuf {
     "state".into()
 }
 
+fn position() -> Vec<PositionSource> {
+    vec![PositionSource::default()]
+}
+
 fn sigma_limit_m() -> f64 {
     DEFAULT_SIGMA_LIMIT_M
 }
@@ -203,9 +211,10 @@ impl AgentFile {
             roster: agent.roster.clone(),
             state: state(),
             lease_ms: lease_ms(),
+            radio_range_m: agent.radio_range_m,
             // TOML has no greater number.
             seed: agent.seed.min(i64::MAX.unsigned_abs()),
-            position: agent.position,
+            position: agent.position.clone(),
             sigma_limit_m: agent.sigma_limit_m,
             autopilot: Autopilot {
                 link,
@@ -276,12 +285,14 @@ impl AgentFile {
             sigma_limit_m: self.sigma_limit_m,
             lidar: lidar.is_some(),
             fence: self.fence,
+            epoch: Duration::ZERO,
             airspace,
             envelope: self.envelope,
             planners: self.planners,
             link_loss: self.mission.without_ground,
             scripts: self.script.iter().map(|script| script.read(folder)).collect::<anyhow::Result<_>>()?,
             lease: Duration::from_secs_f64(self.lease_ms / 1000.0),
+            radio_range_m: self.radio_range_m,
             authority: self.authority.unwrap_or_else(standard_authority),
             kept: Kept::default(),
             seed: self.seed,

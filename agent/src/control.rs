@@ -9,8 +9,9 @@ use skein_bp::Bound;
 use skein_dbp::NodeName;
 use skein_mav::{Companion, CompanionConfig, Landed, MavEvent, SetPoint, Station, Telemetry, Text, axes};
 use skein_planning::map::MapError;
+use skein_positioning::PoseFix;
 use skein_wire::event::Right;
-use skein_wire::{Limits, Readiness, Scan, State};
+use skein_wire::{Limits, Readiness, Scan, State, Zone};
 
 use crate::{
     apart::decisions::{Decisions, Standing, is_too_late},
@@ -19,6 +20,7 @@ use crate::{
     energy::{Energy, known_charge},
     flight::{Flight, FlightPhase},
     instruction::{Instruction, Waypoint},
+    living_airspace::LivingAirspace,
     neighbours::{Neighbour, Neighbours},
     pipeline::{
         allowed::Allowed,
@@ -27,12 +29,12 @@ use crate::{
         heading::Heading,
         headroom::{Headroom, Look},
         layers::Layers,
-        perception::{Other, Perception, Pose},
+        perception::{Other, Perception, Pose, ZONE_MARGIN_M},
         set_point::{FRESH_FOR, KeepAlive, keep_alive, oldest_age},
         surroundings::Surroundings,
         touchdown::Descent,
     },
-    positioning::{Estimate, Motion, Positioning, excess_m},
+    positioning::{Estimate, Motion, Positioning, Sensed, excess_m},
     preflight::{Failsafes, HandlingParameters, Others, Preflight, Situation, degrees},
     rank::goes_before,
     refuge::Refuge,
@@ -84,6 +86,9 @@ pub struct Control {
     /// Why the estimate is none to fly by, if so.
     doubt: Option<String>,
     perception: Perception,
+    living: LivingAirspace,
+    /// The limits that its b-threads state.
+    stated: Limits,
     neighbours: Neighbours,
     watches: Watches,
     refuge: Refuge,
@@ -113,6 +118,7 @@ impl Control {
                 system_id: config.system_id,
                 component_id: 191,
                 datum: config.datum,
+                wants_measured: positioning.wants_measured(),
             }),
             station: Station::of(config.system_id),
             texts: Vec::new(),
@@ -128,7 +134,10 @@ impl Control {
             estimate: Estimate::default(),
             doubt: None,
             perception: Perception::of_mission(&config)?,
-            neighbours: Neighbours::new(name.clone(), config.incarnation, config.roster.len()),
+            living: LivingAirspace::new(&config),
+            stated: Limits::default(),
+            neighbours: Neighbours::new(name.clone(), config.incarnation, config.roster.len())
+                .within_radio_range(config.radio_range_m),
             watches: Watches::default(),
             refuge: Refuge::new([config.home[0], config.home[1], config.return_altitude_m], &config.rally),
             energy: Energy::new(config.clone()),
@@ -155,8 +164,16 @@ impl Control {
         self.locate(now);
     }
 
+    /// Takes in a pose by markers.
+    pub fn see_markers(&mut self, now: Duration, fix: &PoseFix) {
+        self.positioning.sense(now, &Sensed::Markers(*fix));
+    }
+
     /// Takes in the newest estimate; what was placed by those before is shifted with it.
     fn locate(&mut self, now: Duration) {
+        for reading in self.companion.take_measured() {
+            self.positioning.sense(now, &Sensed::Instrument(reading));
+        }
         let before = self.estimate.frame;
         self.estimate = self.positioning.estimate(now, self.companion.telemetry());
         let shift = self.estimate.frame - before;
@@ -193,6 +210,7 @@ impl Control {
         if now.saturating_sub(scan.stamp) > FRESH_FOR {
             return;
         }
+        self.positioning.scan(scan);
         let [up_m, down_m] = [scan.up_m, scan.down_m].map(|range| range.map(f64::from));
         self.look = Some(Look { stamp: scan.stamp, up_m, down_m });
         let Some((position, attitude)) = self.estimate.pose_at(scan.stamp) else { return };
@@ -217,6 +235,7 @@ impl Control {
 
     /// Takes in what other vehicles say of themselves.
     pub fn hear(&mut self, now: Duration, states: Vec<State>) {
+        self.neighbours.listen_at(self.motion().map(|motion| motion.position));
         for state in states {
             self.neighbours.hear(now, state);
         }
@@ -245,12 +264,53 @@ impl Control {
     pub fn observe(&mut self, now: Duration) -> Vec<Report> {
         self.companion.tick(now);
         self.locate(now);
-        let mut reports = Vec::new();
+        self.look_at_airspace(now);
+        if let Some(external) = self.positioning.external(now) {
+            self.companion.external(now, &external);
+        }
+        let mut reports: Vec<_> =
+            self.positioning.take_news().into_iter().map(Report::PositionSource).collect();
         self.follow_autopilot(now, &mut reports);
         self.watch(now, &mut reports);
         reports.extend(self.heed_silence(now));
-        reports.extend(self.guidance.go_on_planning(self.perception.map_mut()));
+        let planned = self.guidance.go_on_planning(self.perception.map_mut());
+        reports.extend(planned.map(|report| self.with_zone(report)));
         reports
+    }
+
+    /// Has regard for these zones from now on, and for no others that are drawn.
+    pub fn draw(&mut self, now: Duration, zones: Vec<Zone>) {
+        self.living.draw(zones);
+        self.look_at_airspace(now);
+    }
+
+    fn look_at_airspace(&mut self, now: Duration) {
+        let position = self.motion().map(|motion| motion.position);
+        if !self.living.look(now, position.as_ref()) {
+            return;
+        }
+        self.perception.close(self.living.closed().clone());
+        self.guidance.steering.look_for_a_place();
+        self.perception.reach(self.living.rally().map(|[.., z]| z));
+        self.refuge.set_rally(self.config.rally.iter().copied().chain(self.living.rally()));
+        self.keep_to_limits();
+    }
+
+    fn keep_to_limits(&mut self) {
+        let limits = self.living.limits(&self.stated);
+        let ([.., low_m], [.., high_m]) = limits.region();
+        self.perception.reach([low_m, high_m]);
+        self.guidance.limit(Allowed::from(&limits));
+    }
+
+    /// Where there is no path, the zone that is in the way.
+    fn with_zone(&self, report: Report) -> Report {
+        let Report::Unplannable { leg, why, .. } = report else { return report };
+        let ends = self.motion().zip(self.guidance.course.waypoint);
+        let zone = ends.and_then(|(motion, waypoint)| {
+            self.living.in_the_way(&motion.position, &waypoint.target, ZONE_MARGIN_M)
+        });
+        Report::Unplannable { leg, why, zone: zone.map(str::to_owned) }
     }
 
     fn follow_autopilot(&mut self, now: Duration, reports: &mut Vec<Report>) {
@@ -282,7 +342,7 @@ impl Control {
     fn watch(&mut self, now: Duration, reports: &mut Vec<Report>) {
         let charge = known_charge(now, self.companion.telemetry().battery);
         self.watch_energy(now, charge, reports);
-        let AgentConfig { fence, airspace, .. } = &*self.config;
+        let fence = &self.config.fence;
         let (telemetry, estimate) = (self.companion.telemetry(), self.estimate);
         let around = self.neighbours.around();
         reports.extend(self.preflight.update(&Situation {
@@ -309,7 +369,8 @@ impl Control {
             let position = motion.value.position;
             let sigma_m = motion.value.position_sigma_m();
             reports.extend(self.watches.doubt(self.doubt.as_deref(), sigma_m));
-            reports.extend(self.watches.fence(&motion.value, fence, &airspace.stay_inside));
+            reports.extend(self.watches.fence(&motion.value, fence, &self.living.closed().stay_inside));
+            reports.extend(self.living.watch(&position));
             reports.extend(self.watches.separation(position, around));
             reports.extend(self.refuge.look(&self.name, &position, around, self.guidance.goes_home()));
         } else {
@@ -401,9 +462,8 @@ impl Control {
 
     /// Keeps to these limits from now on.
     pub fn limit(&mut self, limits: &Limits) {
-        let ([.., low_m], [.., high_m]) = limits.region();
-        self.perception.reach([low_m, high_m]);
-        self.guidance.limit(Allowed::from(limits));
+        self.stated = limits.clone();
+        self.keep_to_limits();
     }
 
     /// The mission has decided at this time, even if it was that nothing is to be done.
@@ -455,7 +515,8 @@ impl Control {
             Instruction::GoTo(waypoint) => self.guidance.head_for(waypoint),
             Instruction::Plan { is_stuck } => {
                 let (motion, map) = (self.motion()?, self.perception.map_mut());
-                return self.guidance.plan(is_stuck, &motion, map, self.neighbours.around());
+                let report = self.guidance.plan(is_stuck, &motion, map, self.neighbours.around());
+                return report.map(|report| self.with_zone(report));
             }
             Instruction::GrantLeave => self.guidance.grant_leave(at),
             Instruction::MakeWay => {
@@ -465,6 +526,7 @@ impl Control {
             Instruction::Land => self.settle(now),
             Instruction::EndFlight => self.guidance.forget(),
             Instruction::Hold => self.guidance.hold(),
+            Instruction::FlyBy(source) => self.positioning.fly_by(source),
             Instruction::TakeOff | Instruction::TakeBack | Instruction::Resume => {}
         }
         None
@@ -630,6 +692,12 @@ impl Control {
     #[must_use]
     pub fn guidance(&self) -> &Guidance {
         &self.guidance
+    }
+
+    /// The vehicle's state by its own belief.
+    #[must_use]
+    pub fn estimate(&self) -> &Estimate {
+        &self.estimate
     }
 
     /// Standard deviation of the position, m; 0 while there is none.

@@ -10,6 +10,7 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_dbp::{Happened, NodeName};
 use skein_mav::{SetPoint, Text};
+use skein_positioning::PoseFix;
 use skein_wire::event::What;
 use skein_wire::{KeptScript, Link, NodeLink, Scan, Store, VehicleLink};
 
@@ -20,7 +21,7 @@ use crate::{
     control::{Control, SetPointRecord},
     mission::{Mission, Outcome},
     parts::Parts,
-    positioning::Motion,
+    positioning::{Estimate, Motion},
     scripts::RunningScript,
 };
 
@@ -145,6 +146,17 @@ impl AgentCore {
         self.side.control.sense(now, scan);
     }
 
+    /// The vehicle's state by its own belief.
+    #[must_use]
+    pub fn estimate(&self) -> &Estimate {
+        self.side.control.estimate()
+    }
+
+    /// Takes in a pose by markers.
+    pub fn see_markers(&mut self, now: Duration, fix: &PoseFix) {
+        self.side.control.see_markers(now, fix);
+    }
+
     /// One tick, every 20 ms: hears, decides, and answers with a set-point.
     pub fn tick(&mut self, now: Duration, link: &mut dyn Link) {
         if let Some(report) = self.side.note_pause(now) {
@@ -228,6 +240,9 @@ impl AgentCore {
         control.note_decision(now);
         if let Some(limits) = self.mission.changed_limits() {
             control.limit(limits);
+        }
+        if let Some(zones) = self.mission.changed_zones() {
+            control.draw(now, zones);
         }
     }
 

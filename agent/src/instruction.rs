@@ -3,11 +3,12 @@
 use nalgebra::Vector3;
 use skein_bp::Event;
 use skein_wire::event::{
-    Advance, Declared as _, Goto, HandBack, Hold, Homeward, Land, Landed, MakeWay, OrderTaken, Plan,
+    Advance, Declared as _, FlyBy, Goto, HandBack, Hold, Homeward, Land, Landed, MakeWay, OrderTaken, Plan,
     PlanReason, Takeoff,
 };
 
 use crate::bthreads::HOME_LEG;
+use crate::config::PositionSource;
 use crate::me::Me;
 
 /// Something to be done on the vehicle.
@@ -31,6 +32,8 @@ pub enum Instruction {
     GrantLeave,
     /// Use it to make way for who was said to need it.
     MakeWay,
+    /// Fly by this source of position, or by none but inertia and flow.
+    FlyBy(Option<PositionSource>),
     /// The flight is over.
     EndFlight,
 }
@@ -60,6 +63,7 @@ impl Instruction {
             Plan::NAME => Self::Plan { is_stuck: Plan::read(event)?.why == PlanReason::Stuck },
             Advance::NAME | Homeward::NAME => Self::GrantLeave,
             MakeWay::NAME => Self::MakeWay,
+            FlyBy::NAME => Self::FlyBy(PositionSource::named(&FlyBy::read(event)?.source)),
             Landed::NAME => Self::EndFlight,
             _ => return None,
         })

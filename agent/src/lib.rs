@@ -19,11 +19,13 @@ mod config;
 pub mod config_file;
 mod control;
 mod core;
+mod drawn;
 mod energy;
 mod errand;
 pub mod field;
 mod flight;
 mod instruction;
+mod living_airspace;
 mod me;
 mod mind;
 mod mission;
@@ -50,7 +52,7 @@ pub use self::{
     airspace_table::{AirspaceError, AirspaceTable},
     config::{
         AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, GlobalPlanner, LocalPlanner, Nose, Planners,
-        PositionSource, Repellers,
+        PositionSource, Repellers, position_sources,
     },
     control::SetPointRecord,
     core::{AgentCore, Status},

@@ -11,10 +11,12 @@ use skein_bp::{Event, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
 use skein_wire::event::{
     self, Advance, Arrived, Complete, Declared as _, Declined, Enter, Failed, Goto, Hold, Land, Load,
-    OrderTaken, PlaceFree, PlaceTaken, Rerouted, Return, Right, ScriptNews, Takeoff, Text, Unload, What,
+    OrderTaken, PlaceFree, PlaceTaken, Planned, Rerouted, Return, Right, ScriptNews, Takeoff, Text, Unload,
+    Unplannable, What,
 };
 use skein_wire::{
-    Fleet, KeptScript, Limits, Link, MissionState, NodeLink, Readiness, Route, State, Store, joint_roster,
+    Fleet, KeptScript, Limits, Link, MissionState, NodeLink, Readiness, Route, State, Store, Zone,
+    joint_roster,
 };
 
 use crate::{
@@ -22,6 +24,7 @@ use crate::{
     apart::Words,
     arrival, bthreads,
     config::AgentConfig,
+    drawn::DrawnZones,
     instruction::{Instruction, Waypoint},
     me::Me,
     mind::Mind,
@@ -39,6 +42,9 @@ const STATES_TRIED: usize = 500;
 
 /// What a task is told with while another vehicle has the place where it ends, and who that is.
 const BESIDE: &str = ", waiting beside it: ";
+
+/// What a task is told with while a zone keeps the vehicle from it.
+const WAITS_FOR: &str = ", waiting for the zone ";
 
 /// Why a script is not taken in that nobody sends.
 const UNNAMED: &str = "the request names nobody: set `by` to the name of the person or program that makes it";
@@ -74,6 +80,9 @@ pub struct Mission {
     outcome: Option<Outcome>,
     selections: Vec<Happened>,
     limits: Limits,
+    drawn: DrawnZones,
+    /// Whether control has yet to be told of other zones.
+    draws: bool,
     /// The revision of the program that these are of.
     limits_of: Option<u64>,
     fault: Option<String>,
@@ -160,6 +169,8 @@ impl Mission {
             outcome: None,
             selections: Vec::new(),
             limits: Limits::default(),
+            drawn: DrawnZones::default(),
+            draws: false,
             limits_of: None,
             fault: None,
             trials: VecDeque::new(),
@@ -237,6 +248,7 @@ impl Mission {
             },
             right: self.right(),
             scripts: self.scripts.running().map(|(name, _)| name.to_owned()).collect(),
+            zones: self.drawn.zones().map(|zone| zone.name().to_owned()).collect(),
         }
     }
 
@@ -290,12 +302,30 @@ impl Mission {
     /// The limits on the vehicle's motion that its b-threads state now, if they may have changed since the
     /// last call.
     pub fn changed_limits(&mut self) -> Option<&Limits> {
+        self.read_zones();
         let program = self.node.node().program();
         if self.limits_of.replace(program.revision()) == Some(program.revision()) {
             return None;
         }
         self.limits = Limits::of(self.me.name(), program.stated());
+        if let Some(why) = self.drawn.unreadable() {
+            self.limits.note_unreadable(why);
+        }
         Some(&self.limits)
+    }
+
+    fn read_zones(&mut self) {
+        let Some(news) = self.drawn.read(self.node.node()) else { return };
+        (self.draws, self.limits_of) = (true, None);
+        for told in news {
+            self.node.node_mut().enqueue(self.me.event(told));
+        }
+    }
+
+    /// The zones that others have drawn for this vehicle, if they are others than at the last call; to be asked after
+    /// [`changed_limits`](Self::changed_limits).
+    pub fn changed_zones(&mut self) -> Option<Vec<Zone>> {
+        std::mem::take(&mut self.draws).then(|| self.drawn.zones().cloned().collect())
     }
 
     /// Tells once when the disk does not take `what` must be kept, and once when it does again.
@@ -370,7 +400,8 @@ impl Mission {
         }
         let way = order.way.as_deref().ok_or("the order names no points")?;
         let route = way.parse::<Route>().map_err(|error| error.to_string())?;
-        match reroute::objection(&route, &self.config, &self.ends) {
+        let drawn: Vec<_> = self.drawn.zones().cloned().collect();
+        match reroute::objection(&route, &self.config, &drawn, &self.ends) {
             Some(why) => Err(why),
             None => Ok(route),
         }
@@ -402,6 +433,18 @@ impl Mission {
             Some(PlaceTaken::NAME) => {
                 PlaceTaken::read(event).map_or_else(String::new, |taken| self.beside(&taken))
             }
+            Some(Unplannable::NAME) => match self.me.read::<Unplannable>(event) {
+                Some(Unplannable { leg: 0.., zone: Some(zone), .. }) => {
+                    let before =
+                        self.task.split_once(WAITS_FOR).map_or(self.task.as_str(), |(before, _)| before);
+                    format!("{before}{WAITS_FOR}`{zone}`, which is in the way")
+                }
+                _ => return,
+            },
+            Some(Planned::NAME) => match self.task.split_once(WAITS_FOR) {
+                Some((before, _)) => before.to_owned(),
+                None => return,
+            },
             Some(PlaceFree::NAME) => match self.task.split_once(BESIDE) {
                 Some((before, _)) => before.to_owned(),
                 None => return,

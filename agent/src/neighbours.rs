@@ -34,6 +34,8 @@ const CLIMB_S: f64 = 4.0;
 const MOST_UNSEEN_S: f64 = 4.0;
 /// After so long a silence, s, its failsafe has landed it, or its mission is over.
 const SURELY_DOWN_S: f64 = 45.0;
+/// Who falls silent farther away than this share of a short radio's range has flown out of it.
+const EDGE_OF_RANGE: f64 = 0.75;
 
 /// The last state heard of each other vehicle.
 #[derive(Debug)]
@@ -43,6 +45,10 @@ pub struct Neighbours {
     last: BTreeMap<NodeName, Heard>,
     /// So many are remembered.
     most: usize,
+    /// The range of a short radio, m.
+    radio_range_m: Option<f64>,
+    /// Where this vehicle is, as far as it knows, world ENU, m.
+    place: Option<Vector3<f64>>,
     /// Whom the newest echo was for.
     echoed: Option<NodeName>,
     /// Everybody as of the last look around.
@@ -55,6 +61,8 @@ struct Heard {
     way: Option<Arc<Path>>,
     /// When it arrived, on this vehicle's clock.
     at: Duration,
+    /// The distance over which it was heard, m, if this vehicle knew where it was.
+    apart_m: Option<f64>,
     clock: Option<Clock>,
 }
 
@@ -101,6 +109,11 @@ impl Neighbour {
         self.goal.unwrap_or_else(|| self.position())
     }
 
+    /// Whether it was in the air when it was last heard, and is not heard any more.
+    pub fn has_fallen_silent(&self) -> bool {
+        self.armed && !self.track.cooperative
+    }
+
     /// Whether it stands, as far as is known, or has fallen silent.
     pub fn stands(&self) -> bool {
         !self.track.cooperative || self.track.velocity.norm() < STANDING_M_S
@@ -109,8 +122,7 @@ impl Neighbour {
     /// The distance that a vehicle of this envelope keeps from it where both stand, centre to centre, m: more
     /// from one that flies and has fallen silent.
     pub fn kept_m(&self, envelope: &Envelope) -> f64 {
-        let is_lost = self.armed && !self.track.cooperative;
-        let track = match is_lost {
+        let track = match self.has_fallen_silent() {
             true => self.track,
             false => separation::Neighbour { sigma_m: 0.0, age_s: 0.0, ..self.track },
         };
@@ -139,7 +151,27 @@ impl Neighbours {
     /// nor, where nobody is known to be one, than [`Bound::Strangers`].
     pub fn new(me: NodeName, incarnation: u64, members: usize) -> Self {
         let most = members.max(Bound::Strangers.most());
-        Self { me, incarnation, last: BTreeMap::new(), most, echoed: None, around: Vec::new() }
+        Self {
+            me,
+            incarnation,
+            last: BTreeMap::new(),
+            most,
+            radio_range_m: None,
+            place: None,
+            echoed: None,
+            around: Vec::new(),
+        }
+    }
+
+    /// The same with a radio that reaches so far, m, if it does not reach everywhere.
+    #[must_use]
+    pub fn within_radio_range(self, radio_range_m: Option<f64>) -> Self {
+        Self { radio_range_m, ..self }
+    }
+
+    /// Takes in where this vehicle is, world ENU, m.
+    pub fn listen_at(&mut self, place: Option<Vector3<f64>>) {
+        self.place = place;
     }
 
     /// Takes in a state message that arrived at `now`; one older than the last is dropped.
@@ -152,7 +184,9 @@ impl Neighbours {
         if newest && self.makes_room(now, &state.node) {
             let clock = better(now, known, self.clock_of(now, &state));
             let way = Some(&state.path).filter(|points| points.len() > 1).cloned().and_then(Path::new);
-            self.last.insert(state.node.clone(), Heard { way: way.map(Arc::new), state, at: now, clock });
+            let apart_m = self.place.map(|place| (place - state.position).norm());
+            self.last
+                .insert(state.node.clone(), Heard { way: way.map(Arc::new), state, at: now, apart_m, clock });
         }
     }
 
@@ -205,9 +239,13 @@ impl Neighbours {
         &self.around
     }
 
-    /// Every neighbour as of `now`, in the order of their names.
+    /// Every neighbour as of `now`, in the order of their names, but those that have flown out of range.
     pub fn at(&self, now: Duration) -> impl Iterator<Item = Neighbour> + '_ {
-        (0_u32..).zip(self.last.values()).map(move |(id, heard)| {
+        let is_in_range = move |(_, heard): &(u32, &Heard)| {
+            let is_at_edge = |range_m| heard.apart_m.is_some_and(|apart_m| apart_m > EDGE_OF_RANGE * range_m);
+            !heard.is_silent(now) || !self.radio_range_m.is_some_and(is_at_edge)
+        };
+        (0_u32..).zip(self.last.values()).filter(is_in_range).map(move |(id, heard)| {
             let state = &heard.state;
             Neighbour {
                 node: state.node.clone(),
@@ -223,7 +261,7 @@ impl Neighbours {
                     sigma_m: state.position_sigma_m,
                     age_s: heard.age_s(now),
                     radius_m: state.radius_m,
-                    cooperative: now.saturating_sub(heard.at) <= SILENT_AFTER,
+                    cooperative: !heard.is_silent(now),
                 },
             }
         })
@@ -239,6 +277,10 @@ impl Neighbours {
 }
 
 impl Heard {
+    fn is_silent(&self, now: Duration) -> bool {
+        now.saturating_sub(self.at) > SILENT_AFTER
+    }
+
     /// Since it was said; since it arrived, while the time on the network is not known.
     fn age_s(&self, now: Duration) -> f64 {
         let since_arrival_s = now.saturating_sub(self.at).as_secs_f64();
@@ -380,5 +422,19 @@ mod tests {
         one.hear(ms(0), State { time: ms(0), ..State::new(name(2)) });
         let relied_on = |now| one.at(now).next().unwrap().track.cooperative;
         assert!(relied_on(ms(1000)) && !relied_on(ms(1001)));
+    }
+
+    #[test]
+    fn with_a_short_radio_who_falls_silent_at_its_edge_has_flown_out_of_range() {
+        for (range_m, at_m, remains) in
+            [(None, 14.0, true), (Some(15.0), 14.0, false), (Some(15.0), 5.0, true)]
+        {
+            let mut one = Neighbours::new(name(1), 1, 4).within_radio_range(range_m);
+            one.listen_at(Some(Vector3::zeros()));
+            let position = Vector3::new(at_m, 0.0, 0.0);
+            one.hear(ms(0), State { time: ms(0), position, armed: true, ..State::new(name(2)) });
+            assert_eq!(one.at(ms(900)).count(), 1);
+            assert_eq!(one.at(ms(1001)).count() == 1, remains, "{range_m:?} {at_m}");
+        }
     }
 }

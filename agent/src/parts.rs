@@ -19,7 +19,7 @@ impl Parts {
     pub fn of(config: &AgentConfig) -> Self {
         Self {
             mind: Box::new(BThreads),
-            positioning: positioning::source(config.position),
+            positioning: positioning::source(config),
             layers: Layers::of(&config.envelope, config.fence, config.planners),
         }
     }

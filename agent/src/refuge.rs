@@ -17,14 +17,26 @@ pub struct Refuge {
     /// World ENU, m: home, then the rally points.
     places: Vec<Vector3<f64>>,
     told: usize,
+    /// The place that was told is a place no more.
+    is_gone: bool,
 }
 
 impl Refuge {
     /// Home at the height of the way there, and rally points with theirs, which is no lower; world ENU, m.
     pub fn new(home: [f64; 3], rally: &[[f64; 3]]) -> Self {
-        let [.., height_m] = home;
-        let at_height = |[x, y, z]: &[f64; 3]| Vector3::new(*x, *y, z.max(height_m));
-        Self { places: std::iter::once(&home).chain(rally).map(at_height).collect(), told: 0 }
+        let mut refuge = Self { places: vec![home.into()], told: 0, is_gone: false };
+        refuge.set_rally(rally.iter().copied());
+        refuge
+    }
+
+    /// These are the rally points from now on.
+    pub fn set_rally(&mut self, rally: impl IntoIterator<Item = [f64; 3]>) {
+        let (home, told) = (self.places[0], self.places[self.told]);
+        let at_height = |[x, y, z]: [f64; 3]| Vector3::new(x, y, z.max(home.z));
+        self.places = std::iter::once(home).chain(rally.into_iter().map(at_height)).collect();
+        let stays = self.places.iter().position(|place| *place == told);
+        self.told = stays.unwrap_or(0);
+        self.is_gone |= stays.is_none();
     }
 
     /// Looks which place is nearest and not another's; says when that has changed. Who is on the way to one
@@ -36,6 +48,9 @@ impl Refuge {
         neighbours: &[Neighbour],
         is_on_the_way: bool,
     ) -> Option<Report> {
+        if std::mem::take(&mut self.is_gone) {
+            return Some(Report::Refuge(self.places[0]));
+        }
         let stays = is_on_the_way && !neighbours.iter().any(|other| self.takes(me, other, self.told));
         if self.places.len() < 2 || stays {
             return None;
@@ -148,6 +163,19 @@ mod tests {
         assert_eq!(look(25.0), Some(Report::Refuge(Vector3::new(40.0, 0.0, 5.0))));
         assert_eq!([look(25.0), look(20.6)], [None, None]);
         assert_eq!(look(19.0), Some(Report::Refuge(Vector3::new(0.0, 0.0, 4.0))));
+    }
+
+    #[test]
+    fn a_rally_point_that_is_removed_is_returned_to_no_more_and_one_that_is_added_is() {
+        let mut refuge = Refuge::new([0.0, 0.0, 4.0], &[[40.0, 0.0, 5.0]]);
+        let look =
+            |refuge: &mut Refuge| refuge.look(&name("uav/2"), &Vector3::new(38.0, 0.0, 3.0), &[], true);
+        let to = |x, z| Some(Report::Refuge(Vector3::new(x, 0.0, z)));
+        assert_eq!(refuge.look(&name("uav/2"), &Vector3::new(38.0, 0.0, 3.0), &[], false), to(40.0, 5.0));
+        refuge.set_rally([[36.0, 0.0, 1.0], [40.0, 0.0, 5.0]]);
+        assert_eq!(look(&mut refuge), None, "it stays with the place that it flies to");
+        refuge.set_rally([]);
+        assert_eq!([look(&mut refuge), look(&mut refuge)], [to(0.0, 4.0), None]);
     }
 
     #[test]

@@ -9,12 +9,13 @@ use skein_mav::FlightMode;
 use skein_wire::event::{
     Airborne, Arrived, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed, Cornered,
     FenceBreached, FoundAirborne, InTheWay, Landed, Leave, OrderTaken, OutOfTheWay, PathBlocked, PilotTook,
-    PlaceFree, PlaceTaken, Planned, PositionDoubted, PositionTrusted, Ready, Refuge, Right, Slept, Stuck,
-    TooClose, Unplannable, Unready, What,
+    PlaceFree, PlaceTaken, Planned, PositionDoubted, PositionTrusted, Ready, Refuge, Right, Slept,
+    SourceFound, SourceLost, Stuck, TooClose, Unplannable, Unready, What, ZoneNews, ZoneState,
 };
 
 use crate::energy::Changed;
 use crate::me::Me;
+use crate::positioning::SourceNews;
 use crate::stretch::Stretch;
 
 /// A change of the vehicle, of what is around it, or of its path.
@@ -56,6 +57,8 @@ pub enum Report {
     },
     /// It does again.
     PositionTrusted,
+    /// A source of position can be flown by, or cannot any more.
+    PositionSource(SourceNews),
     /// A neighbour is inside the emergency distance.
     TooClose(NodeName),
     /// No neighbour is any more.
@@ -69,7 +72,13 @@ pub enum Report {
     Unplannable {
         leg: i64,
         why: String,
+        /// The zone in the way, if one is.
+        zone: Option<String>,
     },
+    /// The vehicle is in a zone of this name, that was drawn about it or that it was carried into.
+    InZone(String),
+    /// It is in that no more.
+    OutOfZone(String),
     /// The waypoint of this leg is reached.
     Arrived {
         leg: i64,
@@ -125,10 +134,24 @@ impl Report {
             Self::FenceBreached => me.event(FenceBreached),
             Self::PositionDoubted { why, sigma_m } => me.event(PositionDoubted { why: why.into(), sigma_m }),
             Self::PositionTrusted => me.event(PositionTrusted),
+            Self::PositionSource(SourceNews { source, lost: None }) => {
+                me.event(SourceFound { source: source.name().into() })
+            }
+            Self::PositionSource(SourceNews { source, lost: Some(why) }) => {
+                me.event(SourceLost { source: source.name().into(), why: why.into() })
+            }
             Self::TooClose(other) => me.event(TooClose { other: other.as_str().into() }),
             Self::Clear => me.event(Clear),
             Self::Planned { leg, length_m } => me.event(Planned { leg, length_m }),
-            Self::Unplannable { leg, why } => me.event(Unplannable { leg, why: why.into() }),
+            Self::Unplannable { leg, why, zone } => {
+                me.event(Unplannable { leg, why: why.into(), zone: zone.map(Into::into) })
+            }
+            Self::InZone(name) => {
+                me.event(ZoneNews { name: name.into(), state: ZoneState::Inside, of: None })
+            }
+            Self::OutOfZone(name) => {
+                me.event(ZoneNews { name: name.into(), state: ZoneState::Outside, of: None })
+            }
             Self::Arrived { leg } => me.event(Arrived { leg }),
             Self::PlaceTaken { leg, by, leaves } => {
                 me.event(PlaceTaken { leg, by: by.as_str().into(), leaves })

@@ -141,6 +141,12 @@ impl Stretch {
         here.into_iter().fold(places, EventSet::or)
     }
 
+    /// Whether this vehicle, flying through it, would go against another stretch or across.
+    pub fn leads_against(&self, other: &Self, me: &Me) -> bool {
+        let against = other.against();
+        self.places.iter().any(|place| against.contains(&me.event(place.enter())))
+    }
+
     /// `enter` events so near to a place of it, per horizontal axis, m, and flown through the same way; in a bend, as the
     /// stretch goes before or behind it.
     fn same_way(&self, near_m: f64) -> EventSet {
@@ -262,8 +268,7 @@ mod tests {
     }
 
     fn meets(one: &Stretch, other: &Stretch) -> bool {
-        let me = Me::new("uav/7");
-        (0..).map_while(|index| other.enter(index, &me)).any(|enter| one.against().contains(&enter))
+        other.leads_against(one, &Me::new("uav/7"))
     }
 
     fn stretch(from: [f64; 2], heading_deg: f64, places: i32) -> Stretch {

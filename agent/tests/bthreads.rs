@@ -50,6 +50,7 @@ fn config() -> AgentConfig {
         scripts: Vec::new(),
         behaviours: Default::default(),
         lease: SECOND,
+        radio_range_m: None,
         authority: skein_wire::standard_authority(),
         kept: skein_dbp::Kept::default(),
         seed: 1,
@@ -335,7 +336,7 @@ mod path {
     use super::*;
 
     fn unplannable() -> Event {
-        Unplannable { leg: 0, why: "walled in".into() }.at(ME)
+        Unplannable { leg: 0, why: "walled in".into(), zone: None }.at(ME)
     }
 
     #[test]
@@ -994,6 +995,60 @@ mod separation {
     }
 }
 
+mod choosing {
+    use skein_agent::PositionSource;
+
+    use super::*;
+
+    /// A vehicle with satellites and a lidar, the satellites preferred.
+    fn vehicle() -> Vehicle {
+        let position = vec![PositionSource::Autopilot, PositionSource::Lidar];
+        Vehicle::new(&AgentConfig { position, ..config() })
+    }
+
+    fn found(source: &str) -> Event {
+        SourceFound { source: source.into() }.at(ME)
+    }
+
+    fn lost(source: &str) -> Event {
+        SourceLost { source: source.into(), why: "silent for 0.7 s".into() }.at(ME)
+    }
+
+    /// The sources that are flown by after an event, one after another.
+    fn flown(vehicle: &mut Vehicle, event: Event) -> Vec<String> {
+        let before = vehicle.log.len();
+        vehicle.hears(event);
+        let chosen = vehicle.log.iter().skip(before).filter_map(|event| Me::new(ME).read::<FlyBy>(event));
+        chosen.map(|chosen| chosen.source.to_string()).collect()
+    }
+
+    #[test]
+    fn the_first_source_that_can_be_flown_by_is_flown_and_dead_reckoning_without_one() {
+        let mut vehicle = vehicle();
+        assert_eq!(flown(&mut vehicle, found("autopilot")), NOTHING, "it flies by that already");
+        assert_eq!(flown(&mut vehicle, found("lidar")), NOTHING);
+        assert_eq!(flown(&mut vehicle, lost("autopilot")), ["lidar"]);
+        assert_eq!(flown(&mut vehicle, lost("lidar")), ["dead_reckoning"]);
+        assert_eq!(flown(&mut vehicle, found("lidar")), ["lidar"]);
+        assert_eq!(flown(&mut vehicle, found("autopilot")), ["autopilot"]);
+    }
+
+    #[test]
+    fn before_any_source_is_found_the_vehicle_stands_where_it_was_put() {
+        assert_eq!(flown(&mut vehicle(), lost("autopilot")), NOTHING);
+    }
+
+    #[test]
+    fn a_source_that_somebody_else_chose_stays_until_it_is_lost() {
+        let mut vehicle = vehicle();
+        vehicle.hears(found("autopilot"));
+        vehicle.hears(found("lidar"));
+        let choice = FlyBy { source: "lidar".into() }.at(ME);
+        assert_eq!(flown(&mut vehicle, choice), ["lidar"], "and nothing is requested in its place");
+        assert_eq!(flown(&mut vehicle, lost("lidar")), ["autopilot"]);
+    }
+}
+
 mod positioning {
     use super::*;
 
@@ -1254,7 +1309,7 @@ mod reposition {
     fn a_point_without_a_way_is_declined_and_the_vehicle_stays_in_the_air() {
         let mut vehicle = Vehicle::on_its_way();
         vehicle.hears(goto());
-        let unplannable = || Unplannable { leg: -2, why: "walled in".into() }.at(ME);
+        let unplannable = || Unplannable { leg: -2, why: "walled in".into(), zone: None }.at(ME);
         for _ in 0..2 {
             vehicle.hears(unplannable());
             vehicle.after(SECOND);
@@ -1278,8 +1333,12 @@ mod right_of_way_without_the_lost {
 
     /// In a fleet of five, whose others are all heard.
     fn in_reach() -> Vehicle {
+        with_radio_to(None)
+    }
+
+    fn with_radio_to(radio_range_m: Option<f64>) -> Vehicle {
         let roster = [ME, LOWER, HIGHER, "uav/12", "ground/1", "script/operator"].map(str::to_owned);
-        let config = AgentConfig { roster: roster.to_vec(), ..config() };
+        let config = AgentConfig { roster: roster.to_vec(), radio_range_m, ..config() };
         let mut vehicle = Vehicle::in_the_air(&config);
         for other in [LOWER, HIGHER, "uav/12", "ground/1"] {
             vehicle.learns(joined(other));
@@ -1319,6 +1378,25 @@ mod right_of_way_without_the_lost {
         let mut vehicle = in_reach();
         loses(&mut vehicle, HIGHER, "hold right_of_way");
         assert_eq!(asks(&mut vehicle), [LOWER, HIGHER, "uav/12"]);
+    }
+
+    #[test]
+    fn one_that_is_lost_with_a_claim_closes_only_what_it_claimed() {
+        for (place, is_closed) in [([5.0, 0.0, 2.0], true), ([45.0, 0.0, 2.0], false)] {
+            let mut vehicle = in_reach();
+            vehicle.hears(at(Event::new(format!("{HIGHER}/passage")), place));
+            loses(&mut vehicle, HIGHER, "hold right_of_way");
+            assert_eq!(asks(&mut vehicle).contains(&HIGHER), is_closed, "{place:?}");
+        }
+    }
+
+    #[test]
+    fn where_radio_is_short_nobody_is_asked_who_is_not_heard() {
+        let mut vehicle = with_radio_to(Some(15.0));
+        for other in [HIGHER, "uav/12", "ground/1"] {
+            loses(&mut vehicle, other, "right_of_way");
+        }
+        assert_eq!(asks(&mut vehicle), [LOWER]);
     }
 
     #[test]

@@ -58,6 +58,7 @@ fn config() -> AgentConfig {
         scripts: Vec::new(),
         behaviours: Default::default(),
         lease: Duration::from_secs(1),
+        radio_range_m: None,
         authority: skein_wire::standard_authority(),
         kept: skein_dbp::Kept::default(),
         seed: 1,

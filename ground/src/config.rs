@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use skein_bp::behaviour::{Chosen, Host};
 use skein_dbp::{Authority, Kept, NodeName};
-use skein_wire::{Fleet, standard_authority};
+use skein_wire::{Fleet, KeptZone, standard_authority};
 
 use crate::giver::Giver;
 use crate::order::Order;
@@ -40,6 +40,8 @@ pub struct GroundConfig {
     /// Whether what a former life has kept is lost: see
     /// [`NodeConfig::forgot`](skein_dbp::NodeConfig::forgot).
     pub forgot: bool,
+    /// The zones that a former life of this station has drawn.
+    pub zones: Vec<KeptZone>,
     /// Seed of the program's tie-breaks.
     pub seed: u64,
 }
@@ -63,6 +65,7 @@ impl GroundConfig {
             authority: standard_authority(),
             kept: Kept::default(),
             forgot: false,
+            zones: Vec::new(),
             seed: 0,
         }
     }

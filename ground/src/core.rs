@@ -6,10 +6,12 @@ use std::time::Duration;
 use skein_bp::catalogue::Whose;
 use skein_bp::{Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Board, Happened, Node, NodeConfig, NodeError, NodeName};
-use skein_wire::event::{Declared as _, Heard, Held, Situation, What};
-use skein_wire::{Link, MissionState, NodeLink, Readiness, State, Store, joint_roster};
+use skein_wire::event::{Declared as _, Drawn, Erased, Heard, Held, Situation, What};
+use skein_wire::{
+    KeptZone, Link, MissionState, NodeLink, Readiness, Saver, State, Store, Zone, joint_roster,
+};
 
-use crate::bthreads::{self, MissionOutcome, Watch};
+use crate::bthreads::{self, GOING_LASTS, LiftZone, MissionOutcome, Watch, ZoneBlock};
 use crate::config::GroundConfig;
 use crate::explain::{Evidence, Explanation, explain};
 use crate::giver::Giver;
@@ -17,6 +19,7 @@ use crate::launch_offer::{Candidate, LaunchOffer, LaunchOffers};
 use crate::order::{Order, Who};
 use crate::order_log::{Answer, OrderLog, OrderRecord};
 use crate::refusal::Refusal;
+use crate::zone_log::{ZoneLog, ZoneRecord};
 
 /// Who holds a vehicle is kept holding it this often while they are there: several times in a holder's absence that a
 /// vehicle bears with.
@@ -41,6 +44,8 @@ pub struct GroundCore {
     present: BTreeSet<Giver>,
     keep_due: Duration,
     offers: LaunchOffers,
+    zones: ZoneLog,
+    zone_store: Option<Saver<Vec<KeptZone>>>,
     evidence: Evidence,
     selections: Vec<Happened>,
 }
@@ -84,7 +89,7 @@ impl GroundCore {
             Some(store) => NodeLink::durable(node, config.fleet, store),
             None => NodeLink::new(node, config.fleet),
         };
-        Self {
+        let mut core = Self {
             node: node.reading_boards(),
             name: config.name,
             planners: config.orders.iter().map(|(_, by, _)| by.clone()).collect(),
@@ -98,9 +103,97 @@ impl GroundCore {
             present: BTreeSet::new(),
             keep_due: Duration::ZERO,
             offers: LaunchOffers::default(),
+            zones: ZoneLog::default(),
+            zone_store: None,
             evidence,
             selections: Vec::new(),
+        };
+        config.zones.into_iter().for_each(|kept| core.take_up(kept));
+        core
+    }
+
+    /// The same station, which keeps the zones that it draws in `store`.
+    #[must_use]
+    pub fn keeping_zones(self, store: Box<dyn Store<Vec<KeptZone>>>) -> Self {
+        Self { zone_store: Some(Saver::new(store)), ..self }
+    }
+
+    /// States a zone of a former life again: so it is this life's to remove.
+    fn take_up(&mut self, KeptZone { by, zone }: KeptZone) {
+        let by = Giver::new(&by).unwrap_or_else(|_| Giver::from(&self.name));
+        let block = ZoneBlock::new(self.name.clone(), &zone);
+        self.node.node_mut().program_mut().add(ZoneBlock::name(zone.name()), block);
+        self.zones.draw(Duration::ZERO, by, zone, &self.vehicles);
+    }
+
+    /// Draws a zone for all vehicles, in the place of one of its name. What becomes of it stands in
+    /// [`zones`](Self::zones).
+    ///
+    /// # Errors
+    /// [`Refusal`]: there are too many, or one of this name is just being removed.
+    pub fn draw(&mut self, by: &Giver, zone: Zone) -> Result<(), Refusal> {
+        if let Some(refusal) = self.zones.objection(&zone) {
+            return Err(refusal);
         }
+        let (name, bthread) = (zone.name().to_owned(), ZoneBlock::name(zone.name()));
+        let node = self.node.node_mut();
+        match (node.program().bid(&bthread).is_some(), self.zones.is_standing(&name)) {
+            (false, _) => drop(node.program_mut().add(bthread, ZoneBlock::new(self.name.clone(), &zone))),
+            (true, true) => {}
+            (true, false) => return Err(Refusal::ZoneGoing { name }),
+        }
+        let drawn = Drawn { name: name.into(), zone: zone.to_json().into(), by: by.as_str().into() };
+        node.enqueue(drawn.at(&self.name));
+        self.zones.draw(self.now, by.clone(), zone, &self.vehicles);
+        self.keep_zones();
+        Ok(())
+    }
+
+    /// Removes the zone of this name; one that this station does not know is lifted from the vehicles that keep it.
+    ///
+    /// # Errors
+    /// [`Refusal`]: nobody knows it.
+    pub fn erase(&mut self, by: &Giver, name: &str) -> Result<(), Refusal> {
+        if self.zones.erase(self.now, name, &self.vehicles) {
+            let erased = Erased { name: name.into(), by: by.as_str().into() };
+            self.node.node_mut().enqueue(erased.at(&self.name));
+            self.keep_zones();
+            return Ok(());
+        }
+        let keeps = |state: &&State| state.zones.iter().any(|zone| zone == name);
+        let keeping: Vec<_> = self.roster.values().filter(keeps).map(|state| state.node.clone()).collect();
+        if keeping.is_empty() {
+            return Err(Refusal::NoSuchZone { name: name.to_owned() });
+        }
+        for vehicle in keeping {
+            let lift = LiftZone::new(&self.name, name, &vehicle, self.now + GOING_LASTS);
+            self.node.node_mut().program_mut().add(LiftZone::name(name, &vehicle), lift);
+        }
+        Ok(())
+    }
+
+    fn keep_zones(&mut self) {
+        if let Some(store) = &mut self.zone_store {
+            store.put(self.now, self.zones.kept());
+        }
+    }
+
+    fn look_at_zones(&mut self, happened: &[Happened]) {
+        self.zones.update(self.now, self.node.node(), happened);
+        if let Some(store) = &mut self.zone_store {
+            store.go_on(self.now);
+            self.node.node_mut().note_disk("zones", store.trouble());
+        }
+    }
+
+    /// The zones that are drawn, by name, and those that are being removed.
+    pub fn zones(&self) -> impl Iterator<Item = &ZoneRecord> {
+        self.zones.records()
+    }
+
+    /// Grows whenever [`zones`](Self::zones) has changed.
+    pub fn zones_revision(&self) -> u64 {
+        self.zones.revision()
     }
 
     /// Says something to the vehicles, as `by`. Returns the order's number: see [`orders`](Self::orders). Vehicles that
@@ -297,6 +390,7 @@ impl GroundCore {
         for overruled in self.order_log.update(now, self.node.node(), &happened, &self.holders) {
             self.node.node_mut().enqueue(overruled.at(&self.name));
         }
+        self.look_at_zones(&happened);
         self.keep_holders();
         self.selections.extend(happened);
         outcome
@@ -310,6 +404,7 @@ impl GroundCore {
             self.node.node_mut().enqueue(first_word(&self.name, &state));
         }
         self.evidence.note_state(self.now, &state);
+        self.zones.note_state(self.now, &state);
         self.set_holder(&state.node, &state.holder);
         self.roster.insert(state.node.clone(), state);
     }

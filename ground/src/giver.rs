@@ -34,6 +34,12 @@ impl Giver {
         Ok(Self(name.into()))
     }
 
+    /// Whoever looks on, and orders nothing.
+    #[cfg(feature = "console")]
+    pub(crate) fn looking_on() -> Self {
+        Self("whoever looks on".into())
+    }
+
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0

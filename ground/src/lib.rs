@@ -38,6 +38,8 @@ mod order;
 mod order_log;
 pub mod recorder;
 mod refusal;
+pub mod replay;
+mod zone_log;
 
 pub use crate::core::GroundCore;
 pub use bthreads::MissionOutcome;
@@ -49,3 +51,4 @@ pub use launch_offer::{Candidate, LaunchOffer, OFFER_LASTS};
 pub use order::{Destination, Order, SentScript, UnfitScript, Who};
 pub use order_log::{Answer, OrderRecord};
 pub use refusal::Refusal;
+pub use zone_log::ZoneRecord;

@@ -44,7 +44,7 @@ pub enum Answer {
 }
 
 impl Answer {
-    fn is_open(&self) -> bool {
+    pub(crate) fn is_open(&self) -> bool {
         matches!(self, Self::Pending | Self::Missing)
     }
 }

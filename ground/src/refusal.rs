@@ -1,6 +1,7 @@
 //! Why the station does not give an order.
 
 use skein_dbp::NodeName;
+use skein_wire::Zone;
 use skein_wire::event::What;
 
 use crate::launch_offer::OFFER_LASTS;
@@ -30,6 +31,18 @@ pub enum Refusal {
         OFFER_LASTS.as_secs()
     )]
     NoSuchOffer,
+    #[error("{most} zones are drawn already: remove one first", most = Zone::MOST)]
+    TooManyZones,
+    #[error("all zones would have {corners} corners: expected at most {most}", most = Zone::MOST_CORNERS_IN_ALL)]
+    TooManyCorners { corners: usize },
+    #[error("the zone `{name}` is just being removed: draw it again in a moment")]
+    ZoneGoing { name: String },
+    #[error("no zone `{name}` is drawn here, and no vehicle that is heard has regard for one")]
+    NoSuchZone { name: String },
+    #[error("this is a live station: there is no recording that could be played otherwise")]
+    NotRecorded,
+    #[error("this is a recording: nobody is ordered anything by it")]
+    Recorded,
     #[error("who would be launched has changed since you asked; ask for the launch again")]
     OfferOutdated,
 }

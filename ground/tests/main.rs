@@ -8,4 +8,5 @@ mod explain;
 #[cfg(feature = "zenoh")]
 mod explain_command;
 mod recorder;
+mod replay;
 mod station;

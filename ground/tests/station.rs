@@ -210,6 +210,7 @@ const LOSSY: NetworkConfig = NetworkConfig {
     loss: 0.2,
     duplicate: 0.1,
     reorder: 0.3,
+    range_m: None,
 };
 
 #[test]
@@ -453,4 +454,51 @@ fn orders_that_were_known_in_advance_hold_no_vehicle() {
     let released =
         |happened: &&Happened| OrderGiven::read(&happened.event).is_some_and(|it| it.what == What::Release);
     assert_eq!(fleet.happened.iter().filter(released).count(), 1);
+}
+
+fn zone(text: &str) -> skein_wire::Zone {
+    text.parse().unwrap()
+}
+
+#[test]
+fn a_vehicle_that_cannot_keep_a_zone_says_so_and_one_that_is_removed_goes_off_the_record() {
+    let mut fleet = Fleet3::waiting();
+    let pond = zone(r#"{"name":"pond","kind":"no_fly","centre_m":[0,0],"radius_m":5}"#);
+    fleet.station.draw(&giver("Anna"), pond.clone()).unwrap();
+    fleet.run(Duration::from_secs(1));
+    let record = fleet.station.zones().next().unwrap();
+    assert_eq!((&record.zone, record.by.as_str(), record.is_going), (&pond, "Anna", false));
+    let refused = Answer::Refused("its disk does not take it".into());
+    assert!(record.answers.values().all(|answer| *answer == refused), "{:?}", record.answers);
+    fleet.station.erase(&giver("Ben"), "pond").unwrap();
+    fleet.run(Duration::from_secs(1));
+    assert_eq!(fleet.station.zones().count(), 0);
+    assert_eq!((fleet.saw("ground/main/drawn").len(), fleet.saw("ground/main/erased").len()), (1, 1));
+}
+
+#[test]
+fn no_more_zones_are_drawn_than_travel_in_one_message_and_unknown_ones_are_not_removed() {
+    let mut fleet = Fleet3::waiting();
+    let by = giver("Anna");
+    let numbered = |number: usize| {
+        zone(&format!(r#"{{"name":"z{number}","kind":"no_fly","centre_m":[0,0],"radius_m":5}}"#))
+    };
+    for number in 0..skein_wire::Zone::MOST {
+        fleet.station.draw(&by, numbered(number)).unwrap();
+    }
+    assert_eq!(fleet.station.draw(&by, numbered(99)), Err(Refusal::TooManyZones));
+    assert_eq!(fleet.station.draw(&by, numbered(3)), Ok(()), "in the place of itself");
+    let unknown = Refusal::NoSuchZone { name: "moon".into() };
+    assert_eq!(fleet.station.erase(&by, "moon"), Err(unknown));
+    let mut fleet = Fleet3::waiting();
+    let cornered = |number: usize| {
+        let corners: Vec<_> = (0..64).map(|k| [f64::from(k), f64::from(k * k)]).collect();
+        zone(&format!(r#"{{"name":"c{number}","kind":"stay_inside","corners_m":{corners:?}}}"#))
+    };
+    for number in 0..8 {
+        fleet.station.draw(&by, cornered(number)).unwrap();
+    }
+    assert_eq!(fleet.station.draw(&by, cornered(8)), Err(Refusal::TooManyCorners { corners: 576 }));
+    fleet.station.erase(&by, "c3").unwrap();
+    assert_eq!(fleet.station.draw(&by, cornered(8)), Ok(()));
 }

@@ -97,7 +97,7 @@ fn a_scenario_file_sets_vehicles_obstacles_orders_and_conditions() -> Result<(),
     assert_eq!(first.start, Vector3::new(-5.0, 0.0, 0.0));
     assert!((first.yaw - std::f64::consts::FRAC_PI_2).abs() < 1e-12, "looks at its first waypoint");
     assert_eq!((second.yaw, second.model.name.as_str()), (1.0, "crazyflie"));
-    assert_eq!(first.model.gps.sigma_horizontal_m, 0.2);
+    assert_eq!(first.model.gps.unwrap().sigma_horizontal_m, 0.2);
     let names: Vec<_> = yard.scene.obstacles().iter().map(|o| o.name.as_str()).collect();
     assert_eq!(names, ["pole", "obstacle 2"]);
     assert!((yard.scene.clearance(&Vector3::new(-5.0, 0.0, 1.0)) - 4.7).abs() < 1e-12);

@@ -36,6 +36,8 @@ export class Console {
   /** What the station has said of the swarm, ten times a second. */
   fleets = [];
   orders = [];
+  /** What is drawn on the map. */
+  zones = [];
   events = [];
   /** Whether the station has gone. Whatever the page then says of its attempts to reach it is as it should be. */
   gone = false;
@@ -54,6 +56,7 @@ export class Console {
   #hear(message) {
     if (message.type === 'fleet') this.fleets.push(message);
     if (message.type === 'orders') this.orders = message.orders;
+    if (message.type === 'zones') this.zones = message.zones;
     if (message.type === 'events') this.events.push(...message.events);
   }
 
@@ -129,12 +132,14 @@ export class Console {
     return this.orders.find((order) => order.id === id);
   }
 
-  /**
-   * Sends the selected vehicles to the place on the ground that the page itself calls `x` east, `y` north: the pointer is
-   * moved until the page says so, then it clicks.
-   */
+  /** Sends the selected vehicles to a place on the ground. */
   async goTo(x, y) {
     await this.press('Go to');
+    await this.clickAt(x, y);
+  }
+
+  /** Clicks the place on the ground that the page itself calls `x` east, `y` north: the pointer is moved until it says so. */
+  async clickAt(x, y) {
     const view = await this.page.locator('#view').boundingBox();
     const said = async (px, py) => {
       await this.page.mouse.move(px, py);

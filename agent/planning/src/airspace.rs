@@ -66,6 +66,8 @@ pub struct Airspace {
     pub prisms: Vec<NoFlyPrism>,
     /// Areas to stay inside of: in each of these.
     pub stay_inside: Vec<StayInside>,
+    /// Air that is too low to fly in, but to take off and to land.
+    pub low: Vec<Area>,
 }
 
 impl Mountain {
@@ -115,6 +117,7 @@ impl Airspace {
         self.no_fly.extend(other.no_fly);
         self.prisms.extend(other.prisms);
         self.stay_inside.extend(other.stay_inside);
+        self.low.extend(other.low);
         self.heights = other.heights.or(self.heights.take());
     }
 

@@ -84,6 +84,9 @@ impl ControlSide {
         if let Some(limits) = orders.limits {
             self.control.limit(&limits);
         }
+        if let Some(zones) = orders.zones {
+            self.control.draw(now, zones);
+        }
         if let Some(words) = orders.words {
             self.words = words;
         }

@@ -75,6 +75,7 @@ impl MissionSide {
             self.mission.record(decided);
         }
         orders.limits = self.mission.changed_limits().cloned();
+        orders.zones = self.mission.changed_zones();
     }
 
     /// The next script that is to be tried out, by whoever has the time for it.

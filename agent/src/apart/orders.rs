@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use skein_wire::event::Right;
-use skein_wire::{Limits, MissionState, State};
+use skein_wire::{Limits, MissionState, State, Zone};
 
 use super::newest::Newest;
 use crate::instruction::Instruction;
@@ -17,6 +17,7 @@ pub struct Orders {
     pub instructions: Newest<Instruction>,
     /// The newest, if they have changed; as the rest.
     pub limits: Option<Limits>,
+    pub zones: Option<Vec<Zone>>,
     pub words: Option<Words>,
 }
 
@@ -27,6 +28,8 @@ pub struct Words {
     pub waiting_for: String,
     pub mission: MissionState,
     pub scripts: Vec<String>,
+    /// The names of the zones that are drawn for it.
+    pub zones: Vec<String>,
     /// Who commands the vehicle, and who asks to; empty for nobody.
     pub holder: String,
     pub asked_by: String,
@@ -40,6 +43,7 @@ impl Orders {
         self.decided = self.decided.max(newer.decided);
         self.instructions.extend(newer.instructions);
         self.limits = newer.limits.or(self.limits.take());
+        self.zones = newer.zones.or(self.zones.take());
         self.words = newer.words.or(self.words.take());
     }
 }
@@ -48,7 +52,7 @@ impl Words {
     /// The state of a body, with these words.
     #[must_use]
     pub fn said_of(&self, body: State) -> State {
-        let Self { task, waiting_for, mission, scripts, holder, asked_by, right } = self.clone();
-        State { task, waiting_for, mission, scripts, holder, asked_by, right, ..body }
+        let Self { task, waiting_for, mission, scripts, zones, holder, asked_by, right } = self.clone();
+        State { task, waiting_for, mission, scripts, zones, holder, asked_by, right, ..body }
     }
 }

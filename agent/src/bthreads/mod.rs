@@ -5,6 +5,7 @@
 
 mod await_place;
 mod battery;
+mod choosing;
 pub mod escape;
 mod found_airborne;
 mod geofence;
@@ -30,6 +31,7 @@ use skein_bp::{BThread, Program};
 
 pub use await_place::{AwaitPlace, PATIENCE as PATIENCE_FOR_A_PLACE};
 pub use battery::Battery;
+pub use choosing::Choosing;
 pub use escape::Escape;
 pub use found_airborne::FoundAirborne;
 pub use geofence::Geofence;
@@ -51,7 +53,7 @@ pub use right_of_way::{NAME as RIGHT_OF_WAY, RightOfWay};
 pub use separation::Separation;
 pub use together::Together;
 
-use crate::config::AgentConfig;
+use crate::config::{AgentConfig, PositionSource};
 use crate::me::Me;
 
 /// Loads a vehicle's b-threads into its program.
@@ -59,7 +61,8 @@ pub fn load(program: &mut Program, config: &AgentConfig) {
     let with_say = |node: &&String| node.starts_with("uav/") || **node == config.ground;
     let others = config.roster.iter().filter(with_say).filter(|node| **node != config.node);
     let others = others.map(String::as_str);
-    load_with(program, config, RightOfWay::new(Me::new(&config.node), others, config.lease));
+    let right_of_way = RightOfWay::new(Me::new(&config.node), others, config.lease);
+    load_with(program, config, right_of_way.with_short_radio(config.radio_range_m.is_some()));
 }
 
 /// The same with another b-thread in place of [`RightOfWay`].
@@ -68,6 +71,9 @@ pub fn load_with(program: &mut Program, config: &AgentConfig, right_of_way: impl
     let [x, y, _] = config.home;
     program.add("pilot", Pilot::new(me.clone()));
     program.add("positioning", Positioning::new(me.clone()));
+    if config.position.iter().any(|source| *source != PositionSource::Autopilot) {
+        program.add("choosing", Choosing::new(me.clone(), &config.position));
+    }
     program.add("separation", Separation::new(me.clone()));
     program.add("obstacle_avoidance", ObstacleAvoidance::new(me.clone()));
     program.add(RIGHT_OF_WAY, right_of_way);

@@ -16,7 +16,8 @@ pub const ATTEMPTS: u8 = 3;
 /// The pause before the next attempt.
 pub const PAUSE: Duration = Duration::from_secs(1);
 
-/// Requests `plan` for each new waypoint, tries again while there is no path, and at last requests `land`.
+/// Requests `plan` for each new waypoint, tries again while there is no path, and at last requests `land`; where a zone
+/// that was drawn is in the way, it goes on trying.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct PathPlanning {
     me: Me,
@@ -65,6 +66,10 @@ impl BThread for PathPlanning {
         self.phase = match self.me.verb(event) {
             Some(Goto::NAME) => Phase::Asking { attempt: 1 },
             Some(Plan::NAME) => Phase::Computing { attempt },
+            // A zone may be removed, and a curfew ends. Whoever goes home or where an operator points does not wait.
+            Some(Unplannable::NAME) if is_in_a_zone(event) => {
+                Phase::Pausing { attempt: 0, until: cx.now() + PAUSE }
+            }
             Some(Unplannable::NAME) if attempt < ATTEMPTS => {
                 Phase::Pausing { attempt, until: cx.now() + PAUSE }
             }
@@ -77,4 +82,9 @@ impl BThread for PathPlanning {
             Some(_) => Phase::Idle,
         };
     }
+}
+
+/// Whether a waypoint of the mission cannot be flown to because of a zone.
+fn is_in_a_zone(event: &Event) -> bool {
+    Unplannable::read(event).is_some_and(|told| told.leg >= 0 && told.zone.is_some())
 }

@@ -12,9 +12,14 @@
 //! makes way: see [`Right`]. If it cannot, it is cornered, and goes first.
 //!
 //! A vehicle that is lost confirms nothing, and must not close every passage for ever. It is done without while most of
-//! the fleet is in reach, unless it had a claim when it was lost: to claim one since, it would have needed the
-//! confirmation of those who have lost it. So on a cut network one side at most goes on, and whoever was inside is
-//! waited for. Whoever has just heard another again first lets claims cross, for as long as it takes to repeat them.
+//! the fleet is in reach, unless it had a claim to this very stretch when it was lost: to claim another since, it would
+//! have needed the confirmation of those who have lost it. So on a cut network one side at most goes on, and whoever was
+//! inside is waited for: after half a minute a way around where it was lost is looked for, and at last the vehicle lands
+//! and says for whom it waited. Whoever has just heard another again first lets claims cross, for as long as it takes to
+//! repeat them.
+//!
+//! Where radio is known to be short, silence is distance: whoever is not heard is so far away that it cannot be at a
+//! place within half the range before that is let go, and is done without.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -23,8 +28,8 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::facts::{BlockLapsed, Confirmed, PeerJoined, PeerLost, Stalled};
 use skein_wire::event::{
-    Advance, Cornered, Declared as _, Enter, GiveWay, Homeward, InTheWay, Landed, Leave, MakeWay,
-    OutOfTheWay, Passage, Right, of, of_every_vehicle,
+    Advance, Cornered, Declared as _, Enter, GiveWay, Homeward, InTheWay, Land, Landed, Leave, MakeWay,
+    OutOfTheWay, Passage, Plan, PlanReason, Right, of, of_every_vehicle,
 };
 
 use crate::{me::Me, precedence, rank::goes_before, stretch::Stretch};
@@ -36,6 +41,10 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// Who waits for others claims no longer than this at a time, outside and inside.
 const INSISTS_FOR: Duration = Duration::from_secs(3);
 const INSISTS_INSIDE_FOR: Duration = Duration::from_secs(10);
+/// Who waits so long for one that was lost in the stretch ahead looks for another way.
+const LOST_PATIENCE: Duration = Duration::from_secs(30);
+/// So often it looks before it lands.
+const LOOKS: u8 = 4;
 /// A vehicle without leave to move stands after this.
 const STOPS_WITHIN: Duration = Duration::from_secs(2);
 /// Claims that were made apart are known to both sides so many leases after they have met again: records are repeated
@@ -48,8 +57,10 @@ pub struct RightOfWay {
     me: Me,
     /// The other vehicles and the ground station.
     others: BTreeMap<String, Other>,
-    /// The rights of those of them that are in a narrow place, by what they said last.
-    inside: BTreeMap<String, Right>,
+    /// Their last word of those of them that have a narrow stretch before them.
+    told: BTreeMap<String, Told>,
+    /// Who is not heard is out of range.
+    radio_is_short: bool,
     /// The time that claims take to cross.
     meeting: Duration,
     /// No claim counts before this.
@@ -60,6 +71,8 @@ pub struct RightOfWay {
     ahead: Stretch,
     /// It could not make way, and has not come out since.
     cornered: bool,
+    /// It has looked so often for a way around one that is lost.
+    looked: u8,
     phase: Phase,
 }
 
@@ -75,11 +88,27 @@ enum Other {
     LostClaiming,
 }
 
+/// The word of another vehicle: its right to go first, and the stretch of its way.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+struct Told {
+    right: Right,
+    stretch: Stretch,
+}
+
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 enum Phase {
     /// It may fly on: nothing narrow lies ahead that it has not entered.
     Clear,
-    Claiming,
+    /// It awaits confirmation; `until` is when it looks for another way, if one was lost in the stretch.
+    Claiming {
+        until: Option<Duration>,
+    },
+    /// It looks for a way around one that is lost.
+    LookingElsewhere,
+    /// It has found none.
+    GivingUp {
+        lost: String,
+    },
     /// `next` is the place to enter next; who is outside insists until then.
     Entering {
         next: usize,
@@ -103,18 +132,26 @@ impl RightOfWay {
     pub fn new<'a>(me: Me, others: impl IntoIterator<Item = &'a str>, lease: Duration) -> Self {
         let others = others.into_iter().map(|node| (node.to_owned(), Other::Unheard)).collect();
         let meeting = lease.mul_f64(MEETING_LEASES);
-        let (held, ahead, inside) = (Stretch::default(), Stretch::default(), BTreeMap::new());
+        let (held, ahead, told) = (Stretch::default(), Stretch::default(), BTreeMap::new());
         Self {
             me,
             others,
-            inside,
+            told,
+            radio_is_short: false,
             meeting,
             met: Duration::ZERO,
             held,
             ahead,
             cornered: false,
+            looked: 0,
             phase: Phase::Clear,
         }
+    }
+
+    /// The same in a fleet whose radios do not reach everywhere.
+    #[must_use]
+    pub fn with_short_radio(self, radio_is_short: bool) -> Self {
+        Self { radio_is_short, ..self }
     }
 
     /// Its right to go first.
@@ -135,12 +172,41 @@ impl RightOfWay {
     fn claim(&self) -> EventSet {
         let against = self.held.against().or(self.ahead.against());
         let alive = 1 + self.others.values().filter(|other| **other == Other::Alive).count();
-        if 2 * alive <= self.others.len() + 1 {
+        if !self.radio_is_short && 2 * alive <= self.others.len() + 1 {
             return self.of_everyone(against);
         }
-        let needed =
-            self.others.iter().filter(|(_, other)| matches!(other, Other::Alive | Other::LostClaiming));
+        let needed = self.others.iter().filter(|(node, other)| match other {
+            Other::Alive => true,
+            Other::LostClaiming => !self.radio_is_short && self.may_hold(node),
+            Other::Unheard | Other::Lost => false,
+        });
         EventSet::any_of(needed.map(|(node, _)| of::<Enter>(node))).and(against)
+    }
+
+    /// One that was lost with a claim to what lies ahead.
+    fn lost_ahead(&self) -> Option<&str> {
+        let is_there = |(node, other): &(&String, &Other)| {
+            **other == Other::LostClaiming && !self.radio_is_short && self.may_hold(node)
+        };
+        self.others.iter().find(is_there).map(|(node, _)| node.as_str())
+    }
+
+    /// Claims what lies ahead.
+    fn claim_now(&self, now: Duration) -> Phase {
+        Phase::Claiming { until: self.lost_ahead().map(|_| now + LOST_PATIENCE) }
+    }
+
+    /// It has waited for one that is lost.
+    fn look_elsewhere(&mut self, now: Duration) -> Phase {
+        let Some(lost) = self.lost_ahead().map(str::to_owned) else { return self.claim_now(now) };
+        self.looked += 1;
+        if self.looked > LOOKS { Phase::GivingUp { lost } } else { Phase::LookingElsewhere }
+    }
+
+    /// Whether another that was lost with a claim may be in the stretch ahead: its claim was for what it told last.
+    fn may_hold(&self, node: &str) -> bool {
+        let told = self.told.get(node).filter(|told| !told.stretch.is_empty());
+        told.is_none_or(|told| self.ahead.leads_against(&told.stretch, &self.me))
     }
 
     /// The fate of its claim on the place with number `next`, which it insists on until then, now that another
@@ -149,7 +215,7 @@ impl RightOfWay {
     fn stand_against(&mut self, stalled: &Stalled, (next, until): (usize, Duration), now: Duration) -> Phase {
         // Facts name a remote b-thread `node#bthread`.
         let node = stalled.by.split('#').next().unwrap_or_default();
-        let its_right = self.inside.get(node).copied().unwrap_or(Right::Free);
+        let its_right = self.told.get(node).map_or(Right::Free, |told| told.right);
         let gives_in = stalled.event.ends_with(Enter::NAME)
             && goes_before((node, its_right), (self.me.name(), self.right()));
         match (gives_in, self.held.is_entered()) {
@@ -198,7 +264,7 @@ impl RightOfWay {
         } else if now < self.met {
             Phase::Yielding { until: self.met }
         } else {
-            Phase::Claiming
+            self.claim_now(now)
         }
     }
 
@@ -231,12 +297,18 @@ impl RightOfWay {
     fn hear_other(&mut self, event: &Event, now: Duration) -> Option<Phase> {
         let (node, verb) =
             event.name().rsplit_once('/').filter(|(node, _)| self.others.contains_key(*node))?;
-        let is_inside = Stretch::read(event).is_some_and(|stretch| !stretch.here().is_empty());
-        match (verb, self.inside.get(node)) {
-            (Cornered::NAME, _) => drop(self.inside.insert(node.to_owned(), Right::Cornered)),
-            (Passage::NAME, Some(Right::Cornered)) => {}
-            (Passage::NAME, _) if is_inside => drop(self.inside.insert(node.to_owned(), Right::Inside)),
-            _ => drop(self.inside.remove(node)),
+        match (verb, Stretch::read(event)) {
+            (Cornered::NAME, _) => self.told.entry(node.to_owned()).or_default().right = Right::Cornered,
+            (_, Some(stretch)) => {
+                let told = self.told.entry(node.to_owned()).or_default();
+                told.right = match told.right {
+                    Right::Cornered => Right::Cornered,
+                    _ if stretch.here().is_empty() => Right::Free,
+                    _ => Right::Inside,
+                };
+                told.stretch = stretch;
+            }
+            _ => drop(self.told.remove(node)),
         }
         Some(match self.phase {
             Phase::Yielding { .. } if verb == Leave::NAME => self.go_on(now),
@@ -275,7 +347,7 @@ impl RightOfWay {
             PeerJoined::NAME | PeerLost::NAME => {
                 self.note(event, now);
                 self.keep_entered();
-                let claims = matches!(self.phase, Phase::Claiming | Phase::Entering { .. });
+                let claims = matches!(self.phase, Phase::Claiming { .. } | Phase::Entering { .. });
                 Some(if claims { self.go_on(now) } else { self.phase.clone() })
             }
             _ => None,
@@ -294,7 +366,17 @@ impl BThread for RightOfWay {
         let stands = |bid: Bid| bid.block(me.any::<(Advance, Homeward)>());
         Some(match &self.phase {
             Phase::Clear => holds(bid),
-            Phase::Claiming => stands(bid).block(self.claim()).wait_for(me.any::<Confirmed>()),
+            Phase::Claiming { until } => {
+                let bid = stands(bid).block(self.claim()).wait_for(me.any::<Confirmed>());
+                until.iter().fold(bid, |bid, until| bid.deadline(*until))
+            }
+            Phase::LookingElsewhere => {
+                stands(bid).block(self.claim()).request(me.event(Plan { why: PlanReason::Stuck }))
+            }
+            Phase::GivingUp { lost } => {
+                let why = format!("{lost} was lost in the narrow place ahead, and there is no other way");
+                stands(bid).request(me.event(Land { why: why.as_str().into() }))
+            }
             Phase::Entering { next, until } => {
                 let facts = me.any::<(Stalled, BlockLapsed)>();
                 let bid = stands(bid).block(self.claim()).wait_for(facts).deadline(*until);
@@ -319,15 +401,19 @@ impl BThread for RightOfWay {
         let confirmed = Confirmed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
         let lapsed = BlockLapsed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
         self.phase = match (self.phase.clone(), self.me.verb(event)) {
-            (Phase::Claiming, _) if confirmed => {
+            (Phase::Claiming { .. }, _) if confirmed => {
+                self.looked = 0;
                 let is_inside = self.right() != Right::Free;
                 self.enter_from(0, now + if is_inside { INSISTS_INSIDE_FOR } else { INSISTS_FOR })
             }
             (Phase::Entering { next, until }, Some(Enter::NAME)) => self.enter_from(next + 1, until),
             (Phase::Entering { .. }, _) if lapsed => {
                 self.keep_entered();
-                Phase::Claiming
+                self.claim_now(now)
             }
+            (Phase::Claiming { .. }, None) => self.look_elsewhere(now),
+            (Phase::GivingUp { .. }, Some(Land::NAME)) => Phase::Clear,
+            (Phase::LookingElsewhere, Some(Plan::NAME)) => self.claim_now(now),
             (Phase::Entering { .. }, None) => self.give_in(now),
             (Phase::GivingWay, Some(GiveWay::NAME)) => {
                 self.held = self.ahead.here();
@@ -339,7 +425,7 @@ impl BThread for RightOfWay {
             },
             (Phase::Yielding { until }, None) if self.met <= until => {
                 self.met = Duration::ZERO;
-                Phase::Claiming
+                self.claim_now(now)
             }
             (Phase::Yielding { .. }, None) => self.go_on(now),
             (phase, _) => phase,

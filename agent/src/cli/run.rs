@@ -10,7 +10,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::{Context as _, bail};
-use skein_disk::{Background, Memory, ScriptStore};
+use skein_disk::{Background, ListStore, Memory};
 use skein_wire::{Fleet, Key};
 use skein_zenoh::{Complaints, ZenohConfig, ZenohSession};
 
@@ -95,7 +95,7 @@ fn open(mut config: Config, is_shadow: bool) -> anyhow::Result<(ControlThread, M
         Memory::open(&config.state, &config.name, config.agent.incarnation, SystemTime::now(), wake.clone())?;
     config.agent.incarnation = memory.incarnation.number;
     config.agent.kept = memory.kept;
-    let (script_store, scripts) = ScriptStore::open(&config.state, &config.name);
+    let (script_store, scripts) = ListStore::of_scripts(&config.state, &config.name);
     let (scripts, lost_scripts) = match scripts {
         Ok(scripts) => (scripts, None),
         Err(lost) => (Vec::new(), Some(lost.to_string())),
@@ -115,6 +115,8 @@ fn open(mut config: Config, is_shadow: bool) -> anyhow::Result<(ControlThread, M
         session.locators(),
         config.autopilot
     );
+    let began = Instant::now();
+    config.agent.epoch = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     let mut core =
         AgentCore::durable(config.agent, memory.promises)?.keeping_scripts(Box::new(script_store), &scripts);
     if let Some(lost) = memory.lost {
@@ -130,7 +132,6 @@ fn open(mut config: Config, is_shadow: bool) -> anyhow::Result<(ControlThread, M
         mission.note_disk("former scripts", Some(&lost));
     }
     let exchange = Arc::new(Exchange::new(link.bell()));
-    let began = Instant::now();
     let control = ControlThread {
         side: control,
         autopilot: AutopilotLink::new(config.autopilot),

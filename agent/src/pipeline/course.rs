@@ -11,6 +11,8 @@ use crate::instruction::Waypoint;
 const REPLAN_SLACK_M: f64 = 0.15;
 /// The path is checked against the map this far ahead, m.
 const CHECK_AHEAD_M: f64 = 15.0;
+/// A path that is planned around what is closed leads through no more of its margin than this, m.
+const CUTS_CORNERS_M: f64 = 0.4;
 /// A path further away than this is planned anew, m.
 const OFF_PATH_M: f64 = 2.0;
 /// A path that does not lead to the waypoint is not planned on before the vehicle has come so far along it, m.
@@ -126,6 +128,9 @@ impl Following {
         while station_m < end_m {
             station_m = (station_m + 1.0).min(end_m);
             let to = place_at(station_m);
+            if leads_into_closed(&from, &to, map) {
+                return false;
+            }
             // The way out of a tight place counts as clear.
             if !map.is_segment_clear(&from, &to, clearance_m.min(map.clearance(&from))) {
                 return false;
@@ -134,6 +139,15 @@ impl Following {
         }
         (here - within.clamp_height(position)).norm() <= OFF_PATH_M
     }
+}
+
+/// Whether a piece of the way, a metre long, leads into what is closed, or further in: more than where a path that was
+/// searched for in voxels may cut a corner.
+fn leads_into_closed(from: &Vector3<f64>, to: &Vector3<f64>, map: &ClearanceMap) -> bool {
+    map.keep_out().is_some_and(|keep_out| {
+        let room_m = keep_out.room_m(to);
+        room_m < -CUTS_CORNERS_M && room_m < keep_out.room_m(from)
+    })
 }
 
 #[cfg(test)]

@@ -51,7 +51,7 @@ const LEAST_HEIGHT_M: f64 = 0.6;
 /// Beyond every map, m.
 const FAR_CORNER: Vector3<f64> = Vector3::new(1e9, 1e9, 1e9);
 /// Paths keep this far out of zones, m: what a vehicle strays from its path, the error of its position, and its hull.
-const ZONE_MARGIN_M: f64 = 1.0;
+pub const ZONE_MARGIN_M: f64 = 1.0;
 /// Paths keep this high above terrain that is known, m.
 const TERRAIN_CLEARANCE_M: f64 = 1.0;
 
@@ -159,6 +159,13 @@ impl Perception {
     #[must_use]
     pub fn with_keep_out(self, keep_out: KeepOut) -> Self {
         Self { map: self.map.with_keep_out(keep_out), ..self }
+    }
+
+    /// These places are known to be closed from now on, in place of those before.
+    pub fn close(&mut self, airspace: Airspace) {
+        let [margin_m, clearance_m] =
+            [ZONE_MARGIN_M, TERRAIN_CLEARANCE_M].map(|kept_m| kept_m + self.allows_for_m);
+        self.map.set_keep_out(KeepOut::new(airspace, margin_m, clearance_m));
     }
 
     /// Lets paths come as low and as high as these heights too, m ENU; where the map does not reach so far it is made

@@ -71,6 +71,8 @@ pub struct Planning {
     beyond: Beyond,
     /// Whether it is to take the place of a path that is flown meanwhile.
     extends: bool,
+    /// Who has fallen silent, for whoever asks why there is no path.
+    silent: String,
     /// The effort left to the search for a path in this tick.
     allowance: usize,
 }
@@ -94,6 +96,7 @@ impl Planning {
             goal: Vector3::zeros(),
             beyond: Beyond::Nothing,
             extends: false,
+            silent: String::new(),
             allowance: ALLOWANCE,
         }
     }
@@ -120,7 +123,7 @@ impl Planning {
         map: &mut ClearanceMap,
     ) -> Option<Report> {
         let Some(waypoint) = &mut course.waypoint else {
-            return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned() });
+            return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned(), zone: None });
         };
         self.extends = false;
         self.prepare(in_the_way, waypoint, within, motion, map);
@@ -175,6 +178,7 @@ impl Planning {
                 && (*disc - goal).xy().norm() > radius_m
                 && (*disc - motion.position).xy().norm() > radius_m
         };
+        self.silent = silent(neighbours);
         let discs = standing.iter().filter(in_the_way).map(|&centre| Disc { centre, radius_m });
         let ends = [start, goal];
         let in_its_way = movers.iter().filter(|_| is_stuck);
@@ -210,7 +214,7 @@ impl Planning {
             }
             Err(error) => {
                 course.following = None;
-                Report::Unplannable { leg, why: error.to_string() }
+                Report::Unplannable { leg, why: format!("{error}{}", self.silent), zone: None }
             }
         })
     }
@@ -272,7 +276,7 @@ impl Planning {
         motion: &'a Motion,
         ends: [Vector3<f64>; 2],
     ) -> impl Iterator<Item = Disc> + 'a {
-        let silent = neighbours.iter().filter(|neighbour| neighbour.armed && !neighbour.track.cooperative);
+        let silent = neighbours.iter().filter(|neighbour| neighbour.has_fallen_silent());
         silent.filter_map(move |neighbour| {
             let grown = separation::Neighbour { age_s: f64::INFINITY, ..neighbour.track };
             self.kept_clear_of(&grown, motion, ends)
@@ -289,6 +293,16 @@ impl Planning {
         let kept_m = separation::distance_kept_m(motion.position_sigma_m(), other, &self.filter);
         beside(other.position, kept_m + GHOST_SLACK_M, ends)
     }
+}
+
+/// The neighbours around whose ghosts a path is planned, as a reason why there is none; empty if there are none.
+fn silent(neighbours: &[Neighbour]) -> String {
+    let silent = neighbours.iter().filter(|neighbour| neighbour.has_fallen_silent());
+    let names: Vec<_> = silent.map(|neighbour| neighbour.node.to_string()).collect();
+    if names.is_empty() {
+        return String::new();
+    }
+    format!("; {} fell silent and may stand in the way", names.join(", "))
 }
 
 /// A disc that is smaller where the ends of the path would lie in it.

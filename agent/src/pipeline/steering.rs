@@ -128,6 +128,11 @@ impl Steering {
         self.forces
     }
 
+    /// Other places are closed than before: the place to hover at is looked for anew.
+    pub fn look_for_a_place(&mut self) {
+        self.hover_at = None;
+    }
+
     /// Every place that was placed by the vehicle's position moves with it, m.
     pub fn shift(&mut self, by: &Vector3<f64>) {
         for place in [&mut self.hover_at, &mut self.settles_at].into_iter().flatten() {
@@ -272,12 +277,13 @@ impl Steering {
     }
 }
 
-/// Where to hover instead of at `place`, if that is closed: the nearest place that is open and to which the way is
-/// free.
+/// Where to hover instead of at `place`, if that is closed: the nearest place that is open, to its side, above or below,
+/// and to which the way is free.
 fn open_place(place: &Vector3<f64>, from: &Vector3<f64>, map: &ClearanceMap) -> Vector3<f64> {
     let Some(keep_out) = map.keep_out() else { return *place };
-    let is_reached = |there: &Vector3<f64>| map.is_segment_clear(from, there, 0.0);
-    keep_out.nearest_open(place, is_reached).unwrap_or(*place)
+    let is_mapped = |there: &Vector3<f64>| map.voxels().index_of(there).is_some();
+    let is_reached = |there: &Vector3<f64>| is_mapped(there) && map.is_segment_clear(from, there, 0.0);
+    keep_out.way_out(place, is_reached).unwrap_or(*place)
 }
 
 /// Whether one place is closed and another is not.

@@ -48,6 +48,10 @@ pub enum Doubt {
     Late(Duration),
     /// There are no satellites any more.
     GpsLost,
+    /// The inertial unit is silent.
+    Unfelt,
+    /// No source has told the position for too long, or it has become too uncertain without one.
+    Alone,
 }
 
 impl fmt::Display for Doubt {
@@ -61,6 +65,8 @@ impl fmt::Display for Doubt {
             Self::Frozen => f.write_str("the position is frozen"),
             Self::Late(age) => write!(f, "the position is {:.1} s late", age.as_secs_f64()),
             Self::GpsLost => f.write_str("the autopilot has lost its satellites"),
+            Self::Unfelt => f.write_str("the autopilot tells nothing of its inertial unit"),
+            Self::Alone => f.write_str("nothing but inertia and flow has told the position for too long"),
         }
     }
 }

@@ -99,10 +99,10 @@ pub(super) fn guidance(me: &Me, legs: &[i64], hard: bool) -> Part {
     };
     let mut places = vec![
         new_leg(Place::new("nowhere").hears(me.any::<Plan>(), "planning for nowhere")),
-        new_leg(
-            Place::new("planning for nowhere")
-                .offers(me.event(Unplannable { leg: 0, why: "there is no waypoint".into() }), "nowhere"),
-        ),
+        new_leg(Place::new("planning for nowhere").offers(
+            me.event(Unplannable { leg: 0, why: "there is no waypoint".into(), zone: None }),
+            "nowhere",
+        )),
     ];
     for leg in legs {
         let [planning, following, blocked, arrived] =
@@ -112,7 +112,7 @@ pub(super) fn guidance(me: &Me, legs: &[i64], hard: bool) -> Part {
         let arrives = |place: Place| place.offers(me.event(Arrived { leg: *leg }), arrived.as_str());
         let planned = me.event(Planned { leg: *leg, length_m: 20.0 });
         let plans = Place::new(planning.as_str()).offers(planned.clone(), following.as_str());
-        let no_path = me.event(Unplannable { leg: *leg, why: "no path".into() });
+        let no_path = me.event(Unplannable { leg: *leg, why: "no path".into(), zone: None });
         let follows = arrives(place(&following));
         places.push(arrives(place(&to(*leg))));
         places.push(place(&arrived));

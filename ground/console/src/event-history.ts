@@ -19,6 +19,12 @@ export class EventHistory {
 
   constructor(private readonly most = MOST_EVENTS) {}
 
+  /** All that was heard is void. */
+  clear(): void {
+    this.events.length = 0;
+    this.known.clear();
+  }
+
   /** Adds what is not known yet (a station repeats its recent history on each connection), and returns just that. */
   add(events: readonly SwarmEvent[]): SwarmEvent[] {
     const fresh: SwarmEvent[] = [];

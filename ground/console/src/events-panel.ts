@@ -54,7 +54,13 @@ export class EventsPanel {
     this.showAll();
   }
 
-  add(events: readonly SwarmEvent[]): void {
+  /** `anew`: all that was heard before is void. */
+  add(events: readonly SwarmEvent[], anew = false): void {
+    if (anew) {
+      this.history.clear();
+      this.waiting = [];
+      this.showAll();
+    }
     const fresh = this.history.add(events);
     if (fresh.length === 0) return;
     if (this.waiting.length === 0) window.setTimeout(() => this.showFresh(), 50);

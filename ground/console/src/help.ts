@@ -10,6 +10,8 @@ const KEYS: [keys: string[], does: string][] = [
   [['B'], 'return: back home'],
   [['L'], 'land'],
   [['G'], 'go to: then click the ground'],
+  [['P'], 'play or pause a recording'],
+  [['Z'], 'draw a zone: click its corners on the ground'],
   [['1', '…', '9'], 'select a vehicle by its number (12: 1, then 2), with ⇧ add it'],
   [['0', 'A'], 'select all'],
   [['Esc'], 'leave a mode, then deselect'],

@@ -7,6 +7,7 @@ import { Commands } from './commands';
 import { Confirmation } from './confirmation';
 import { Connection, liveUrl } from './connection';
 import { html, part, setText } from './dom';
+import { Drawing } from './drawing';
 import { EventsPanel } from './events-panel';
 import { Help } from './help';
 import { HolderPanel } from './holder-panel';
@@ -18,16 +19,18 @@ import { Banner, Notices } from './notices';
 import { OrdersPanel } from './orders-panel';
 import { Person } from './person';
 import { Placing } from './placing';
-import type { ClientMessage, Command, Fleet, Point, Question, Scene, Script, ServerMessage } from './protocol';
+import type { ClientMessage, Command, Fleet, Point, Question, Scene, Script, ServerMessage, Zone } from './protocol';
 import { addresseeWords, Selection } from './selection';
 import { Theme } from './theme';
 import { VehiclesPanel } from './vehicles-panel';
 import { What } from './vocabulary';
 import { View } from './view/view';
 import { WhyPanel } from './why-panel';
+import { ReplayBar } from './replay-bar';
 import { showScript } from './script-dialog';
 import { ScriptsPanel } from './scripts-panel';
 import { TypedNumber } from './typed-number';
+import { ZonesPanel } from './zones-panel';
 import { clockWords, durationWords, orderName, outcomeWords, overWords } from './words';
 
 /** The station speaks ten times a second; after this long what is shown is no longer live. */
@@ -36,6 +39,9 @@ const STALE_MS = 2000;
 const GRACE_MS = 1500;
 /** An order that the station has not taken by then was probably not heard. */
 const ANSWER_MS = 3000;
+
+/** How requests about zones are called. */
+const ZONE = 'zone';
 
 /** An order that the station has not answered yet. */
 interface Sent {
@@ -47,7 +53,7 @@ interface Sent {
 const selection: Selection = new Selection(selectionChanged);
 const view = new View(part('view'), {
   picked: (name, more) => (more ? selection.toggle(name) : selection.pick(name)),
-  placed: goTo,
+  placed: (place) => (drawing.active ? drawing.add(rounded(place)) : goTo(place)),
 });
 const theme = new Theme(() => view.repaint());
 const vehicles = new VehiclesPanel(part('vehicles'), part('vehicles-note'), selection);
@@ -55,14 +61,26 @@ const events = new EventsPanel(part('events-head'), part('events'), selection);
 const why = new WhyPanel(part('why'), part('why-title'), part('why-note'), part('why-body'));
 const orders = new OrdersPanel(part('answers'));
 const scripts = new ScriptsPanel(part('vehicles'), withdraw, (file) => void readScript(file));
+const zonesPanel = new ZonesPanel(part('vehicles'), erase, () => drawing.set(!drawing.active, zones.map(({ zone }) => zone.name)));
 const notices = new Notices(part('notices'));
 const connectionBanner = new Banner(part('banners'), 'alert');
 const outcomeBanner = new Banner(part('banners'), 'status');
 const help = new Help(part('help-open'));
 const placing = new Placing(part('view').parentElement!, (on) => {
-  view.setPlacing(on);
+  if (on) drawing.set(false);
+  view.setPlacing(on || drawing.active);
   commands.setPlacing(on);
 });
+const drawing: Drawing = new Drawing(part('view').parentElement!, {
+  changed: (on, places, radius) => {
+    if (on) placing.set(false);
+    view.setPlacing(on || placing.active);
+    view.setDrawn(places, radius);
+    zonesPanel.setDrawing(on);
+  },
+  drawn: (zone) => person.named(What.load, () => send({ type: 'draw', tag: newTag(), zone })),
+});
+const replay = new ReplayBar(part('view').parentElement!, (wish) => send({ type: 'replay', tag: newTag(), ...wish }));
 const confirmation = new Confirmation();
 const commands = new Commands(part('commands'), {
   order: (what) => confirmed(what, () => order(what)),
@@ -81,6 +99,7 @@ const launch = new LaunchDialog(
 );
 
 let fleet: Fleet = { type: 'fleet', time_s: 0, outcome: null, vehicles: [] };
+let zones: Zone[] = [];
 /** Where the mission is recorded; empty while nobody says so. */
 let recording = '';
 const typed = new TypedNumber((number) => named(number) !== undefined);
@@ -110,8 +129,10 @@ listenToKeys(
     f: () => view.fit(),
     t: () => theme.toggle(),
     w: () => why.focus(),
+    p: () => replay.toggle(),
+    z: () => drawing.set(!drawing.active, zones.map(({ zone }) => zone.name)),
     '?': () => help.open(),
-    Escape: () => (placing.active ? placing.set(false) : selection.set([])),
+    Escape: () => (placing.active ? placing.set(false) : drawing.active ? drawing.set(false) : selection.set([])),
   },
   (digit, more) => {
     const number = typed.type(digit, performance.now());
@@ -137,7 +158,7 @@ function receive(message: ServerMessage): void {
     case 'you':
       settle(message.tag);
       person.hear(message);
-      commands.setRights((what) => person.mayNot(what));
+      showRights();
       showAddressees();
       break;
     case 'offer':
@@ -147,7 +168,21 @@ function receive(message: ServerMessage): void {
       orders.show(message.orders);
       break;
     case 'events':
-      events.add(message.events);
+      events.add(message.events, message.anew);
+      break;
+    case 'zones':
+      zones = message.zones;
+      zonesPanel.show(zones);
+      view.setZones(zones);
+      break;
+    case 'mapped':
+    case 'replayed':
+      settle(message.tag);
+      break;
+    case 'replay':
+      if (!replay.active) document.body.dataset.replay = '';
+      replay.show(message);
+      showRights();
       break;
     case 'why':
       why.show(message);
@@ -167,6 +202,10 @@ function receive(message: ServerMessage): void {
       break;
     }
   }
+}
+
+function showRights(): void {
+  commands.setRights((what) => (replay.active ? 'This is a recording: nobody is ordered anything' : person.mayNot(what)));
 }
 
 /** What whoever sits here must notice of who holds what. */
@@ -248,6 +287,10 @@ function withdraw(name: string, to: string[]): void {
   person.named(What.unload, () => send({ type: 'order', tag: newTag(), what: What.unload, name, to }));
 }
 
+function erase(name: string): void {
+  person.named(What.load, () => send({ type: 'erase', tag: newTag(), name }));
+}
+
 /** Asks the station what a script's file says. */
 async function readScript(file: File): Promise<void> {
   send({ type: 'read_script', tag: newTag(), file: file.name, text: await file.text() });
@@ -267,7 +310,7 @@ function newTag(): string {
 
 function send(request: Exclude<ClientMessage, Question>): void {
   const { tag } = request;
-  const what = request.type === 'order' ? request.what : request.type === 'hello' ? 'Your name' : What.load;
+  const what = request.type === 'order' ? request.what : request.type === 'hello' ? 'Your name' : request.type === 'read_script' ? What.load : request.type === 'replay' ? 'The recording' : ZONE;
   const point = 'point' in request ? request.point : undefined;
   if (!connection.send(request)) {
     notices.show(`${orderName(what)} was not sent: there is no connection to the station.`);
@@ -298,10 +341,14 @@ function goTo(place: [x: number, y: number]): void {
     notices.show('That place is outside the bounds.');
     return;
   }
-  const [x, y] = place.map((coordinate) => Math.round(coordinate * 100) / 100) as [number, number];
+  const [x, y] = rounded(place);
   const point: Point = [x, y, metres === null ? null : view.groundZ + metres];
   placing.set(false);
   order(What.goto, point);
+}
+
+function rounded(place: [x: number, y: number]): [x: number, y: number] {
+  return place.map((coordinate) => Math.round(coordinate * 100) / 100) as [number, number];
 }
 
 function connectionChanged(live: boolean, retryMs: number): void {
@@ -317,6 +364,7 @@ function connectionChanged(live: boolean, retryMs: number): void {
     launch.close();
     confirmation.close();
     placing.set(false);
+    drawing.set(false);
     const lost = [...unanswered.keys()].map(settle);
     if (lost.length > 0) notices.show('The connection was lost before the station answered the last order.');
   }
@@ -329,7 +377,7 @@ function showConnection(): void {
   const live = document.body.dataset.connection === 'live';
   const stale = live && silence > STALE_MS;
   document.body.classList.toggle('stale', !live || stale);
-  setText(part('connection'), !live ? (everLive ? 'Disconnected' : 'Connecting') : stale ? 'Silent' : 'Live');
+  setText(part('connection'), !live ? (everLive ? 'Disconnected' : 'Connecting') : stale ? 'Silent' : replay.active ? 'Recording' : 'Live');
   if (!live && fleet.outcome) {
     setText(part('connection'), 'Over');
     connectionBanner.show(overWords(fleet.outcome, names().length, recording), fleet.outcome.succeeded ? 'good' : 'warn');

@@ -5,6 +5,7 @@
  */
 
 import type { What } from './vocabulary';
+import type { ZoneTable } from './zone';
 
 export type AnswerView = { "state": "pending" } | { "state": "missing" } | { "state": "acknowledged", after_ms: number, } | { "state": "refused", why: string, };
 
@@ -59,7 +60,7 @@ state: string, value: string, advice: string, };
 /**
  * A message of a browser.
  */
-export type ClientMessage = { "type": "hello", tag: string | null, name: string, } | { "type": "order" } & OrderMessage | { "type": "why", vehicle: string | null, } | { "type": "read_script", tag: string | null, file: string, text: string, };
+export type ClientMessage = { "type": "hello", tag: string | null, name: string, } | { "type": "order" } & OrderMessage | { "type": "draw", tag: string | null, zone: ZoneTable, } | { "type": "erase", tag: string | null, name: string, } | { "type": "replay" } & ReplayMessage | { "type": "why", vehicle: string | null, } | { "type": "read_script", tag: string | null, file: string, text: string, };
 
 /**
  * An event that has happened.
@@ -113,6 +114,23 @@ export type OrderView = { id: number, by: string, what: string, script: string |
 export type OutcomeView = { succeeded: boolean, failed: { [key in string]: string }, };
 
 /**
+ * How a recording is to go on.
+ */
+export type ReplayMessage = { tag?: string,
+/**
+ * Whether it is to play.
+ */
+play?: boolean,
+/**
+ * Where to go to.
+ */
+at_s?: number,
+/**
+ * How many times as fast it is to play.
+ */
+speed?: number, };
+
+/**
  * Something that is requested.
  */
 export type Request = {
@@ -141,7 +159,15 @@ export type ServerMessage = { "type": "scene", fleet: string, station: string, s
 /**
  * The file in which the mission is recorded; empty if it is not.
  */
-recording: string, bounds: Bounds | null, obstacles: Array<Obstacle>, } | { "type": "fleet", time_s: number, outcome: OutcomeView | null, vehicles: Array<VehicleView>, } | { "type": "orders", orders: Array<OrderView>, } | { "type": "events", events: Array<EventView>, } | { "type": "why", headline: string, vehicle: string, time_s: number,
+recording: string, bounds: Bounds | null, obstacles: Array<Obstacle>, } | { "type": "fleet", time_s: number, outcome: OutcomeView | null, vehicles: Array<VehicleView>, } | { "type": "orders", orders: Array<OrderView>, } | { "type": "events", events: Array<EventView>,
+/**
+ * Whether all that was told before is void.
+ */
+anew: boolean, } | { "type": "replay", at_s: number, from_s: number, to_s: number, playing: boolean, speed: number,
+/**
+ * Whether it was brought to its end, and not cut short.
+ */
+complete: boolean, } | { "type": "zones", zones: Array<ZoneView>, } | { "type": "why", headline: string, vehicle: string, time_s: number,
 /**
  * Where it is and what it does; none of one that has not been heard.
  */
@@ -169,7 +195,7 @@ doubts: Array<string>, } | { "type": "you", tag: string | null, name: string | n
 /**
  * Whether a certificate says so; otherwise whoever sits there does.
  */
-certified: boolean, } | { "type": "offer", tag: string | null, token: string, what: string, lasts_s: number, vehicles: Array<CandidateView>, } | { "type": "ordered", tag: string | null, id: number, } | { "type": "script", tag: string | null, script: unknown, } | { "type": "error", tag: string | null, message: string, };
+certified: boolean, } | { "type": "offer", tag: string | null, token: string, what: string, lasts_s: number, vehicles: Array<CandidateView>, } | { "type": "ordered", tag: string | null, id: number, } | { "type": "mapped", tag: string | null, name: string, } | { "type": "replayed", tag: string | null, } | { "type": "script", tag: string | null, script: unknown, } | { "type": "error", tag: string | null, message: string, };
 
 /**
  * Where a vehicle is and what it does.
@@ -210,6 +236,10 @@ still_since_s: number | null, };
 
 export type StateView = { position: [number, number, number], velocity: [number, number, number], yaw_rad: number, radius_m: number, mode: string, armed: boolean, battery: number, task: string, waiting_for: string, mission: MissionView, path: Array<[number, number, number]>, scripts: Array<string>,
 /**
+ * The names of the zones that it has regard for.
+ */
+zones: Array<string>,
+/**
  * Whose orders it takes; empty while nobody holds it.
  */
 holder: string,
@@ -225,3 +255,9 @@ export type VehicleView = { name: string, heard: boolean, link: LinkView, notes:
  * Its checks before take-off.
  */
 checks: Array<CheckView>, };
+
+export type ZoneView = { zone: ZoneTable, by: string, time_s: number,
+/**
+ * Whether it is being removed; then a vehicle acknowledges that it has let it go.
+ */
+going: boolean, answers: { [key in string]: AnswerView }, };

@@ -7,7 +7,8 @@
  */
 
 import type * as station from './messages';
-import { What } from './vocabulary';
+import { What, ZoneKind } from './vocabulary';
+import type { ZoneTable } from './zone';
 
 /** The station's message of this type. */
 type Told<Type extends station.ServerMessage['type']> = Extract<station.ServerMessage, { type: Type }>;
@@ -45,6 +46,12 @@ export type Answer = Exclude<station.AnswerView, { state: 'acknowledged' }> | { 
 /** `script` is the one that it is about, or empty. */
 export type Order = With<station.OrderView, { script: string; answers: Record<string, Answer> }>;
 
+/** How a recording is played, which is shown in the place of a live swarm. */
+export type Replay = Told<'replay'>;
+
+/** Something drawn on the map. */
+export type Zone = With<station.ZoneView, { answers: Record<string, Answer> }>;
+
 export type SwarmEvent = station.EventView;
 
 export type Blocker = station.Blocker;
@@ -81,6 +88,10 @@ export type ServerMessage =
   | Fleet
   | With<Told<'orders'>, { orders: Order[] }>
   | Told<'events'>
+  | Replay
+  | With<Told<'replayed'>, { tag: string }>
+  | With<Told<'zones'>, { zones: Zone[] }>
+  | With<Told<'mapped'>, { tag: string }>
   | Why
   | You
   | Offer
@@ -114,7 +125,7 @@ export type Point = [x: number, y: number, z: number | null];
 export type Question = Asked<'why'>;
 
 /** What this console says. But for questions, all of it is answered under its tag. */
-export type ClientMessage = ((Asked<'order'> | Asked<'read_script'> | Asked<'hello'>) & { tag: string }) | Question;
+export type ClientMessage = ((Asked<'order'> | Asked<'read_script'> | Asked<'hello'> | Asked<'draw'> | Asked<'erase'> | Asked<'replay'>) & { tag: string }) | Question;
 
 /** Reads a message of the station; `null` if it is none that this console knows. */
 export function readMessage(text: string): ServerMessage | null {
@@ -138,7 +149,15 @@ export function readMessage(text: string): ServerMessage | null {
     case 'orders':
       return { type: 'orders', orders: list(json.orders, readOrder) };
     case 'events':
-      return { type: 'events', events: list(json.events, readEvent) };
+      return { type: 'events', events: list(json.events, readEvent), anew: json.anew === true };
+    case 'replay':
+      return readReplay(json);
+    case 'replayed':
+      return { type: 'replayed', tag: string(json.tag) };
+    case 'zones':
+      return { type: 'zones', zones: list(json.zones, readZone) };
+    case 'mapped':
+      return { type: 'mapped', tag: string(json.tag), name: string(json.name) };
     case 'why':
       return readWhy(json);
     case 'you':
@@ -230,6 +249,7 @@ function readVehicle(json: Raw<station.VehicleView | station.StateView>): Vehicl
     mission: json.mission === 'complete' || json.mission === 'failed' || json.mission === 'under_way' ? json.mission : null,
     path: Array.isArray(json.path) ? json.path.map(vector).filter((point) => point !== null) : [],
     scripts: strings(json.scripts),
+    zones: strings(json.zones),
     holder: string(json.holder),
     asked_by: string(json.asked_by),
     link: { alive: link.alive === true, age_ms: number(link.age_ms) },
@@ -276,15 +296,56 @@ function readOutcome(json: Raw<station.OutcomeView>): Outcome {
 function readOrder(json: Raw<station.OrderView>): Order | null {
   const id = number(json.id);
   if (id === null) return null;
-  const answers = isRecord(json.answers) ? json.answers : {};
   return {
     id,
     by: string(json.by),
     what: string(json.what),
     script: string(json.script),
     time_s: number(json.time_s) ?? 0,
-    answers: Object.fromEntries(Object.entries(answers).map(([name, answer]) => [name, readAnswer(answer)])),
+    answers: readAnswers(json.answers),
   };
+}
+
+function readAnswers(json: unknown): Record<string, Answer> {
+  const answers = isRecord(json) ? json : {};
+  return Object.fromEntries(Object.entries(answers).map(([name, answer]) => [name, readAnswer(answer)]));
+}
+
+function readReplay(json: Raw<Replay>): Replay {
+  const [from, to] = [number(json.from_s) ?? 0, number(json.to_s) ?? 0];
+  return {
+    type: 'replay',
+    at_s: number(json.at_s) ?? from,
+    from_s: from,
+    to_s: to,
+    playing: json.playing === true,
+    speed: number(json.speed) ?? 1,
+    complete: json.complete === true,
+  };
+}
+
+/** A zone of a kind that this console does not know cannot be shown. */
+function readZone(json: Raw<station.ZoneView>): Zone | null {
+  const table: Raw<ZoneTable> = isRecord(json.zone) ? json.zone : {};
+  const kind = Object.values(ZoneKind).find((known) => known === table.kind);
+  if (!kind || !string(table.name)) return null;
+  const numbers = ['radius_m', 'floor_m', 'ceiling_m', 'height_m', 'from_s', 'until_s'] as const;
+  const given = numbers.flatMap((field) => (number(table[field]) === null ? [] : [[field, number(table[field])]]));
+  const centre = place(table.centre_m);
+  const corners = Array.isArray(table.corners_m) ? table.corners_m.map(place).filter((corner) => corner !== null) : null;
+  const zone: ZoneTable = {
+    name: string(table.name),
+    kind,
+    ...(centre && { centre_m: centre }),
+    ...(corners && { corners_m: corners }),
+    ...Object.fromEntries(given),
+  };
+  return { zone, by: string(json.by), time_s: number(json.time_s) ?? 0, going: json.going === true, answers: readAnswers(json.answers) };
+}
+
+function place(json: unknown): [number, number] | null {
+  const [x, y] = Array.isArray(json) ? json.map(number) : [];
+  return x === null || x === undefined || y === null || y === undefined ? null : [x, y];
 }
 
 function readAnswer(json: unknown): Answer {

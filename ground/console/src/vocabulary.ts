@@ -23,6 +23,17 @@ export const What = {
 } as const;
 export type What = (typeof What)[keyof typeof What];
 
+/** What is drawn on the map. */
+export const ZoneKind = {
+  noFly: 'no_fly',
+  stayInside: 'stay_inside',
+  threat: 'threat',
+  notAbove: 'not_above',
+  notBelow: 'not_below',
+  rally: 'rally',
+} as const;
+export type ZoneKind = (typeof ZoneKind)[keyof typeof ZoneKind];
+
 /** These are decided for everyone, whoever is selected. */
 export const FOR_ALL: ReadonlySet<What> = new Set([What.launch, What.launchTogether, What.abort]);
 

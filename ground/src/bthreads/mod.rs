@@ -7,10 +7,12 @@ mod beside_delivery;
 mod delivery;
 mod hold;
 mod launch;
+mod lift;
 mod muster;
 pub mod roll_call;
 mod together;
 mod watch;
+mod zone_block;
 
 use skein_bp::Program;
 
@@ -18,10 +20,12 @@ pub use beside_delivery::BesideDelivery;
 pub use delivery::{Delivery, GOING_LASTS};
 pub use hold::Hold;
 pub use launch::Launch;
+pub use lift::LiftZone;
 pub use muster::Muster;
 pub use roll_call::RollCall;
 pub use together::{LAUNCH_LASTS, Together};
 pub use watch::{MissionOutcome, Watch};
+pub use zone_block::ZoneBlock;
 
 use crate::config::GroundConfig;
 

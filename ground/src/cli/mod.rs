@@ -5,9 +5,12 @@ mod certificates;
 mod explain;
 mod order;
 mod recording;
+mod replay;
 mod serve;
 mod status;
+mod zone;
 
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -53,6 +56,17 @@ enum Command {
     Order(order::OrderCommand),
     /// Say where each vehicle of a station that runs is, what it does and for whom it waits.
     Status(caller::Call),
+    /// Draw no-fly zones, fences, threats, limits of height and rally points for all vehicles, list and remove them.
+    #[command(subcommand)]
+    Zone(zone::ZoneCommand),
+    /// Play a recorded mission in the console, with a time line; with --json print what it came to.
+    Replay {
+        /// The recording, such as mission.mcap; one that was cut short is played as far as it goes.
+        file: PathBuf,
+        /// Where to serve the console; port 0 is any free one.
+        #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8700")]
+        console: SocketAddr,
+    },
     /// Explain why vehicles of a recorded mission moved or stood still: who requested what, who blocked it, and what
     /// would have to change.
     Explain {
@@ -80,6 +94,8 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
         }
         Command::Certificates(args) => certificates::run(args, cli.json),
         Command::Status(call) => status::run(call, cli.json),
+        Command::Replay { file, console } => replay::run(file, *console, cli.json),
+        Command::Zone(command) => zone::run(command, cli.json),
         Command::Order(order) => order::run(order, cli.json),
         Command::Explain { file, at, vehicle } => explain::run(file, *at, vehicle.as_deref(), cli.json),
     };

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant, SystemTime};
 use anyhow::Context as _;
 use skein_dbp::Happened;
 use skein_dbp::facts::{DiskFails, DiskWorks};
-use skein_disk::{Memory, Number};
+use skein_disk::{Background, ListStore, Memory, Number};
 use skein_wire::event::Declared as _;
 use skein_wire::{Key, Payload, Scene};
 use skein_zenoh::{Complaints, ZenohConfig, ZenohLink, ZenohSession};
@@ -107,7 +107,18 @@ impl Station {
             config.station.vehicles.len()
         );
         tracing::info!("console: {}", console.url());
-        let mut core = GroundCore::durable(config.station, memory.promises);
+        let (zone_store, zones) = ListStore::of_zones(&config.state, &config.station.name);
+        let lost_zones = zones.map(|zones| config.station.zones = zones).err();
+        let zone_store = Background::new(zone_store, {
+            let bell = link.bell();
+            move || bell.ring()
+        })?;
+        let mut core =
+            GroundCore::durable(config.station, memory.promises).keeping_zones(Box::new(zone_store));
+        if let Some(lost) = lost_zones {
+            tracing::error!("{lost}");
+            core.note_disk("former zones", Some(&lost.to_string()));
+        }
         if let Some(lost) = memory.lost {
             tracing::error!("{lost}");
             let why = format!(

@@ -9,10 +9,11 @@ use tokio::task::JoinSet;
 use tokio::time::timeout;
 
 use super::feed::Message;
-use super::request::{self, Granted, Mailbox, OrderMessage, Request};
+use super::request::{self, Granted, Mailbox, OrderMessage, Request, Wanted};
 use super::session::Session;
 use super::subscription::{Pictures, Question, Reasons, Subscription, Text};
 use super::token;
+use crate::giver::Giver;
 
 /// A browser that takes nothing for this long is let go.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -149,6 +150,15 @@ async fn answer(
         }
         Ok(Request::Script(script)) => say(socket, &Message::Script { tag, script }).await,
         Ok(Request::Order(order)) => give(socket, session, tag, *order, mailbox).await,
+        Ok(Request::Map(wanted)) => change_map(socket, session, tag, wanted, mailbox).await,
+        Ok(Request::Replay(message)) => {
+            let by = session.name().cloned().unwrap_or_else(Giver::looking_on);
+            let granted = granted(by, Wanted::Replay(message), mailbox).await;
+            match granted {
+                Ok(granted) => say(socket, &Message::granted(tag, &granted)).await,
+                Err(message) => say(socket, &Message::Error { tag, message }).await,
+            }
+        }
         Ok(Request::Hello(name)) => {
             let answer = match session.introduce(&name) {
                 Ok(()) => Message::you(session, tag),
@@ -168,8 +178,24 @@ async fn give(
     mailbox: &Mailbox,
 ) -> Result<(), Gone> {
     match wish(session, order, mailbox).await {
-        Ok(Granted::Ordered(id)) => say(socket, &Message::Ordered { tag, id }).await,
-        Ok(Granted::Offered(offer)) => say(socket, &Message::offer(tag, &offer)).await,
+        Ok(granted) => say(socket, &Message::granted(tag, &granted)).await,
+        Err(message) => say(socket, &Message::Error { tag, message }).await,
+    }
+}
+
+async fn change_map(
+    socket: &mut WebSocket,
+    session: &Session,
+    tag: Option<String>,
+    wanted: Wanted,
+    mailbox: &Mailbox,
+) -> Result<(), Gone> {
+    let granted = match session.drawer() {
+        Ok(by) => granted(by, wanted, mailbox).await,
+        Err(message) => Err(message),
+    };
+    match granted {
+        Ok(granted) => say(socket, &Message::granted(tag, &granted)).await,
         Err(message) => say(socket, &Message::Error { tag, message }).await,
     }
 }
@@ -177,6 +203,10 @@ async fn give(
 /// What the station makes of a request. Rights are looked at before anything else is.
 async fn wish(session: &Session, order: OrderMessage, mailbox: &Mailbox) -> Result<Granted, String> {
     let by = session.giver(order.what)?;
-    let given = mailbox.put(by, order.wanted(token::random)?)?.await;
+    granted(by, order.wanted(token::random)?, mailbox).await
+}
+
+async fn granted(by: Giver, wanted: Wanted, mailbox: &Mailbox) -> Result<Granted, String> {
+    let given = mailbox.put(by, wanted)?.await;
     given.map_err(|_| "the station is ending".to_owned())?.map_err(|refusal| refusal.to_string())
 }

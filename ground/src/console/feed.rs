@@ -14,8 +14,9 @@ use skein_bp::{Event, Value};
 use skein_dbp::facts::Stalled;
 use skein_dbp::{Happened, NodeName, Peer};
 use skein_wire::event::{Advance, Declared as _, Homeward, What};
-use skein_wire::{Check, Form, MissionState, Scene, SenderStats, State};
+use skein_wire::{Check, Form, MissionState, Scene, SenderStats, Solid, State, Zone};
 
+use super::request::Granted;
 use super::session::{Role, Session};
 use super::subscription::{Broadcast, Subscription, Text};
 use crate::core::GroundCore;
@@ -23,6 +24,8 @@ use crate::explain::Explanation;
 use crate::giver::Giver;
 use crate::launch_offer::{Candidate, LaunchOffer, OFFER_LASTS};
 use crate::order_log::{Answer, OrderRecord};
+use crate::replay::{Moment, Replay};
+use crate::zone_log::ZoneRecord;
 
 /// The swarm is shown this often.
 const FLEET_PERIOD: Duration = Duration::from_millis(100);
@@ -35,6 +38,9 @@ pub(super) struct Feed {
     fleet_due: Duration,
     reasons_due: Duration,
     orders_shown: Option<u64>,
+    zones_shown: Option<u64>,
+    /// Of a recording, how often time had jumped.
+    jumps_shown: Option<u64>,
     /// The file in which the mission is recorded; empty if it is not.
     pub(super) recording: String,
 }
@@ -64,6 +70,22 @@ pub(super) enum Message<'a> {
     },
     Events {
         events: Vec<EventView<'a>>,
+        /// Whether all that was told before is void.
+        anew: bool,
+    },
+    /// How a recording is played, which is shown in the place of a live swarm.
+    Replay {
+        at_s: f64,
+        from_s: f64,
+        to_s: f64,
+        playing: bool,
+        speed: f64,
+        /// Whether it was brought to its end, and not cut short.
+        complete: bool,
+    },
+    /// What is drawn on the map.
+    Zones {
+        zones: Vec<ZoneView<'a>>,
     },
     Why {
         headline: String,
@@ -90,6 +112,15 @@ pub(super) enum Message<'a> {
     Ordered {
         tag: Option<String>,
         id: u64,
+    },
+    /// The zone of this name is drawn, or being removed.
+    Mapped {
+        tag: Option<String>,
+        name: &'a str,
+    },
+    /// A recording goes on as wished.
+    Replayed {
+        tag: Option<String>,
     },
     /// A script as its file says it.
     Script {
@@ -183,6 +214,8 @@ pub(super) struct StateView<'a> {
     mission: MissionView,
     path: Vec<[f64; 3]>,
     scripts: &'a [String],
+    /// The names of the zones that it has regard for.
+    zones: &'a [String],
     /// Whose orders it takes; empty while nobody holds it.
     holder: &'a str,
     /// Who asks the holder for it; empty if nobody does.
@@ -221,6 +254,18 @@ pub(super) struct OrderView<'a> {
 
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct ZoneView<'a> {
+    #[cfg_attr(test, ts(type = "ZoneTable"))]
+    zone: &'a Zone,
+    by: &'a str,
+    time_s: f64,
+    /// Whether it is being removed; then a vehicle acknowledges that it has let it go.
+    going: bool,
+    answers: BTreeMap<&'a str, AnswerView<'a>>,
+}
+
+#[derive(Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(tag = "state", rename_all = "snake_case")]
 pub(super) enum AnswerView<'a> {
     Pending,
@@ -250,22 +295,15 @@ impl Feed {
             fleet_due: Duration::ZERO,
             reasons_due: Duration::ZERO,
             orders_shown: None,
+            zones_shown: None,
+            jumps_shown: None,
             recording: String::new(),
         };
         (feed, subscription)
     }
 
     pub(super) fn show_scene(&mut self, station: &GroundCore, scene: Option<&Scene>) {
-        let solids = scene.iter().flat_map(|scene| &scene.solids);
-        let obstacles = solids.map(|solid| Obstacle {
-            form: match solid.form {
-                Form::Box(size) => FormView::Box { size: size.into() },
-                Form::Cylinder { radius, height } => FormView::Cylinder { radius, height },
-                Form::Sphere { radius } => FormView::Sphere { radius },
-            },
-            position: solid.pose.translation.vector.into(),
-            orientation: solid.pose.rotation.coords.into(),
-        });
+        let obstacles = scene.iter().flat_map(|scene| &scene.solids).map(obstacle);
         let message = Message::Scene {
             fleet: station.node().fleet().as_str(),
             station: station.name().as_str(),
@@ -283,6 +321,11 @@ impl Feed {
             self.orders_shown = Some(station.orders_revision());
             let orders = station.orders().map(order_view).collect();
             self.browsers.show("orders", Message::Orders { orders }.text());
+        }
+        if self.zones_shown != Some(station.zones_revision()) {
+            self.zones_shown = Some(station.zones_revision());
+            let zones = station.zones().map(zone_view).collect();
+            self.browsers.show("zones", Message::Zones { zones }.text());
         }
         if now >= self.fleet_due {
             self.fleet_due = now + FLEET_PERIOD;
@@ -319,11 +362,105 @@ impl Feed {
             self.browsers.tell(&told, Message::events(told.iter().copied()).text());
         }
     }
+
+    /// Shows where a recording is now.
+    pub(super) fn show_replay(&mut self, replay: &mut Replay) {
+        let has_jumped =
+            self.jumps_shown.replace(replay.jumps()).is_some_and(|jumps| jumps != replay.jumps());
+        let happened = replay.take_happened();
+        if has_jumped {
+            self.browsers.forget();
+            self.browsers.tell(&[], Message::Events { events: Vec::new(), anew: true }.text());
+        }
+        let vehicles = || replay.moment().states.keys();
+        let station = happened.iter().map(|happened| &happened.home).find(|home| home.kind() == "ground");
+        if let Some(station) = station.or(vehicles().next()).cloned() {
+            self.publish_events(&station, &happened);
+        }
+        let Moment { states, zones, .. } = replay.moment();
+        let vehicles = states.iter().map(|(name, (_, state))| recorded_view(replay, name, state)).collect();
+        let at_s = replay.at().as_secs_f64();
+        self.browsers.show("fleet", Message::Fleet { time_s: at_s, outcome: None, vehicles }.text());
+        let zones = zones.values().map(|(at, by, zone)| recorded_zone(states, *at, by, zone)).collect();
+        self.browsers.show_new("zones", Message::Zones { zones }.text());
+        self.browsers.show_new("scene", self.scene_of(replay).text());
+        let (from, to) = replay.span();
+        let message = Message::Replay {
+            at_s,
+            from_s: from.as_secs_f64(),
+            to_s: to.as_secs_f64(),
+            playing: replay.is_playing(),
+            speed: replay.speed(),
+            complete: replay.is_complete(),
+        };
+        self.browsers.show_new("replay", message.text());
+        self.explain_recorded(replay);
+    }
+
+    fn scene_of(&self, replay: &Replay) -> Message<'_> {
+        Message::Scene {
+            fleet: "a recording",
+            station: "",
+            software: env!("CARGO_PKG_VERSION"),
+            recording: &self.recording,
+            bounds: None,
+            obstacles: replay.moment().solids.iter().map(obstacle).collect(),
+        }
+    }
+
+    fn explain_recorded(&self, replay: &Replay) {
+        let why = |vehicle: NodeName| {
+            let explanation = replay.explain(&vehicle)?;
+            Some((vehicle, Message::Why { headline: explanation.headline(), explanation }.text()))
+        };
+        let asked = self.browsers.asked();
+        if !asked.is_empty() {
+            self.browsers.explain(asked.into_iter().filter_map(why).collect());
+        }
+    }
+}
+
+fn recorded_view<'a>(replay: &Replay, name: &'a NodeName, state: &'a State) -> VehicleView<'a> {
+    VehicleView {
+        name: name.as_str(),
+        heard: true,
+        link: LinkView { alive: replay.is_heard(name), age_ms: None },
+        notes: Vec::new(),
+        checks: Vec::new(),
+        state: Some(state_view(state)),
+    }
+}
+
+/// A zone of a recording: each vehicle has said itself whether it has regard for it.
+fn recorded_zone<'a>(
+    states: &'a BTreeMap<NodeName, (Duration, State)>,
+    at: Duration,
+    by: &'a str,
+    zone: &'a Zone,
+) -> ZoneView<'a> {
+    let answer = |state: &State| match state.zones.iter().any(|name| name == zone.name()) {
+        true => AnswerView::Acknowledged { after_ms: 0.0 },
+        false => AnswerView::Pending,
+    };
+    let answers = states.iter().map(|(vehicle, (_, state))| (vehicle.as_str(), answer(state))).collect();
+    ZoneView { zone, by, time_s: at.as_secs_f64(), going: false, answers }
+}
+
+fn obstacle(solid: &Solid) -> Obstacle {
+    Obstacle {
+        form: match solid.form {
+            Form::Box(size) => FormView::Box { size: size.into() },
+            Form::Cylinder { radius, height } => FormView::Cylinder { radius, height },
+            Form::Sphere { radius } => FormView::Sphere { radius },
+        },
+        position: solid.pose.translation.vector.into(),
+        orientation: solid.pose.rotation.coords.into(),
+    }
 }
 
 impl<'a> Message<'a> {
     pub(super) fn events(happened: impl Iterator<Item = &'a Happened>) -> Self {
-        Self::Events { events: happened.map(event_view).collect() }
+        Self::Events { events: happened.map(event_view).collect(), anew: false }
     }
 
     pub(super) fn you(session: &'a Session, tag: Option<String>) -> Self {
@@ -331,7 +468,16 @@ impl<'a> Message<'a> {
         Self::You { tag, name, role: session.role(), certified: session.is_certified() }
     }
 
-    pub(super) fn offer(tag: Option<String>, offer: &'a LaunchOffer) -> Self {
+    pub(super) fn granted(tag: Option<String>, granted: &'a Granted) -> Self {
+        match granted {
+            Granted::Ordered(id) => Self::Ordered { tag, id: *id },
+            Granted::Offered(offer) => Self::offer(tag, offer),
+            Granted::Mapped(name) => Self::Mapped { tag, name },
+            Granted::Replayed => Self::Replayed { tag },
+        }
+    }
+
+    fn offer(tag: Option<String>, offer: &'a LaunchOffer) -> Self {
         let view = |Candidate { vehicle, task, doubts }: &'a Candidate| CandidateView {
             name: vehicle.as_str(),
             task,
@@ -449,25 +595,40 @@ fn state_view(state: &State) -> StateView<'_> {
         },
         path: state.path.iter().map(array).collect(),
         scripts: &state.scripts,
+        zones: &state.zones,
         holder: &state.holder,
         asked_by: &state.asked_by,
     }
 }
 
-fn order_view(record: &OrderRecord) -> OrderView<'_> {
-    let answer = |answer| match answer {
+fn answer_views(answers: &BTreeMap<NodeName, Answer>) -> BTreeMap<&str, AnswerView<'_>> {
+    let view = |answer| match answer {
         &Answer::Pending => AnswerView::Pending,
         &Answer::Missing => AnswerView::Missing,
         &Answer::Acknowledged(after) => AnswerView::Acknowledged { after_ms: after.as_secs_f64() * 1000.0 },
         Answer::Refused(why) => AnswerView::Refused { why },
     };
+    answers.iter().map(|(vehicle, said)| (vehicle.as_str(), view(said))).collect()
+}
+
+fn zone_view(record: &ZoneRecord) -> ZoneView<'_> {
+    ZoneView {
+        zone: &record.zone,
+        by: record.by.as_str(),
+        time_s: record.at.as_secs_f64(),
+        going: record.is_going,
+        answers: answer_views(&record.answers),
+    }
+}
+
+fn order_view(record: &OrderRecord) -> OrderView<'_> {
     OrderView {
         id: record.id,
         by: record.by.as_str(),
         what: record.order.what().word(),
         script: record.order.script(),
         time_s: record.at.as_secs_f64(),
-        answers: record.answers.iter().map(|(vehicle, said)| (vehicle.as_str(), answer(said))).collect(),
+        answers: answer_views(&record.answers),
     }
 }
 

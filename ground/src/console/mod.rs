@@ -36,6 +36,7 @@ pub use self::tls::{ConsoleSecurity, ConsoleSecurityError};
 use self::{feed::Feed, request::Mailbox, subscription::Present};
 use crate::core::GroundCore;
 use crate::giver::Giver;
+use crate::replay::Replay;
 
 /// So many orders may wait for the station's loop.
 const ORDERS_WAITING: usize = 64;
@@ -114,6 +115,11 @@ impl Console {
     /// Shows what is so now, and what has `happened` since the last call.
     pub fn publish(&mut self, now: Duration, station: &GroundCore, happened: &[Happened]) {
         self.feed.publish(now, station, happened);
+    }
+
+    /// Shows where a recording is now, in the place of a live swarm.
+    pub fn show_replay(&mut self, replay: &mut Replay) {
+        self.feed.show_replay(replay);
     }
 
     /// What operators have wished for since the last call: see [`Wish::carry_out`].

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
+use std::time::Duration;
 
 use serde::Deserialize;
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_dbp::NodeName;
-use skein_wire::Route;
 use skein_wire::event::{OrderGiven, What};
+use skein_wire::{Route, Zone, ZoneTable};
 use tokio::sync::oneshot;
 
 use crate::core::GroundCore;
@@ -15,6 +16,7 @@ use crate::giver::Giver;
 use crate::launch_offer::LaunchOffer;
 use crate::order::{Destination, Order, SentScript, Who};
 use crate::refusal::Refusal;
+use crate::replay::Replay;
 
 /// What somebody wants of the station.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +26,12 @@ pub(super) enum Wanted {
     Offer(What, String),
     /// The launch that was offered under this token.
     Launch(String),
+    /// That a zone is drawn.
+    Draw(Zone),
+    /// That the zone of this name is removed.
+    Erase(String),
+    /// That a recording goes on otherwise.
+    Replay(ReplayMessage),
 }
 
 /// What somebody wants, on its way to the station.
@@ -42,6 +50,10 @@ pub(super) enum Granted {
     /// The number under which it has given an order.
     Ordered(u64),
     Offered(LaunchOffer),
+    /// The zone of this name is drawn, or being removed.
+    Mapped(String),
+    /// The recording goes on as wished.
+    Replayed,
 }
 
 impl Wish {
@@ -52,6 +64,32 @@ impl Wish {
             Wanted::Order(order) => station.order(&by, &order).map(Granted::Ordered),
             Wanted::Offer(what, token) => station.offer_launch(&by, what, token).map(Granted::Offered),
             Wanted::Launch(token) => station.launch(&by, &token).map(Granted::Ordered),
+            Wanted::Draw(zone) => {
+                let name = zone.name().to_owned();
+                station.draw(&by, zone).map(|()| Granted::Mapped(name))
+            }
+            Wanted::Erase(name) => station.erase(&by, &name).map(|()| Granted::Mapped(name)),
+            Wanted::Replay(_) => Err(Refusal::NotRecorded),
+        };
+        // Who asked may have closed the page.
+        let _ = answer.send(granted);
+    }
+}
+
+impl Wish {
+    /// Has a recording go on as is wished; nobody is ordered anything by it.
+    pub fn carry_out_on(self, replay: &mut Replay) {
+        let Self { wanted, answer, .. } = self;
+        let granted = match wanted {
+            Wanted::Replay(ReplayMessage { play, at_s, speed, .. }) => {
+                if let Some(at) = at_s.and_then(|at_s| Duration::try_from_secs_f64(at_s).ok()) {
+                    replay.seek(at);
+                }
+                speed.into_iter().for_each(|speed| replay.set_speed(speed));
+                play.into_iter().for_each(|play| replay.play(play));
+                Ok(Granted::Replayed)
+            }
+            _ => Err(Refusal::Recorded),
         };
         // Who asked may have closed the page.
         let _ = answer.send(granted);
@@ -64,6 +102,9 @@ impl std::fmt::Display for Wish {
             Wanted::Order(order) => write!(f, "{} orders {} for {}", self.by, order.what(), order.who()),
             Wanted::Offer(what, _) => write!(f, "{} asks what {what} would launch", self.by),
             Wanted::Launch(_) => write!(f, "{} confirms a launch", self.by),
+            Wanted::Draw(zone) => write!(f, "{} draws the zone {}", self.by, zone.name()),
+            Wanted::Erase(name) => write!(f, "{} removes the zone {name}", self.by),
+            Wanted::Replay(_) => write!(f, "{} wants the recording to go on otherwise", self.by),
         }
     }
 }
@@ -96,6 +137,10 @@ pub(super) enum Request {
     Hello(String),
     /// That something is done. It is read when it is known that whoever asks may.
     Order(Box<OrderMessage>),
+    /// That something of the map is changed.
+    Map(Wanted),
+    /// That a recording goes on otherwise.
+    Replay(ReplayMessage),
     /// To be told why this vehicle does what it does, from now on; none: nothing more.
     Why(Option<NodeName>),
     /// To be told what a script's file says: its purpose and its parameters.
@@ -114,6 +159,18 @@ pub(super) enum Message {
         name: String,
     },
     Order(Box<OrderMessage>),
+    /// Draws a zone for all vehicles, or draws the one of its name anew.
+    Draw {
+        tag: Option<String>,
+        #[cfg_attr(test, ts(type = "ZoneTable"))]
+        zone: ZoneTable,
+    },
+    /// Removes a zone.
+    Erase {
+        tag: Option<String>,
+        name: String,
+    },
+    Replay(ReplayMessage),
     Why {
         #[cfg_attr(test, ts(type = "string | null"))]
         vehicle: Option<NodeName>,
@@ -123,6 +180,27 @@ pub(super) enum Message {
         file: String,
         text: String,
     },
+}
+
+/// How a recording is to go on.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+pub(super) struct ReplayMessage {
+    #[serde(default)]
+    #[cfg_attr(test, ts(optional))]
+    tag: Option<String>,
+    /// Whether it is to play.
+    #[serde(default)]
+    #[cfg_attr(test, ts(optional))]
+    play: Option<bool>,
+    /// Where to go to.
+    #[serde(default)]
+    #[cfg_attr(test, ts(optional))]
+    at_s: Option<f64>,
+    /// How many times as fast it is to play.
+    #[serde(default)]
+    #[cfg_attr(test, ts(optional))]
+    speed: Option<f64>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -195,6 +273,12 @@ pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
     match serde_json::from_str::<Message>(text) {
         Ok(Message::Hello { tag, name }) => (tag, Ok(Request::Hello(name))),
         Ok(Message::Order(message)) => (message.tag.clone(), Ok(Request::Order(message))),
+        Ok(Message::Draw { tag, zone }) => {
+            let zone = Zone::try_from(zone).map_err(|error| format!("`zone`: {error}"));
+            (tag, zone.map(|zone| Request::Map(Wanted::Draw(zone))))
+        }
+        Ok(Message::Replay(message)) => (message.tag.clone(), Ok(Request::Replay(message))),
+        Ok(Message::Erase { tag, name }) => (tag, Ok(Request::Map(Wanted::Erase(name)))),
         Ok(Message::Why { vehicle }) => (None, Ok(Request::Why(vehicle))),
         Ok(Message::ReadScript { tag, file, text }) => {
             let script = ScriptFile::parse(&file, &text).map_err(|error| error.to_string());
@@ -372,6 +456,12 @@ mod tests {
             (r#"{"type":"order","what":"give","to":"all","name":"a/b"}"#, "names no person"),
             (r#"{"type":"order","what":"hold","to":"all","token":"7"}"#, "takes no `token`"),
             (r#"{"type":"hello"}"#, "`name`"),
+            (r#"{"type":"draw","zone":{"name":"a","kind":"moat"}}"#, "unknown variant `moat`"),
+            (
+                r#"{"type":"draw","zone":{"name":"a","kind":"threat","centre_m":[0,0],"radius_m":-1}}"#,
+                "`zone`: `radius_m` is -1.0: expected",
+            ),
+            (r#"{"type":"erase"}"#, "`name`"),
             (
                 r#"{"type":"order","what":"load","to":"all","script":{"script":{"name":"a","about":"","body":[{"dance":1}]}}}"#,
                 "a: `body[0]` unknown field `dance`",

@@ -140,6 +140,19 @@ impl Session {
     }
 }
 
+impl Session {
+    /// Who draws on the map, and removes from it, if they may.
+    pub(super) fn drawer(&self) -> Result<Giver, String> {
+        let role = self.role();
+        if role != Role::Operator {
+            return Err(format!("to draw zones is beyond your role, {}: ask an operator", role.word()));
+        }
+        self.name.clone().ok_or_else(|| {
+            "a zone needs to know who draws or removes it: say {\"type\":\"hello\",\"name\":\"...\"} first".into()
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -158,6 +171,14 @@ mod tests {
             assert_eq!(session(Some(("Sam", Role::Safety))).giver(what).is_ok(), stops, "{what}");
             assert!(session(Some(("Anna", Role::Operator))).giver(what).is_ok(), "{what}");
         }
+    }
+
+    #[test]
+    fn only_an_operator_who_is_known_draws_zones() {
+        for (role, draws) in [(Role::Observer, false), (Role::Safety, false), (Role::Operator, true)] {
+            assert_eq!(session(Some(("Anna", role))).drawer().is_ok(), draws);
+        }
+        assert!(session(None).drawer().unwrap_err().contains("hello"));
     }
 
     #[test]

@@ -103,6 +103,14 @@ impl Broadcast {
         self.pictures.send_modify(|pictures| drop(pictures.insert(kind, picture)));
     }
 
+    /// The same, if it is another than that.
+    pub(super) fn show_new(&self, kind: &'static str, picture: Text) {
+        let is_new = self.pictures.borrow().get(kind).is_none_or(|shown| *shown != picture);
+        if is_new {
+            self.show(kind, picture);
+        }
+    }
+
     /// Tells what has happened, now and to browsers that come later.
     pub(super) fn tell(&self, happened: &[&Happened], text: Text) {
         let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
@@ -112,6 +120,11 @@ impl Broadcast {
         drop(history);
         // Nobody watches: that is no error.
         let _ = self.events.send(text);
+    }
+
+    /// What was told is void: browsers that come later are not told of it.
+    pub(super) fn forget(&self) {
+        self.history.lock().unwrap_or_else(PoisonError::into_inner).clear();
     }
 
     /// The vehicles that somebody asks about.

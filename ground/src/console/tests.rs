@@ -35,7 +35,7 @@ fn the_console_has_the_messages_in_typescript() {
     declarations.visit::<feed::StateView<'static>>();
     declarations.visit::<request::Message>();
     let head = format!(
-        "/**\n * Station and console say these to each other. Made from the station's types in `ground/src`; to make it anew:\n *\n *     {REFRESH}\n */\n\nimport type {{ What }} from './vocabulary';\n\n"
+        "/**\n * Station and console say these to each other. Made from the station's types in `ground/src`; to make it anew:\n *\n *     {REFRESH}\n */\n\nimport type {{ What }} from './vocabulary';\nimport type {{ ZoneTable }} from './zone';\n\n"
     );
     let declared = declarations.found.into_values().collect::<Vec<_>>().join("\n");
     let text: String = (head + &declared).lines().map(|line| line.trim_end().to_owned() + "\n").collect();

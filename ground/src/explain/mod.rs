@@ -40,6 +40,7 @@ use skein_wire::{Limits, MissionState};
 
 pub use self::evidence::Evidence;
 pub use self::explanation::{Blocker, Change, EventNote, Explanation, Request, Situation};
+pub(crate) use self::recorded::Note;
 pub use self::recorded::{Recorded, RecordedError};
 
 use self::evidence::Noted;

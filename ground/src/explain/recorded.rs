@@ -3,14 +3,17 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use foxglove::messages::{FrameTransform, FrameTransforms, SceneUpdate};
 use mcap::McapError;
+use nalgebra::Vector3;
 use prost::Message as _;
-use skein_dbp::{Board, Happened};
+use skein_dbp::{Board, Happened, NodeName};
 use skein_wire::proto::{self, TraceEvent};
-use skein_wire::{DecodeError, State};
+use skein_wire::{DecodeError, Solid, State};
 
 use super::Evidence;
 use super::messages::Messages;
+use crate::recorder::drawing;
 
 /// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -30,10 +33,17 @@ pub struct Recorded {
     complete: bool,
 }
 
-enum Note {
+/// One message of a recording.
+pub(crate) enum Note {
     State(Box<State>),
     Board(Board),
     Event(Happened),
+    /// Where vehicles were, ENU, metres.
+    Places(Vec<(NodeName, Vector3<f64>)>),
+    /// What stands in the world.
+    Solids(Vec<Solid>),
+    /// The way ahead of a vehicle, ENU, metres.
+    Path(NodeName, Vec<Vector3<f64>>),
 }
 
 impl Recorded {
@@ -65,11 +75,13 @@ impl Recorded {
             };
             let at = Duration::from_nanos(header.log_time);
             recorded.span = (recorded.span.0.min(at), recorded.span.1.max(at));
-            let note = note(messages.schema(&header), &data).map_err(|cause| RecordedError::Message {
-                path: path.to_owned(),
-                topic: messages.topic(&header).unwrap_or_default().to_owned(),
-                at_s: at.as_secs_f64(),
-                cause,
+            let note = note(messages.schema(&header), messages.topic(&header), &data).map_err(|cause| {
+                RecordedError::Message {
+                    path: path.to_owned(),
+                    topic: messages.topic(&header).unwrap_or_default().to_owned(),
+                    at_s: at.as_secs_f64(),
+                    cause,
+                }
             })?;
             recorded.notes.extend(note.map(|note| (at, note)));
         }
@@ -95,6 +107,11 @@ impl Recorded {
         self.notes.iter().any(|(_, note)| matches!(note, Note::Board(_)))
     }
 
+    /// What it holds, in order, each with its time.
+    pub(crate) fn notes(&self) -> &[(Duration, Note)] {
+        &self.notes
+    }
+
     pub fn evidence_at(&self, at: Duration) -> Evidence {
         let mut evidence = Evidence::default();
         for (_, note) in &self.notes {
@@ -107,6 +124,7 @@ impl Recorded {
                 Note::State(state) => evidence.note_state(*when, state),
                 Note::Board(board) => evidence.note_board(*when, board.clone()),
                 Note::Event(happened) => evidence.note_event(happened.clone()),
+                Note::Places(_) | Note::Solids(_) | Note::Path(..) => {}
             }
         }
         evidence
@@ -118,11 +136,37 @@ fn ends_as_it_should(file: &[u8]) -> bool {
     file.get(mcap::MAGIC.len()..).is_some_and(|rest| rest.ends_with(mcap::MAGIC))
 }
 
-fn note(schema: Option<&str>, data: &[u8]) -> Result<Option<Note>, DecodeError> {
+fn note(schema: Option<&str>, topic: Option<&str>, data: &[u8]) -> Result<Option<Note>, DecodeError> {
     Ok(match schema {
         Some("skein.State") => Some(Note::State(Box::new(proto::State::decode(data)?.try_into()?))),
         Some("skein.Board") => Some(Note::Board(proto::Board::decode(data)?.try_into()?)),
         Some("skein.TraceEvent") => Some(Note::Event(TraceEvent::decode(data)?.try_into()?)),
+        Some("foxglove.FrameTransforms") => Some(Note::Places(places(&FrameTransforms::decode(data)?))),
+        Some("foxglove.SceneUpdate") => drawn(topic.unwrap_or_default(), SceneUpdate::decode(data)?),
         _ => None,
     })
+}
+
+fn places(transforms: &FrameTransforms) -> Vec<(NodeName, Vector3<f64>)> {
+    let place = |transform: &FrameTransform| {
+        let place = drawing::plain(transform.translation.as_ref()?);
+        Some((NodeName::new(&transform.child_frame_id).ok()?, place)).filter(|(_, place)| is_finite(place))
+    };
+    transforms.transforms.iter().filter_map(place).collect()
+}
+
+/// What stands in the world, or the way of a vehicle.
+fn drawn(topic: &str, update: SceneUpdate) -> Option<Note> {
+    let entity = update.entities.first()?;
+    if topic == "/scene" {
+        return (entity.id == drawing::OBSTACLES).then(|| Note::Solids(drawing::solids(entity)));
+    }
+    let vehicle = topic.strip_prefix('/')?.strip_suffix("/path")?;
+    let points = entity.lines.iter().flat_map(|line| &line.points);
+    let points = points.map(|point| Vector3::new(point.x, point.y, point.z)).filter(is_finite);
+    Some(Note::Path(NodeName::new(vehicle).ok()?, points.collect()))
+}
+
+fn is_finite(place: &Vector3<f64>) -> bool {
+    place.iter().all(|metres| metres.is_finite())
 }

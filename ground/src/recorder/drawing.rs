@@ -14,8 +14,11 @@ const TEXT: Color = Color { r: 1.0, g: 1.0, b: 1.0, a: 1.0 };
 const PATH_THICKNESS_M: f64 = 0.05;
 const TEXT_HEIGHT_M: f64 = 0.4;
 
+/// The entity of all obstacles.
+pub const OBSTACLES: &str = "obstacles";
+
 pub fn obstacles(timestamp: Timestamp, solids: &[Solid]) -> SceneEntity {
-    let mut entity = entity(timestamp, WORLD, "obstacles");
+    let mut entity = entity(timestamp, WORLD, OBSTACLES);
     for solid in solids {
         let (pose, color) = (Some(pose(&solid.pose)), Some(OBSTACLE));
         match solid.form {
@@ -34,6 +37,32 @@ pub fn obstacles(timestamp: Timestamp, solids: &[Solid]) -> SceneEntity {
         }
     }
     entity
+}
+
+/// The obstacles of an entity that [`obstacles`] has made; what has no place or size is left out.
+pub fn solids(entity: &SceneEntity) -> Vec<Solid> {
+    let solid = |at: &Option<Pose>, form| Some(Solid { form, pose: plain_pose(at.as_ref()?)? });
+    let cubes =
+        entity.cubes.iter().filter_map(|cube| solid(&cube.pose, Form::Box(plain(cube.size.as_ref()?))));
+    let cylinders = entity.cylinders.iter().filter_map(|cylinder| {
+        let size = cylinder.size.as_ref()?;
+        solid(&cylinder.pose, Form::Cylinder { radius: size.x / 2.0, height: size.z })
+    });
+    let spheres = entity
+        .spheres
+        .iter()
+        .filter_map(|sphere| solid(&sphere.pose, Form::Sphere { radius: sphere.size.as_ref()?.x / 2.0 }));
+    cubes.chain(cylinders).chain(spheres).collect()
+}
+
+pub fn plain(v: &Vector) -> Vector3<f64> {
+    Vector3::new(v.x, v.y, v.z)
+}
+
+fn plain_pose(pose: &Pose) -> Option<Isometry3<f64>> {
+    let (place, turn) = (plain(pose.position.as_ref()?), pose.orientation.as_ref()?);
+    let turn = UnitQuaternion::try_new(nalgebra::Quaternion::new(turn.w, turn.x, turn.y, turn.z), 1e-6)?;
+    place.iter().all(|metres| metres.is_finite()).then(|| Isometry3::from_parts(place.into(), turn))
 }
 
 /// A vehicle's hull, fixed to its frame, with its name over it.

@@ -15,7 +15,7 @@
 //! Times are the run's, from 0, so that equal runs make equal files. Each second of it is a chunk of its own: a process
 //! that is killed leaves all but its last second.
 
-mod drawing;
+pub(crate) mod drawing;
 
 use std::collections::BTreeMap;
 use std::fs::File;

@@ -320,6 +320,12 @@ impl Node {
         self.guest.kept_by(bthread, self.clock.now(), self.config.lease)
     }
 
+    /// What each b-thread of another node blocks here, as it was asked for; of that the part counts that concerns this
+    /// home, and may be blocked from afar.
+    pub fn blocks_from_afar(&self) -> impl Iterator<Item = (&NodeName, &str, &EventSet)> {
+        self.home.table.blocks()
+    }
+
     /// The b-threads that request, block and wait for the events of a set, and behind each remote one its node and the
     /// age of its lease: `node.explain("uav/3/takeoff")`.
     pub fn explain(&self, question: impl Into<EventSet>) -> NodeExplanation {

@@ -2,7 +2,8 @@
 //!
 //! - [`next_incarnation`]: the number by which others tell a node's lives apart;
 //! - [`PromiseStore`]: what a node has promised to others ([`skein_dbp::Kept`]);
-//! - [`ScriptStore`]: the scripts that a vehicle was sent ([`skein_wire::KeptScript`]).
+//! - [`ListStore`]: the scripts that a vehicle was sent ([`skein_wire::KeptScript`]), the zones that a station has
+//!   drawn ([`skein_wire::KeptZone`]).
 //!
 //! [`Memory`] opens all that a life begins with. Libraries read no file: they know the seam
 //! [`skein_wire::Store`]. Programs open these files and hand them over, each behind a thread of its own
@@ -12,17 +13,17 @@
 
 mod background;
 mod incarnation;
+mod lists;
 mod lost;
 mod memory;
 mod node_file;
 mod promises;
 mod room;
-mod scripts;
 
 pub use background::Background;
 pub use incarnation::{Incarnation, IncarnationError, IncarnationStore, next_incarnation};
+pub use lists::ListStore;
 pub use lost::Lost;
 pub use memory::{Memory, MemoryError, Number};
 pub use promises::PromiseStore;
 pub use room::{RESERVE, Room};
-pub use scripts::ScriptStore;

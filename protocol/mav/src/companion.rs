@@ -12,18 +12,21 @@ use std::time::Duration;
 
 use mavlink::dialects::common::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavState, MavType,
+    SET_GPS_GLOBAL_ORIGIN_DATA,
 };
 use mavlink::{MavlinkVersion, Message};
 
 use crate::command::{Command, CommandResult};
 use crate::dialect::Dialect;
 use crate::event::MavEvent;
+use crate::external::External;
 use crate::frame::{Address, Frame, FrameReader, FrameWriter};
-use crate::geodesy::Datum;
+use crate::geodesy::{Datum, LocalFrame};
+use crate::measured::Measured;
 use crate::mission::MissionItem;
 use crate::parameter::{MAX_NAME_LEN, ParameterValue};
 use crate::set_point::SetPoint;
-use crate::telemetry::Telemetry;
+use crate::telemetry::{Stamped, Telemetry};
 use commands::{Commands, Purpose};
 use missions::{Missions, Wanted};
 use parameters::Parameters;
@@ -34,6 +37,10 @@ use subscriptions::Subscriptions;
 const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
 /// An autopilot that goes on in MAVLink 1 for so long, while it is written to in 2, is answered in 1.
 const ONLY_MAVLINK_1: Duration = Duration::from_secs(3);
+/// The origin is told this often to an autopilot that has none.
+const ORIGIN_INTERVAL: Duration = Duration::from_secs(1);
+/// Readings of instruments that are kept until they are taken.
+const MOST_MEASURED: usize = 256;
 /// MAVLink's component id for the first companion computer.
 const ONBOARD_COMPUTER: u8 = 191;
 
@@ -46,12 +53,14 @@ pub struct CompanionConfig {
     pub component_id: u8,
     /// Datum of the world's ENU frame.
     pub datum: Datum,
+    /// Whether the autopilot is asked for what its instruments measure: see [`Companion::take_measured`].
+    pub wants_measured: bool,
 }
 
 impl CompanionConfig {
     /// The companion computer of the vehicle `system_id`.
     pub fn new(system_id: u8, datum: Datum) -> Self {
-        Self { system_id, component_id: ONBOARD_COMPUTER, datum }
+        Self { system_id, component_id: ONBOARD_COMPUTER, datum, wants_measured: false }
     }
 }
 
@@ -92,6 +101,9 @@ pub struct Companion {
     only_listens: bool,
     /// See [`Dialect::set_point`].
     kept_yaw: Option<f64>,
+    datum: Datum,
+    measured: Vec<Stamped<Measured>>,
+    next_origin: Duration,
 }
 
 impl Companion {
@@ -106,7 +118,7 @@ impl Companion {
             }),
             reports: Reports::new(config.datum),
             commands: Commands::default(),
-            subscriptions: Subscriptions::default(),
+            subscriptions: Subscriptions::new(config.wants_measured),
             parameters: Parameters::default(),
             missions: Missions::default(),
             events: VecDeque::new(),
@@ -114,6 +126,9 @@ impl Companion {
             mavlink_1_since: None,
             only_listens: false,
             kept_yaw: None,
+            datum: config.datum,
+            measured: Vec::new(),
+            next_origin: Duration::ZERO,
         }
     }
 
@@ -214,6 +229,34 @@ impl Companion {
             self.writer.write(message);
         }
         message.is_some()
+    }
+
+    /// Tells the autopilot an estimate of its motion that it may fly by; and to one that knows of no origin, where that
+    /// is: at the datum. Returns whether it was sent.
+    pub fn external(&mut self, now: Duration, external: &External) -> bool {
+        if self.telemetry().last_heartbeat.is_none() || self.only_listens {
+            return false;
+        }
+        let origin = self.datum.place();
+        if self.reports.local_frame().is_none() && now >= self.next_origin {
+            self.next_origin = now + ORIGIN_INTERVAL;
+            self.writer.write(&SET_GPS_GLOBAL_ORIGIN_DATA {
+                target_system: self.autopilot.system_id,
+                latitude: origin.latitude_e7(),
+                longitude: origin.longitude_e7(),
+                altitude: origin.height_mm(),
+                time_usec: now.as_micros() as u64,
+            });
+        }
+        let to_be = LocalFrame::new(&self.datum, &origin);
+        let local = self.reports.local_frame().unwrap_or(&to_be);
+        self.reports.dialect.external(now, external, local, &mut self.writer)
+    }
+
+    /// Takes what the autopilot's instruments have measured since the last call, oldest first, each with its time as
+    /// near as the clocks are known. Empty unless [`CompanionConfig::wants_measured`].
+    pub fn take_measured(&mut self) -> Vec<Stamped<Measured>> {
+        std::mem::take(&mut self.measured)
     }
 
     /// The dialect of the autopilot's make, as its heartbeats say.
@@ -318,7 +361,14 @@ impl Companion {
             message if for_me => {
                 self.events.extend(self.missions.receive(now, message, self.autopilot, &mut self.writer));
             }
-            message => self.reports.hear(now, message, &mut self.events),
+            message => match Measured::read(message) {
+                Some((time, value)) if self.measured.len() < MOST_MEASURED => {
+                    let age = self.reports.clock.age(now, time).unwrap_or_default();
+                    self.measured.push(Stamped { stamp: now.saturating_sub(age), value });
+                }
+                Some(_) => {}
+                None => self.reports.hear(now, message, &mut self.events),
+            },
         }
     }
 }

@@ -7,7 +7,10 @@ use mavlink::MessageData as _;
 use mavlink::dialects::common::{COMMAND_LONG_DATA, ESTIMATOR_STATUS_DATA, HEARTBEAT_DATA, MavCmd};
 
 use crate::command::{Command, CommandResult};
+use crate::external::External;
 use crate::failsafe::Failsafe;
+use crate::frame::FrameWriter;
+use crate::geodesy::LocalFrame;
 use crate::handling::Handling;
 use crate::mode::FlightMode;
 use crate::parameter::ParameterEncoding;
@@ -67,6 +70,18 @@ pub trait Dialect: std::fmt::Debug + Send + Sync {
         _kept_yaw: &mut Option<f64>,
     ) -> Option<SetPoint> {
         None
+    }
+
+    /// Writes what tells the autopilot an estimate of its motion, at `time` on the companion's clock. Returns whether it
+    /// did: not if a number is none.
+    fn external(
+        &self,
+        time: Duration,
+        external: &External,
+        local: &LocalFrame,
+        output: &mut FrameWriter,
+    ) -> bool {
+        external.odometry(time, local).map(|odometry| output.write(&odometry)).is_some()
     }
 
     /// The message that tells how good the estimate is.

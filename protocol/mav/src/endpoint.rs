@@ -1,6 +1,7 @@
 //! The autopilot's end of the link.
 
 mod calls;
+mod felt;
 mod missions;
 mod parameter_table;
 mod parameters;
@@ -13,25 +14,28 @@ use std::time::Duration;
 
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    AUTOPILOT_VERSION_DATA, COMMAND_ACK_DATA, EXTENDED_SYS_STATE_DATA, GPS_GLOBAL_ORIGIN_DATA,
-    HEARTBEAT_DATA, HOME_POSITION_DATA, LOG_ENTRY_DATA, MANUAL_CONTROL_DATA, MESSAGE_INTERVAL_DATA,
-    MISSION_CURRENT_DATA, MISSION_ITEM_REACHED_DATA, MISSION_REQUEST_DATA, MISSION_REQUEST_INT_DATA, MavCmd,
-    MavMessage, MavModeFlag, PARAM_SET_DATA, PING_DATA, PROTOCOL_VERSION_DATA, SET_MODE_DATA,
-    STATUSTEXT_DATA, TIMESYNC_DATA,
+    AUTOPILOT_VERSION_DATA, COMMAND_ACK_DATA, DISTANCE_SENSOR_DATA, EXTENDED_SYS_STATE_DATA,
+    GPS_GLOBAL_ORIGIN_DATA, HEARTBEAT_DATA, HIGHRES_IMU_DATA, HOME_POSITION_DATA, LOG_ENTRY_DATA,
+    MANUAL_CONTROL_DATA, MESSAGE_INTERVAL_DATA, MISSION_CURRENT_DATA, MISSION_ITEM_REACHED_DATA,
+    MISSION_REQUEST_DATA, MISSION_REQUEST_INT_DATA, MavCmd, MavMessage, MavModeFlag, OPTICAL_FLOW_RAD_DATA,
+    PARAM_SET_DATA, PING_DATA, PROTOCOL_VERSION_DATA, SET_MODE_DATA, STATUSTEXT_DATA, TIMESYNC_DATA,
 };
 use mavlink::types::CharArray;
 use nalgebra::Vector3;
 
 use crate::command::CommandResult;
 use crate::dialects::px4;
+use crate::external::External;
 use crate::frame::{Address, Frame, FrameReader, FrameWriter};
 use crate::geodesy::{Datum, Geodetic, LocalFrame};
+use crate::measured::Measured;
 use crate::mission::MissionItem;
 use crate::mode::FlightMode;
 use crate::set_point::SetPoint;
 use crate::telemetry::{Landed, Severity};
 use crate::unparsed::{Unparsed, Want, write_unsupported};
 use calls::{Call, Novelty, Remembered};
+use felt::Felt;
 use missions::{Changed, Missions, whole};
 pub use parameter_table::{Parameter, ParameterError, ParameterTable};
 use parameters::Parameters;
@@ -76,6 +80,7 @@ pub struct Endpoint {
     reader: FrameReader,
     writer: FrameWriter,
     streams: Streams,
+    felt: Felt,
     parameters: Parameters,
     missions: Missions,
     remembered: Remembered,
@@ -121,6 +126,7 @@ impl Endpoint {
             reader: FrameReader::default(),
             writer: FrameWriter::new(Address::autopilot(config.system_id)),
             streams: Streams::default(),
+            felt: Felt::default(),
             parameters: Parameters::new(config.parameters),
             missions: Missions::new(config.accepts_item, config.accepts_fence, config.accepts_rally),
             remembered: Remembered::default(),
@@ -134,7 +140,7 @@ impl Endpoint {
     pub fn receive(&mut self, now: Duration, bytes: &[u8]) {
         self.reader.push(bytes);
         while let Some(frame) = self.reader.next_frame() {
-            if self.writer.sender().is_addressed_by(&frame.message) {
+            if self.concerns(&frame) {
                 self.handle(now, &frame);
             }
         }
@@ -143,6 +149,14 @@ impl Endpoint {
                 self.refuse(&unparsed);
             }
         }
+    }
+
+    /// Whether a frame is for this autopilot: an estimate has no address, and comes from its own vehicle.
+    fn concerns(&self, frame: &Frame) -> bool {
+        let own = self.writer.sender();
+        let is_own_estimate =
+            matches!(frame.message, MavMessage::ODOMETRY(_)) && frame.sender.system_id == own.system_id;
+        is_own_estimate || own.is_addressed_by(&frame.message)
     }
 
     /// Answers what could not be read whole: the command is not known.
@@ -187,7 +201,27 @@ impl Endpoint {
         for message_id in self.asked_once.drain(..) {
             report.write(message_id, &mut self.writer);
         }
-        self.streams.for_each_due(now, |message_id| report.write(message_id, &mut self.writer));
+        let time = now.saturating_sub(self.booted);
+        self.streams.for_each_due(now, |message_id| match message_id {
+            HIGHRES_IMU_DATA::ID => self.felt.write(time, &mut self.writer),
+            _ => report.write(message_id, &mut self.writer),
+        });
+    }
+
+    /// Takes in what an instrument has measured by `now`, for who asks for that. To be called at each step of the
+    /// inertial unit, before [`Endpoint::report`].
+    pub fn measure(&mut self, now: Duration, measured: &Measured) {
+        let time = now.saturating_sub(self.booted);
+        match measured {
+            Measured::Inertial(inertial) => self.felt.take_in(inertial),
+            Measured::Flow(flow) if self.streams.is_on(OPTICAL_FLOW_RAD_DATA::ID) => {
+                self.writer.write(&flow.encode(time, &self.felt.rate()));
+            }
+            Measured::Distance(distance) if self.streams.is_on(DISTANCE_SENSOR_DATA::ID) => {
+                self.writer.write(&distance.encode(time));
+            }
+            Measured::Flow(_) | Measured::Distance(_) => {}
+        }
     }
 
     /// Puts the origin of the local frame `moved` off the datum, ENU, m, and tells so.
@@ -261,6 +295,11 @@ impl Endpoint {
             MavMessage::SET_POSITION_TARGET_LOCAL_NED(message) => {
                 if let Some(set_point) = SetPoint::decode(message, &self.local) {
                     self.push(Request::SetPoint { set_point, from });
+                }
+            }
+            MavMessage::ODOMETRY(message) => {
+                if let Some(external) = External::read(message, &self.local) {
+                    self.push(Request::External(Box::new(external)));
                 }
             }
             MavMessage::MANUAL_CONTROL(message) => self.on_sticks(message),

@@ -37,10 +37,12 @@ mod dialects;
 mod ekf_status;
 mod endpoint;
 mod event;
+mod external;
 mod failsafe;
 mod frame;
 mod geodesy;
 mod handling;
+mod measured;
 mod mission;
 mod mode;
 mod parameter;
@@ -60,11 +62,13 @@ pub use endpoint::{
     VehicleState,
 };
 pub use event::MavEvent;
+pub use external::External;
 pub use failsafe::Failsafe;
 pub use frame::{Address, Frame, FrameReader, FrameWriter};
 pub use geodesy::{Datum, Geodetic, LocalFrame};
 pub use handling::Handling;
 pub use mavlink::dialects::common as messages;
+pub use measured::{Distance, Flow, Inertial, Measured};
 pub use mission::{MAX_ITEMS, MissionError, MissionItem};
 pub use mode::FlightMode;
 pub use parameter::{ParameterEncoding, ParameterValue};

@@ -4,6 +4,7 @@
 
 mod ardupilot;
 mod dialects;
+mod estimates;
 mod frames;
 mod geodesy;
 mod habits;

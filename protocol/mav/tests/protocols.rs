@@ -44,7 +44,12 @@ fn telemetry_arrives_in_the_world_frame() {
 /// A companion that hears an autopilot tell these batteries, each by its id with its charge in per cent, one a second.
 fn companion_told(batteries: &[(u8, i8)]) -> Companion {
     let mut autopilot = FrameWriter::new(Address { system_id: 3, component_id: 1 });
-    let mut companion = Companion::new(CompanionConfig { system_id: 3, component_id: 191, datum: datum() });
+    let mut companion = Companion::new(CompanionConfig {
+        system_id: 3,
+        component_id: 191,
+        datum: datum(),
+        wants_measured: false,
+    });
     for (second, (id, battery_remaining)) in (0..).zip(batteries) {
         autopilot.write(&BATTERY_STATUS_DATA {
             id: *id,

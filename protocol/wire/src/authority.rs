@@ -4,8 +4,8 @@ use skein_bp::EventSet;
 use skein_dbp::{Authority, Grant, Lift, NewRoster, NodeName, Role, Roster};
 
 use crate::event::{
-    Abort, Advance, Enter, Events as _, Goto, Handover, Launch, Load, OrderTaken, SWARM, Takeoff, Unload,
-    of_every_vehicle,
+    Abort, Advance, Disregard, Enter, Events as _, Goto, Handover, Launch, Load, OrderTaken, SWARM, Takeoff,
+    Unload, of_every_vehicle,
 };
 
 /// First chunk of a vehicle's name.
@@ -17,7 +17,7 @@ pub fn joint_roster<'a>(ground: NodeName, fleet: impl IntoIterator<Item = &'a No
     Roster::first(ground, vehicles)
 }
 
-/// Ground stations and operators' scripts order and hold vehicles, change the roster and lift blocks. Ground stations
+/// Ground stations and operators' scripts order and hold vehicles, draw zones, change the roster and lift blocks. Ground stations
 /// alone launch, for a launch takes two messages there. Vehicles
 /// claim passages from one another, keep a joint launch back until they are ready, and may call one off.
 pub fn standard_authority() -> Authority {
@@ -25,7 +25,7 @@ pub fn standard_authority() -> Authority {
     let orders = |of_vehicle: EventSet| of_vehicle.or(NewRoster::any_of("*/*")).or(Lift::any_of("*/*"));
     let station = Grant {
         request: orders(of_every_vehicle::<(Takeoff, OrderTaken, Handover, Load, Unload)>()).or(joint()),
-        block: of_every_vehicle::<(Takeoff, Goto, Advance)>().or(Enter::any_of("*/*")).or(joint()),
+        block: of_every_vehicle::<(Takeoff, Goto, Advance, Disregard)>().or(Enter::any_of("*/*")).or(joint()),
     };
     let operator = Grant {
         request: orders(of_every_vehicle::<(OrderTaken, Handover, Load, Unload)>()).or(Abort::any_of(SWARM)),

@@ -45,6 +45,7 @@ mod share;
 mod store;
 mod trace;
 mod vehicle_link;
+mod zone;
 
 /// The compiled `proto/skein.proto`, a `FileDescriptorSet`: the schema to put beside recorded messages.
 pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/skein.bin"));
@@ -62,5 +63,6 @@ pub use proto::{MAX_PAYLOAD, VERSION};
 pub use route::{Route, UnfitRoute};
 pub use saver::Saver;
 pub use skein_dbp::{NodeName, NodeNameError};
-pub use store::{KeptScript, MemoryStore, Saving, Store};
+pub use store::{KeptScript, KeptZone, MemoryStore, Saving, Store};
 pub use vehicle_link::VehicleLink;
+pub use zone::{Outline, UnfitZone, Zone, ZoneTable};

@@ -55,6 +55,18 @@ impl Limits {
         limits
     }
 
+    /// These limits, and one more that `whose` states.
+    #[must_use]
+    pub fn with(mut self, whose: &str, limit: &Limit) -> Self {
+        self.tighten(whose, limit);
+        self
+    }
+
+    /// `whose` has stated a limit that cannot be read: no place is within all limits.
+    pub fn note_unreadable(&mut self, whose: &str) {
+        self.unreadable = Some(whose.into());
+    }
+
     fn tighten(&mut self, whose: &str, limit: &Limit) {
         let &Limit { speed_m_s, min_x, min_y, min_z, max_x, max_y, max_z } = limit;
         at_most(&mut self.speed, speed_m_s, whose);

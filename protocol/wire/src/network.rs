@@ -22,6 +22,8 @@ pub struct NetworkConfig {
     pub duplicate: f64,
     /// Probability that it may overtake others, or be overtaken; the rest stays in order between two nodes.
     pub reorder: f64,
+    /// Two nodes that have a place hear one another within so many metres; everywhere, if there is no range.
+    pub range_m: Option<f64>,
 }
 
 impl Default for NetworkConfig {
@@ -32,6 +34,7 @@ impl Default for NetworkConfig {
             loss: 0.0,
             duplicate: 0.0,
             reorder: 0.0,
+            range_m: None,
         }
     }
 }
@@ -90,6 +93,8 @@ struct Air {
     ports: BTreeMap<u64, Port>,
     /// Group of each node that a partition named; the others are a group of their own.
     groups: BTreeMap<NodeName, usize>,
+    /// Where nodes are, m.
+    places: BTreeMap<NodeName, [f64; 3]>,
     stats: NetworkStats,
 }
 
@@ -116,6 +121,7 @@ impl Network {
             next_message: 0,
             ports: BTreeMap::new(),
             groups: BTreeMap::new(),
+            places: BTreeMap::new(),
             stats: NetworkStats::default(),
         })))
     }
@@ -167,6 +173,11 @@ impl Network {
         self.lock().groups.clear();
     }
 
+    /// Places a node, m: what has none reaches everyone, whatever the range.
+    pub fn place(&self, node: &NodeName, place: [f64; 3]) {
+        self.lock().places.insert(node.clone(), place);
+    }
+
     pub fn stats(&self) -> NetworkStats {
         self.lock().stats
     }
@@ -207,10 +218,7 @@ impl Air {
             .map(|(id, _)| *id)
             .collect();
         for to in receivers {
-            let reachable = self
-                .ports
-                .get(&to)
-                .is_some_and(|port| self.groups.get(&port.node) == self.groups.get(&sender));
+            let reachable = self.ports.get(&to).is_some_and(|port| self.reaches(&sender, &port.node));
             // The same draws whether or not there is a way, so that a partition changes nothing else.
             let lost = self.rng.random::<f64>() < self.config.loss;
             let copies = 1 + u64::from(self.rng.random::<f64>() < self.config.duplicate);
@@ -231,6 +239,17 @@ impl Air {
                 self.stats.lost += 1;
             }
         }
+    }
+
+    fn reaches(&self, from: &NodeName, to: &NodeName) -> bool {
+        let is_in_range = |range_m: f64| match (self.places.get(from), self.places.get(to)) {
+            (Some(from), Some(to)) => {
+                let squared: f64 = from.iter().zip(to).map(|(from, to)| (from - to).powi(2)).sum();
+                squared <= range_m * range_m
+            }
+            _ => true,
+        };
+        self.groups.get(from) == self.groups.get(to) && self.config.range_m.is_none_or(is_in_range)
     }
 
     /// When a message put now arrives, and whether it overtakes others.

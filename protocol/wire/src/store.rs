@@ -7,7 +7,10 @@ use serde::{Deserialize, Serialize};
 use skein_bp::script::Assignment;
 use skein_dbp::Kept;
 
-/// Keeps what must not be forgotten: a node's promises ([`Kept`]), or the scripts that it was sent ([`KeptScript`]).
+use crate::zone::Zone;
+
+/// Keeps what must not be forgotten: a node's promises ([`Kept`]), the scripts that it was sent ([`KeptScript`]), or the
+/// zones that it has drawn ([`KeptZone`]).
 pub trait Store<T = Kept>: Debug + Send {
     /// Keeps `kept` in place of what was kept before, so that it is still there after a crash. One that takes
     /// its time is asked again with the same value until it is done, or has failed; asked after that, it
@@ -34,6 +37,15 @@ pub struct KeptScript {
     pub from: String,
     /// The script, and the values of its parameters.
     pub assignment: Assignment,
+}
+
+/// A zone that a station has drawn.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KeptZone {
+    /// The person or program that has drawn it.
+    pub by: String,
+    pub zone: Zone,
 }
 
 /// Keeps in memory: for runs on one host, where a node's life ends but not the process.

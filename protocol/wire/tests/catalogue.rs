@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 use skein_wire::event::{
-    Abort, Advance, Catalogue, Declared as _, Handover, Homeward, Launch, OrderTaken, ScriptNews, What, Whose,
+    Abort, Advance, Catalogue, Declared as _, Handover, Homeward, Launch, OrderTaken, ScriptNews, What,
+    Whose, ZoneKind,
 };
 use skein_wire::event::{Declaration, Load, MOTION, PlanReason, ScriptState, Situation, Unload};
 
@@ -59,6 +60,7 @@ fn the_console_knows_the_orders() {
         )
     };
     text += &list("What", What::WORDS);
+    text += &format!("\n/** What is drawn on the map. */\n{}", list("ZoneKind", ZoneKind::WORDS));
     let mut set = |name: &str, about: &str, is_so: fn(What) -> bool| {
         let words: Vec<String> =
             What::those(is_so).map(|what| format!("What.{}", camel(what.word()))).collect();
@@ -146,9 +148,12 @@ fn what_a_vehicle_takes_and_its_own_are_as_they_were() {
     };
     let catalogue = Catalogue::standard();
     assert_eq!(named(&mut catalogue.gateway()), ["order", "handover", "load", "unload"]);
-    assert_eq!(catalogue.own().count(), 50);
+    assert_eq!(catalogue.own().count(), 53);
     let others = catalogue.of_vehicle().filter(|event| event.whose == Whose::Anyone);
-    assert_eq!(named(&mut { others }), ["takeoff", "goto", "advance", "enter", "complete", "failed"]);
+    assert_eq!(
+        named(&mut { others }),
+        ["takeoff", "goto", "advance", "enter", "fly_by", "complete", "failed", "disregard"]
+    );
     assert_eq!([Launch::NAME, Abort::NAME], [What::Launch.word(), What::Abort.word()]);
 }
 

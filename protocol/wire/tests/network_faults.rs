@@ -54,6 +54,23 @@ fn faults_come_at_their_rates_and_from_the_seed() {
 }
 
 #[test]
+fn nodes_with_a_place_hear_one_another_within_range_only() {
+    let config = NetworkConfig { range_m: Some(15.0), ..Default::default() };
+    let (network, mut a, mut b, key) = setup(config, 1);
+    let mut is_heard = |place: Option<[f64; 3]>, at_ms| {
+        for (node, place) in [("uav/1", Some([0.0; 3])), ("uav/2", place)] {
+            place.into_iter().for_each(|place| network.place(&NodeName::new(node).unwrap(), place));
+        }
+        a.put(&key, 1_u32.to_le_bytes().to_vec());
+        network.advance(MS * at_ms);
+        !drain(&mut b).is_empty()
+    };
+    assert!(is_heard(None, 10), "one without a place");
+    assert!(!is_heard(Some([9.0, 12.0, 1.0]), 20));
+    assert!(is_heard(Some([9.0, 12.0, 0.0]), 30));
+}
+
+#[test]
 fn messages_reach_whom_they_are_for() {
     let fleet = Fleet::new("test").unwrap();
     let names = ["uav/1", "uav/2", "ground/main"].map(|name| NodeName::new(name).unwrap());

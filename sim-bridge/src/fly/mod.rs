@@ -20,7 +20,9 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use skein_agent::{AgentConfig, Parts};
 use skein_bp::behaviour::Behaviours;
+use skein_ground::explain::Recorded;
 use skein_ground::recorder::keep_former;
+use skein_ground::replay::Digest;
 use skein_ground::{Order, Who};
 use skein_wire::{Fleet, Network, NetworkConfig};
 
@@ -110,18 +112,23 @@ pub fn run(args: &cli::Fly, known: &Behaviours) -> anyhow::Result<Summary> {
     Ok(summary)
 }
 
-/// Where the flight is recorded, and what to do with that.
-fn debrief(summary: &Summary, recording: &Path) -> Vec<String> {
-    let recording = recording.display();
+/// How near vehicles were, where that is recorded, and what to do with it.
+fn debrief(summary: &Summary, path: &Path) -> Vec<String> {
+    let recording = path.display();
+    let digest = Recorded::open(path).ok().and_then(|recorded| Digest::of(&recorded));
+    let nearest = digest.map(|digest| digest.nearest_in_words()).unwrap_or_default();
+
     let landed_early = summary.per_vehicle.iter().find(|vehicle| vehicle.reason.is_some());
     let explain = match landed_early {
         Some(vehicle) => format!("skein-ground explain {recording} --vehicle {}", vehicle.id),
         None => format!("skein-ground explain {recording} --at {:.0}", summary.sim_time_s / 2.0),
     };
-    vec![
+    let files = [
         format!("recording: {recording}, which Foxglove opens as it is"),
+        format!("replay in the console: skein-ground replay {recording}"),
         format!("why a vehicle did what it did: {explain}"),
-    ]
+    ];
+    nearest.into_iter().chain(files).collect()
 }
 
 fn in_lockstep(
@@ -149,6 +156,7 @@ fn memory_network(scenario: &Scenario) -> Network {
     let config = NetworkConfig {
         latency: (mean / 2, mean * 3 / 2),
         loss: scenario.network.loss,
+        range_m: scenario.network.radio_range_m,
         ..NetworkConfig::default()
     };
     Network::new(config, scenario.seed)
@@ -182,6 +190,11 @@ struct Lockstep(Network);
 impl Host for Lockstep {
     fn before_step(&mut self, swarm: &mut Swarm) {
         self.0.advance(swarm.now() + skein_world::STEP);
+        for (index, agent) in swarm.agents().enumerate() {
+            if let Some(vehicle) = swarm.simulation().vehicle(index) {
+                self.0.place(agent.name(), vehicle.motion.position.into());
+            }
+        }
     }
 
     fn after_step(&mut self, _: &Swarm, _: &Happenings) {}

@@ -6,7 +6,7 @@
 
 use std::net::SocketAddr;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::Context as _;
 use skein_ground::console::Console;
@@ -80,7 +80,9 @@ pub fn fly(
         Err(error) => table.note(&format!("no MAVLink for other programs: {error:#}"))?,
     }
     let table = (!args.headless).then_some(table);
-    let agents = Agents::of(scenario, args.controller);
+    let mut agents = Agents::of(scenario, args.controller);
+    let epoch = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    agents.configs.iter_mut().for_each(|config| config.epoch = epoch);
     let mut flight = Flight::new(scenario, agents, links, Some(recording), table)?;
     flight.seat(&args.autopilots, out)?;
     flight.fly(&mut RealTime {

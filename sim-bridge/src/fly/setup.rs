@@ -11,7 +11,7 @@ use skein_wire::{Fleet, standard_authority};
 use skein_world::{SimulationConfig, VehicleSetup};
 
 use crate::cli;
-use crate::scenario::{self, Scenario};
+use crate::scenario::{self, Scenario, VehiclePlan};
 use crate::sequential::Sequential;
 
 /// The fleet's name on one host.
@@ -89,10 +89,11 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             takeoff_height_m: scenario.takeoff_height_m,
             return_altitude_m: (RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64)
                 .min(bounds.max.z - 1.0),
-            position: PositionSource::default(),
+            position: sources(scenario, plan),
             sigma_limit_m: DEFAULT_SIGMA_LIMIT_M,
             lidar: plan.model.lidar.is_some(),
             fence,
+            epoch: Duration::ZERO,
             airspace: scenario.airspace.clone(),
             envelope: Envelope {
                 cruise_m_s: scenario.cruise_speed_m_s.min(plan.model.max_speed_m_s),
@@ -103,6 +104,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
                 brake_m_s2: plan.model.max_accel_m_s2 * 0.7,
                 hull_m: plan.model.hull_radius_m,
                 separation_m: scenario.separation_m(plan),
+                margin_m: scenario.margin_m.unwrap_or(Envelope::DEFAULT.margin_m),
                 ..Envelope::default()
             },
             planners: scenario.planners,
@@ -110,11 +112,25 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             scripts: scripts_of(scenario, index + 1),
             behaviours: scenario.behaviours.clone(),
             lease: lease(scenario),
+            radio_range_m: scenario.network.radio_range_m,
             authority: standard_authority(),
             kept: Kept::default(),
             seed: scenario.seed.wrapping_mul(1000).wrapping_add(index as u64),
         })
         .collect()
+}
+
+/// The sources of position of a vehicle of the simulated world: what the scenario says, or what it has.
+fn sources(scenario: &Scenario, plan: &VehiclePlan) -> Vec<PositionSource> {
+    if !scenario.position.is_empty() {
+        return scenario.position.clone();
+    }
+    let model = &plan.model;
+    let sources = [
+        (PositionSource::Autopilot, model.gps.is_some()),
+        (PositionSource::Markers, model.floor_camera.is_some()),
+    ];
+    sources.into_iter().filter(|(_, has)| *has).map(|(source, _)| source).collect()
 }
 
 /// The parts of an agent with this in control.

@@ -22,6 +22,7 @@ pub struct Swarm {
     vehicles: Vec<Vehicle>,
     ground: GroundCore,
     ground_link: Box<dyn Link>,
+    ground_is_dead: bool,
     steps: u64,
     trace: TraceHash,
     /// Equal configurations give equal runs.
@@ -105,6 +106,7 @@ impl Swarm {
             plan_times: PlanTimes::default(),
             stopwatch: None,
             ground_link: links.ground,
+            ground_is_dead: false,
             steps: 0,
             trace: TraceHash::default(),
             replays: true,
@@ -126,6 +128,16 @@ impl Swarm {
         if let Some(vehicle) = self.vehicles.get_mut(index) {
             vehicle.is_dead = true;
         }
+    }
+
+    /// Ends the ground station as if its process had been killed.
+    pub fn kill_ground(&mut self) {
+        self.ground_is_dead = true;
+    }
+
+    /// Begins another life of the ground station, over this link.
+    pub fn restart_ground(&mut self, ground: GroundCore, link: Box<dyn Link>) {
+        (self.ground, self.ground_link, self.ground_is_dead) = (ground, link, false);
     }
 
     /// From now on the mission of vehicle `index` is silent, or decides again, as if its thread hung or went
@@ -154,6 +166,11 @@ impl Swarm {
                 timed(&mut self.stopwatch, || vehicle.agent.sense(now, scan));
             }
         }
+        for (index, fix) in self.simulation.take_fixes() {
+            if let Some(vehicle) = self.vehicles.get_mut(index).filter(|vehicle| !vehicle.is_dead) {
+                timed(&mut self.stopwatch, || vehicle.agent.see_markers(now, &fix));
+            }
+        }
         if self.steps.is_multiple_of(STEPS_PER_TICK) {
             happenings.ticked = true;
             self.tick(now, &mut happenings.selections);
@@ -167,7 +184,9 @@ impl Swarm {
     }
 
     fn tick(&mut self, now: Duration, selections: &mut Vec<Happened>) {
-        if let Err(error) = self.ground.tick(now, self.ground_link.as_mut()) {
+        if !self.ground_is_dead
+            && let Err(error) = self.ground.tick(now, self.ground_link.as_mut())
+        {
             tracing::error!("{error}");
         }
         let mut heard = self.ground.take_selections();

@@ -1,6 +1,7 @@
 //! The scenario file: what its TOML may say, and how a scenario comes out of it.
 
 use std::collections::BTreeMap;
+use std::num::NonZeroU8;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -8,13 +9,17 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{AirspaceTable, GlobalPlanner, LocalPlanner, Nose, Planners, Repellers};
+use skein_agent::{
+    AirspaceTable, GlobalPlanner, LocalPlanner, Nose, Planners, PositionSource, Repellers, position_sources,
+};
 use skein_bp::behaviour::{Behaviours, Settings};
 use skein_bp::configuration::{self, Malformed};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_planning::airspace::Airspace;
 use skein_wire::event::What;
-use skein_world::{Aabb, Drift, Obstacle, PositionErrors, Scene, Shape, VehicleModel, WindConfig};
+use skein_world::{
+    Aabb, Drift, MarkerFloor, Obstacle, PositionErrors, Scene, Shape, VehicleModel, WindConfig,
+};
 
 use super::antipodal::Antipodal;
 use super::coverage::Coverage;
@@ -89,6 +94,11 @@ struct FileTable {
     targets: Option<Targets>,
     #[serde(default)]
     airspace: AirspaceTable,
+    markers: Option<MarkersTable>,
+    #[serde(default, deserialize_with = "field::optional_positive")]
+    margin_m: Option<f64>,
+    #[serde(default, deserialize_with = "position_sources")]
+    position: Vec<PositionSource>,
     bounds: Option<BoundsTable>,
     wind: Option<WindTable>,
     #[serde(default)]
@@ -142,6 +152,25 @@ struct WindTable {
 impl From<WindTable> for WindConfig {
     fn from(table: WindTable) -> Self {
         Self { mean: table.mean_m_s, gust_sigma_m_s: table.gust_m_s, ..Self::default() }
+    }
+}
+
+/// Markers on the floor, row by row from id 1, whose centre is the origin.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MarkersTable {
+    columns: NonZeroU8,
+    rows: NonZeroU8,
+    #[serde(deserialize_with = "field::positive")]
+    side_m: f64,
+    #[serde(deserialize_with = "field::positive")]
+    pitch_m: f64,
+}
+
+impl From<MarkersTable> for MarkerFloor {
+    fn from(table: MarkersTable) -> Self {
+        let MarkersTable { columns, rows, side_m, pitch_m } = table;
+        Self { columns: columns.get().into(), rows: rows.get().into(), side_m, pitch_m }
     }
 }
 
@@ -314,6 +343,8 @@ impl ScenarioFile {
                 potential: table.potential,
             },
             separation_hulls: SEPARATION_HULLS,
+            margin_m: table.margin_m,
+            position: table.position,
             takeoff_height_m,
             without_ground: table.without_ground,
             time_limit_s,
@@ -354,6 +385,11 @@ impl ScenarioFile {
             && let Err((field, message)) = forest.check()
         {
             return Err(self.contradiction(format!("forest.{field}"), message));
+        }
+        if let Some(markers) = &table.markers
+            && markers.side_m > markers.pitch_m
+        {
+            return Err(self.contradiction("markers.pitch_m", "expected at least side_m: they would overlap"));
         }
         let ways = [
             ("vehicle", !table.vehicle.is_empty()),
@@ -533,8 +569,9 @@ impl ScenarioFile {
     fn tune_gps(&self, plans: &mut [VehiclePlan]) {
         let Some(gps) = &self.table.gps else { return };
         for plan in plans {
-            plan.model.gps.sigma_horizontal_m = gps.sigma_m;
-            plan.model.gps.sigma_vertical_m = gps.sigma_m;
+            if let Some(own) = &mut plan.model.gps {
+                (own.sigma_horizontal_m, own.sigma_vertical_m) = (gps.sigma_m, gps.sigma_m);
+            }
         }
     }
 
@@ -547,8 +584,7 @@ impl ScenarioFile {
         }
         for (i, table) in self.table.position_fault.iter().enumerate() {
             let Some(fault) = table.fault() else {
-                let message =
-                    "expected exactly one of jump_m, origin_moves_m, late_s, freezes, gps_lost and resets";
+                let message = "expected exactly one of jump_m, origin_moves_m, late_s, freezes, gps_lost, jammed_m, markers_missed, flow_lost and resets";
                 return Err(self.contradiction(format!("position_fault[{i}]"), message));
             };
             let count = plans.len();
@@ -587,6 +623,10 @@ impl ScenarioFile {
                 (Scene::new(name, obstacles).with_bounds(layout.bounds), layout.notes)
             }
             (None, None) => (Scene::new(name, own), Vec::new()),
+        };
+        let scene = match self.table.markers {
+            Some(markers) => scene.with_markers(markers.into()),
+            None => scene,
         };
         match &self.table.bounds {
             Some(bounds) => Ok((scene.with_bounds(Aabb { min: bounds.min_m, max: bounds.max_m }), notes)),

@@ -32,7 +32,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::value::{Error as WordError, StrDeserializer};
 use skein_agent::bthreads::LinkLossPolicy;
-use skein_agent::{Errand, Planners};
+use skein_agent::{Errand, Planners, PositionSource};
 use skein_bp::behaviour::{Behaviours, Chosen};
 use skein_bp::script::Assignment;
 use skein_mav::Datum;
@@ -72,7 +72,7 @@ const SAME_PLACE_M: f64 = 0.1;
 /// Distances that differ by no more than this are equal, in metres.
 const ROUNDING_M: f64 = 1e-9;
 
-const BUILT_IN: [(&str, &str); 7] = [
+const BUILT_IN: [(&str, &str); 8] = [
     ("forest", include_str!("../../scenarios/forest.toml")),
     ("antipodal", include_str!("../../scenarios/antipodal.toml")),
     ("window", include_str!("../../scenarios/window.toml")),
@@ -80,6 +80,7 @@ const BUILT_IN: [(&str, &str); 7] = [
     ("survey", include_str!("../../scenarios/survey.toml")),
     ("geese", include_str!("../../scenarios/geese.toml")),
     ("valley", include_str!("../../scenarios/valley.toml")),
+    ("indoor", include_str!("../../scenarios/indoor.toml")),
 ];
 
 /// A world, a swarm in it, and what is asked of the swarm. World frame ENU, metres, seconds.
@@ -111,6 +112,10 @@ pub struct Scenario {
     pub planners: Planners,
     /// Distance that vehicles keep from centre to centre, in hull radii.
     pub separation_hulls: f64,
+    /// Clearance kept between hull and obstacles when a path is planned, in metres; the agent's own if `None`.
+    pub margin_m: Option<f64>,
+    /// What tells vehicles where they are, the preferred one first; what each has, if empty.
+    pub position: Vec<PositionSource>,
     /// Height above the ground at which a take-off ends.
     pub takeoff_height_m: f64,
     /// The policy of a vehicle that has been without the ground station for long.
@@ -177,11 +182,15 @@ pub struct Network {
     /// long as a message takes there and back.
     #[serde(deserialize_with = "field::lease_ms")]
     pub lease_ms: f64,
+    /// Vehicles hear one another within so many metres; everywhere, if it is left out. The ground station hears and is
+    /// heard by all.
+    #[serde(deserialize_with = "field::optional_positive")]
+    pub radio_range_m: Option<f64>,
 }
 
 impl Default for Network {
     fn default() -> Self {
-        Self { latency_ms: 5.0, loss: 0.0, lease_ms: 1000.0 }
+        Self { latency_ms: 5.0, loss: 0.0, lease_ms: 1000.0, radio_range_m: None }
     }
 }
 

@@ -69,6 +69,13 @@ pub struct PositionFaultTable {
     freezes: bool,
     #[serde(default)]
     gps_lost: bool,
+    /// East, north and radius of where there are no satellites.
+    #[serde(default, deserialize_with = "optional_point")]
+    jammed_m: Option<Vector3<f64>>,
+    #[serde(default)]
+    markers_missed: bool,
+    #[serde(default)]
+    flow_lost: bool,
     #[serde(default)]
     resets: bool,
 }
@@ -92,6 +99,9 @@ impl PositionFaultTable {
             self.late_s.map(|late_s| PositionFaultKind::Late(Duration::from_secs_f64(late_s))),
             self.freezes.then_some(PositionFaultKind::Freezes),
             self.gps_lost.then_some(PositionFaultKind::GpsLost),
+            self.jammed_m.map(|at| PositionFaultKind::Jammed { centre: at.xy(), radius_m: at.z }),
+            self.markers_missed.then_some(PositionFaultKind::MarkersMissed),
+            self.flow_lost.then_some(PositionFaultKind::FlowLost),
             self.resets.then_some(PositionFaultKind::Resets),
         ];
         let mut kinds = kinds.into_iter().flatten();

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 use crate::noise::Noise;
 use crate::quadrotor::STEP;
@@ -44,6 +44,12 @@ pub enum PositionFaultKind {
     Jump(Vector3<f64>),
     /// There are no fixes.
     GpsLost,
+    /// There are no fixes within so many metres of a place, east and north.
+    Jammed { centre: Vector2<f64>, radius_m: f64 },
+    /// The camera finds no markers: blur, glare.
+    MarkersMissed,
+    /// The flow sensor sees nothing.
+    FlowLost,
     /// The origin that the autopilot tells positions from moves by this, ENU, m.
     OriginMoves(Vector3<f64>),
     /// The autopilot tells the same estimate, with the same time stamp, again and again.
@@ -65,7 +71,7 @@ impl PositionFaultKind {
     /// Whether it is a fault of what an autopilot tells, and not of its instruments.
     #[must_use]
     pub fn is_of_autopilot(&self) -> bool {
-        !matches!(self, Self::Jump(_) | Self::GpsLost)
+        matches!(self, Self::OriginMoves(_) | Self::Freezes | Self::Late(_) | Self::Resets)
     }
 }
 
@@ -77,15 +83,23 @@ pub(crate) struct FixErrors {
     decay: f64,
     drift: Vector3<f64>,
     jump: Vector3<f64>,
-    is_lost: bool,
+    lost: Lost,
+}
+
+/// What is lost now.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Lost {
+    pub(crate) fixes: bool,
+    pub(crate) markers: bool,
+    pub(crate) flow: bool,
 }
 
 impl FixErrors {
     /// The drift begins as if it had gone on for ever.
     pub(crate) fn new(errors: PositionErrors, noise: Noise) -> Self {
         let decay = (-STEP.as_secs_f64() / errors.drift.correlation_s.max(1e-3)).exp();
-        let mut new =
-            Self { errors, noise, decay, drift: Vector3::zeros(), jump: Vector3::zeros(), is_lost: false };
+        let lost = Lost::default();
+        let mut new = Self { errors, noise, decay, drift: Vector3::zeros(), jump: Vector3::zeros(), lost };
         new.drift = new.kick(1.0);
         new
     }
@@ -98,14 +112,19 @@ impl FixErrors {
             .map(|sigma_m| if sigma_m > 0.0 { self.noise.normal(share * sigma_m) } else { 0.0 })
     }
 
-    /// Goes on by [`STEP`], to `now`.
-    pub(crate) fn step(&mut self, now: Duration) {
+    /// Goes on by [`STEP`], to `now`, with the vehicle at this place, ENU, m.
+    pub(crate) fn step(&mut self, now: Duration, place: &Vector3<f64>) {
         self.drift = self.drift * self.decay + self.kick((1.0 - self.decay * self.decay).sqrt());
-        (self.jump, self.is_lost) = (Vector3::zeros(), false);
+        (self.jump, self.lost) = (Vector3::zeros(), Lost::default());
         for fault in self.errors.faults.iter().filter(|fault| fault.is_on(now)) {
             match fault.kind {
                 PositionFaultKind::Jump(by) => self.jump += by,
-                PositionFaultKind::GpsLost => self.is_lost = true,
+                PositionFaultKind::GpsLost => self.lost.fixes = true,
+                PositionFaultKind::Jammed { centre, radius_m } => {
+                    self.lost.fixes |= (place.xy() - centre).norm() < radius_m;
+                }
+                PositionFaultKind::MarkersMissed => self.lost.markers = true,
+                PositionFaultKind::FlowLost => self.lost.flow = true,
                 _ => {}
             }
         }
@@ -116,9 +135,8 @@ impl FixErrors {
         self.drift + self.jump
     }
 
-    /// Whether there are no fixes now.
-    pub(crate) fn is_lost(&self) -> bool {
-        self.is_lost
+    pub(crate) fn lost(&self) -> Lost {
+        self.lost
     }
 }
 
@@ -136,7 +154,7 @@ mod tests {
         let mut errors = errors(drift, Vec::new());
         let mut track = Vec::new();
         for _ in 0..250_000 {
-            errors.step(Duration::ZERO);
+            errors.step(Duration::ZERO, &Vector3::zeros());
             track.push(errors.offset());
         }
         let sigma = |axis: usize| {
@@ -157,11 +175,24 @@ mod tests {
         let jump = |lasts| PositionFault { at: seconds(3), lasts, kind: PositionFaultKind::Jump(by) };
         let mut errors = errors(Drift::default(), vec![jump(Some(seconds(2))), jump(None)]);
         let mut offset = |second| {
-            errors.step(seconds(second));
+            errors.step(seconds(second), &Vector3::zeros());
             errors.offset()
         };
         assert_eq!(offset(2), Vector3::zeros());
         assert_eq!(offset(3), 2.0 * by);
         assert_eq!(offset(5), by);
+    }
+
+    #[test]
+    fn a_jammer_takes_the_fixes_near_it_and_nothing_else() {
+        let centre = Vector2::new(10.0, 0.0);
+        let kind = PositionFaultKind::Jammed { centre, radius_m: 4.0 };
+        let mut errors =
+            errors(Drift::default(), vec![PositionFault { at: Duration::ZERO, lasts: None, kind }]);
+        let mut is_lost = |x| {
+            errors.step(Duration::from_secs(1), &Vector3::new(x, 0.0, 9.0));
+            (errors.lost().fixes, errors.lost().markers, errors.lost().flow)
+        };
+        assert_eq!([is_lost(5.0), is_lost(7.0)], [(false, false, false), (true, false, false)]);
     }
 }

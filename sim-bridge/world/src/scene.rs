@@ -6,6 +6,7 @@ use nalgebra::{Point3, Vector3};
 use skein_mav::Datum;
 
 use crate::aabb::Aabb;
+use crate::floor_camera::MarkerFloor;
 use crate::obstacle::Obstacle;
 
 /// Distance of the derived bounds from the outermost obstacle, m.
@@ -27,6 +28,7 @@ pub struct Scene {
     bounds: Aabb,
     datum: Datum,
     wind: Vector3<f64>,
+    markers: Option<MarkerFloor>,
 }
 
 /// The obstacle next to a point.
@@ -49,7 +51,19 @@ impl Scene {
             obstacles,
             datum: Datum::from_degrees(47.397_742, 8.545_594, 488.0),
             wind: Vector3::zeros(),
+            markers: None,
         }
+    }
+
+    /// The same scene with markers on the ground.
+    pub fn with_markers(mut self, markers: MarkerFloor) -> Self {
+        self.markers = Some(markers);
+        self
+    }
+
+    /// The markers on the ground, if there are any.
+    pub fn markers(&self) -> Option<&MarkerFloor> {
+        self.markers.as_ref()
     }
 
     /// The same scene in other bounds.

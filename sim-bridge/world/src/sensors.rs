@@ -3,13 +3,14 @@
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_mav::Battery;
+use skein_mav::{Battery, Flow};
 
+use crate::flow::FlowSensor;
 use crate::lidar::{Surroundings, cast_ray};
 use crate::noise::Noise;
-use crate::position_error::FixErrors;
+use crate::position_error::{FixErrors, Lost};
 use crate::quadrotor::{Quadrotor, STEP};
-use crate::vehicle::VehicleModel;
+use crate::vehicle::{GpsModel, VehicleModel};
 
 /// One step's readings, the autopilot's whole view of the world.
 ///
@@ -27,6 +28,8 @@ pub struct SensorReadings {
     pub magnetic_heading: Option<f64>,
     /// Distance along body -z from the centre to the first solid, m; `None` also beyond range.
     pub rangefinder_down_m: Option<f64>,
+    /// Optical flow of the ground.
+    pub flow: Option<Flow>,
     /// Whether the legs touch the ground.
     pub contact: bool,
     pub battery: Battery,
@@ -61,18 +64,27 @@ pub(crate) struct Sensors {
     accel_bias: Vector3<f64>,
     baro_offset_m: f64,
     errors: FixErrors,
+    flow: Option<FlowSensor>,
     /// Shifts the slow instruments in time, so that vehicles do not sample all at once.
     phase: u64,
 }
 
 impl Sensors {
-    pub(crate) fn new(model: &VehicleModel, mut noise: Noise, errors: FixErrors, phase: u64) -> Self {
+    /// `flow_noise` is that of the flow sensor alone.
+    pub(crate) fn new(
+        model: &VehicleModel,
+        mut noise: Noise,
+        flow_noise: Noise,
+        errors: FixErrors,
+        phase: u64,
+    ) -> Self {
         Self {
             gyro_bias: noise.vector(model.imu.gyro_bias_rad_s),
             accel_bias: noise.vector(model.imu.accel_bias_m_s2),
             baro_offset_m: noise.normal(model.baro.offset_m),
             noise,
             errors,
+            flow: model.flow.map(|model| FlowSensor::new(model, flow_noise)),
             phase,
         }
     }
@@ -84,24 +96,27 @@ impl Sensors {
         quadrotor: &Quadrotor,
         surroundings: &Surroundings<'_>,
     ) -> SensorReadings {
-        self.errors.step(Duration::from_millis(tick * STEP.as_millis() as u64));
+        self.errors.step(Duration::from_millis(tick * STEP.as_millis() as u64), &quadrotor.state().position);
         let model = quadrotor.model();
         let due = |rate_hz| is_due(tick + self.phase, rate_hz);
-        let [gps, baro, compass, rangefinder] = [
-            due(model.gps.rate_hz),
-            due(model.baro.rate_hz),
-            due(model.compass.rate_hz),
-            due(model.rangefinder.rate_hz),
-        ];
+        let [baro, compass, rangefinder] =
+            [due(model.baro.rate_hz), due(model.compass.rate_hz), due(model.rangefinder.rate_hz)];
+        let is_lost = self.errors.lost().flow;
+        let flow = self
+            .flow
+            .as_mut()
+            .and_then(|flow| flow.step(due(flow.rate_hz()), is_lost, quadrotor, surroundings));
+        let gps = model.gps.filter(|gps| due(gps.rate_hz) && !self.errors.lost().fixes);
         SensorReadings {
             imu: self.imu(quadrotor),
-            gps: (gps && !self.errors.is_lost()).then(|| self.gps(quadrotor)),
+            gps: gps.map(|model| self.gps(&model, quadrotor)),
             baro_height_m: baro.then(|| self.baro_height_m(quadrotor)),
             fix_error: self.errors.offset(),
             magnetic_heading: compass.then(|| self.magnetic_heading(quadrotor)),
             rangefinder_down_m: rangefinder
                 .then(|| self.rangefinder_down_m(quadrotor, surroundings))
                 .flatten(),
+            flow,
             contact: quadrotor.on_ground(),
             battery: quadrotor.battery(),
         }
@@ -119,8 +134,12 @@ impl Sensors {
         }
     }
 
-    fn gps(&mut self, quadrotor: &Quadrotor) -> Gps {
-        let gps = &quadrotor.model().gps;
+    /// What is lost now.
+    pub(crate) fn lost(&self) -> Lost {
+        self.errors.lost()
+    }
+
+    fn gps(&mut self, gps: &GpsModel, quadrotor: &Quadrotor) -> Gps {
         let error = Vector3::new(
             self.noise.normal(gps.sigma_horizontal_m),
             self.noise.normal(gps.sigma_horizontal_m),

@@ -4,9 +4,11 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_mav::Battery;
+use skein_positioning::PoseFix;
 use skein_wire::Scan;
 
 use crate::autopilot::{Autopilot, AutopilotConfig};
+use crate::floor_camera::FloorCamera;
 use crate::lidar::{Hull, Lidar, Surroundings};
 use crate::noise::Noise;
 use crate::pilot::{BuiltIn, Fixed, Pilot};
@@ -20,6 +22,9 @@ use crate::wind::{Wind, WindConfig};
 
 /// The stream of the first vehicle's position errors, beyond those of its instruments and lidar.
 const FIX_ERROR_STREAM: u64 = 1 << 32;
+/// Those of the first vehicle's flow sensor and floor camera.
+const FLOW_STREAM: u64 = 2 << 32;
+const CAMERA_STREAM: u64 = 3 << 32;
 
 /// All that a run depends on.
 #[derive(Debug, Clone)]
@@ -79,6 +84,8 @@ struct Vehicle {
     readings: SensorReadings,
     pilot: Box<dyn Pilot>,
     lidar: Option<Lidar>,
+    camera: Option<FloorCamera>,
+    fixes: Vec<PoseFix>,
     /// Shifts the instruments in time, in steps.
     phase: u64,
     scan: Option<Scan>,
@@ -172,6 +179,12 @@ impl Simulation {
         vehicles.filter_map(|(index, vehicle)| Some((index, vehicle.scan.take()?))).collect()
     }
 
+    /// Takes the poses that floor cameras have found by markers since the last call, each with its vehicle's index.
+    pub fn take_fixes(&mut self) -> Vec<(usize, PoseFix)> {
+        let vehicles = self.vehicles.iter_mut().enumerate();
+        vehicles.flat_map(|(index, vehicle)| vehicle.fixes.drain(..).map(move |fix| (index, fix))).collect()
+    }
+
     /// Sends MAVLink bytes to the autopilot of vehicle `index`.
     pub fn send(&mut self, index: usize, bytes: &[u8]) {
         if let Some(vehicle) = self.vehicles.get_mut(index) {
@@ -228,7 +241,12 @@ impl Vehicle {
         let model = quadrotor.model();
         let errors =
             FixErrors::new(setup.position_errors.clone(), Noise::new(seed, FIX_ERROR_STREAM + index));
-        let mut sensors = Sensors::new(model, Noise::new(seed, 2 * index), errors, phase);
+        let mut sensors = {
+            let flow = Noise::new(seed, FLOW_STREAM + index);
+            Sensors::new(model, Noise::new(seed, 2 * index), flow, errors, phase)
+        };
+        let camera =
+            model.floor_camera.map(|model| FloorCamera::new(model, Noise::new(seed, CAMERA_STREAM + index)));
         let lidar = model.lidar.map(|model| Lidar::new(model, seed, 2 * index + 1));
         let autopilot = Autopilot::new(AutopilotConfig {
             position_errors: setup.position_errors.clone(),
@@ -240,6 +258,8 @@ impl Vehicle {
             sensors,
             pilot: Box::new(BuiltIn::new(autopilot)),
             lidar,
+            camera,
+            fixes: Vec::new(),
             phase,
             scan: None,
             path_length_m: 0.0,
@@ -267,6 +287,12 @@ impl Vehicle {
 
     fn sense(&mut self, tick: u64, now: Duration, surroundings: &Surroundings<'_>) {
         self.readings = self.sensors.read(tick, &self.quadrotor, surroundings);
+        if let (Some(camera), Some(floor)) = (&mut self.camera, surroundings.scene.markers()) {
+            if is_due(tick + self.phase, camera.rate_hz()) && !self.sensors.lost().markers {
+                camera.look(now, floor, self.quadrotor.state());
+            }
+            self.fixes.extend(camera.take(now));
+        }
         let Some(lidar) = &mut self.lidar else { return };
         if is_due(tick + self.phase, lidar.rate_hz()) {
             let pose = self.quadrotor.state().pose();

@@ -9,10 +9,11 @@ use thiserror::Error;
 /// Standard gravity, m/s^2.
 pub const GRAVITY_M_S2: f64 = 9.806_65;
 
-const BUILT_IN: [(&str, &str); 3] = [
+const BUILT_IN: [(&str, &str); 4] = [
     ("x500", include_str!("../vehicles/x500.toml")),
     ("x500-vertical-scanner", include_str!("../vehicles/x500-vertical-scanner.toml")),
     ("crazyflie", include_str!("../vehicles/crazyflie.toml")),
+    ("crazyflie-indoor", include_str!("../vehicles/crazyflie-indoor.toml")),
 ];
 
 /// A quadrotor in X configuration, its limits and its sensors.
@@ -59,7 +60,8 @@ pub struct VehicleModel {
     pub battery: BatteryModel,
     /// Planar laser scanner with its range finders up and down, if it has one; and a second, upright scanner.
     pub lidar: Option<LidarModel>,
-    pub gps: GpsModel,
+    /// Satellite receiver, if it has one.
+    pub gps: Option<GpsModel>,
     /// Accelerometer and gyroscope.
     pub imu: ImuModel,
     pub baro: BaroModel,
@@ -67,6 +69,10 @@ pub struct VehicleModel {
     pub compass: CompassModel,
     /// Range finder that looks down, for the autopilot.
     pub rangefinder: RangefinderModel,
+    /// Camera that looks down on markers, if it has one.
+    pub floor_camera: Option<FloorCameraModel>,
+    /// Optical flow sensor that looks down, if it has one.
+    pub flow: Option<FlowModel>,
 }
 
 fn default_hull_radius_m() -> f64 {
@@ -210,6 +216,37 @@ pub struct RangefinderModel {
     pub rate_hz: f64,
 }
 
+/// A camera along body -z that finds markers.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FloorCameraModel {
+    /// Pictures per second; must divide 250.
+    pub rate_hz: f64,
+    /// Half of its angle of view, to all four sides, rad.
+    pub half_view_rad: f64,
+    /// Standard deviation of a corner in the picture, as an angle, rad.
+    pub corner_sigma_rad: f64,
+    /// Time from a picture to its pose, s.
+    pub latency_s: f64,
+    /// Nearer than this nothing is sharp, m.
+    pub least_m: f64,
+}
+
+/// An optical flow sensor along body -z.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FlowModel {
+    /// Readings per second; must divide 250.
+    pub rate_hz: f64,
+    /// Standard deviation of a reading, rad/s.
+    pub sigma_rad_s: f64,
+    /// Standard deviation of the share by which it tells too much, drawn at power-on.
+    pub scale_sigma: f64,
+    /// Between these distances it sees the ground, m.
+    pub least_m: f64,
+    pub most_m: f64,
+}
+
 /// Why a vehicle file was refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum VehicleError {
@@ -237,8 +274,8 @@ impl VehicleModel {
         Ok(model)
     }
 
-    /// The built-in vehicle of that name: `x500` (2 kg), `x500-vertical-scanner`, which sees cables too, or
-    /// `crazyflie` (27 g).
+    /// The built-in vehicle of that name: `x500` (2 kg), `x500-vertical-scanner`, which sees cables too,
+    /// `crazyflie` (27 g), or `crazyflie-indoor`, which has no satellite receiver.
     pub fn built_in(name: &str) -> Result<Self, VehicleError> {
         match BUILT_IN.iter().find(|(known, _)| *known == name) {
             Some((known, text)) => Self::from_toml(text, &format!("vehicles/{known}.toml")),
@@ -315,9 +352,6 @@ impl VehicleModel {
             ("linear_drag", self.linear_drag),
             ("quadratic_drag", self.quadratic_drag),
             ("battery.idle_power_w", self.battery.idle_power_w),
-            ("gps.sigma_horizontal_m", self.gps.sigma_horizontal_m),
-            ("gps.sigma_vertical_m", self.gps.sigma_vertical_m),
-            ("gps.sigma_velocity_m_s", self.gps.sigma_velocity_m_s),
             ("imu.gyro_sigma_rad_s", self.imu.gyro_sigma_rad_s),
             ("imu.gyro_bias_rad_s", self.imu.gyro_bias_rad_s),
             ("imu.accel_sigma_m_s2", self.imu.accel_sigma_m_s2),
@@ -328,7 +362,6 @@ impl VehicleModel {
             ("rangefinder.sigma_m", self.rangefinder.sigma_m),
         ];
         let rates = [
-            ("gps.rate_hz", self.gps.rate_hz),
             ("baro.rate_hz", self.baro.rate_hz),
             ("compass.rate_hz", self.compass.rate_hz),
             ("rangefinder.rate_hz", self.rangefinder.rate_hz),
@@ -339,13 +372,40 @@ impl VehicleModel {
             }
             Err(VehicleError::Range { source_name: source_name.to_owned(), field, found, expected })
         };
+        let of_gps = |field, of: fn(&GpsModel) -> f64| self.gps.iter().map(move |gps| (field, of(gps)));
+        let not_negative = not_negative
+            .into_iter()
+            .chain(of_gps("gps.sigma_horizontal_m", |gps| gps.sigma_horizontal_m))
+            .chain(of_gps("gps.sigma_vertical_m", |gps| gps.sigma_vertical_m))
+            .chain(of_gps("gps.sigma_velocity_m_s", |gps| gps.sigma_velocity_m_s));
+        let rates = rates.into_iter().chain(of_gps("gps.rate_hz", |gps| gps.rate_hz));
+        let of_camera = |field, of: fn(&FloorCameraModel) -> f64| {
+            self.floor_camera.iter().map(move |camera| (field, of(camera)))
+        };
+        let of_flow = |field, of: fn(&FlowModel) -> f64| self.flow.iter().map(move |flow| (field, of(flow)));
+        let positive = positive
+            .into_iter()
+            .chain(of_camera("floor_camera.corner_sigma_rad", |camera| camera.corner_sigma_rad))
+            .chain(of_camera("floor_camera.least_m", |camera| camera.least_m))
+            .chain(of_flow("flow.least_m", |flow| flow.least_m))
+            .chain(of_flow("flow.most_m", |flow| flow.most_m));
+        let not_negative = not_negative
+            .chain(of_camera("floor_camera.latency_s", |camera| camera.latency_s))
+            .chain(of_flow("flow.sigma_rad_s", |flow| flow.sigma_rad_s))
+            .chain(of_flow("flow.scale_sigma", |flow| flow.scale_sigma));
+        let rates = rates
+            .chain(of_camera("floor_camera.rate_hz", |camera| camera.rate_hz))
+            .chain(of_flow("flow.rate_hz", |flow| flow.rate_hz));
+        for (field, half_view_rad) in of_camera("floor_camera.half_view_rad", |camera| camera.half_view_rad) {
+            range(field, half_view_rad, (0.05..1.5).contains(&half_view_rad), "an angle of 0.05 to 1.5 rad")?;
+        }
         let of_lidar =
             |field, of: fn(&LidarModel) -> f64| self.lidar.iter().map(move |lidar| (field, of(lidar)));
-        let positive = positive.into_iter().chain(of_lidar("lidar.range_m", |lidar| lidar.range_m));
+        let positive = positive.chain(of_lidar("lidar.range_m", |lidar| lidar.range_m));
         let positive = positive.chain(of_lidar("lidar.vertical_range_m", |lidar| lidar.vertical_range_m));
         let positive = positive.chain(of_lidar("lidar.dark_range_m", |lidar| lidar.range_to(0.0)));
-        let not_negative = not_negative.into_iter().chain(of_lidar("lidar.sigma_m", |lidar| lidar.sigma_m));
-        let rates = rates.into_iter().chain(of_lidar("lidar.rate_hz", |lidar| lidar.rate_hz));
+        let not_negative = not_negative.chain(of_lidar("lidar.sigma_m", |lidar| lidar.sigma_m));
+        let rates = rates.chain(of_lidar("lidar.rate_hz", |lidar| lidar.rate_hz));
         for (field, found) in positive {
             range(field, found, found > 0.0, "a number above 0")?;
         }

@@ -14,7 +14,7 @@ fn refuse(from: &str, to: &str) -> String {
 #[test]
 fn every_built_in_vehicle_is_sound_and_bears_its_name() {
     let names: Vec<&str> = VehicleModel::built_in_names().collect();
-    assert_eq!(names, ["x500", "x500-vertical-scanner", "crazyflie"]);
+    assert_eq!(names, ["x500", "x500-vertical-scanner", "crazyflie", "crazyflie-indoor"]);
     for name in names {
         let model = VehicleModel::built_in(name).expect("a sound vehicle");
         assert_eq!(model.name, name);
@@ -28,7 +28,7 @@ fn unknown_names_are_answered_with_the_known_ones() {
     let error = VehicleModel::built_in("x9").expect_err("unknown");
     assert_eq!(
         error.to_string(),
-        "no built-in vehicle `x9`; there are: x500, x500-vertical-scanner, crazyflie"
+        "no built-in vehicle `x9`; there are: x500, x500-vertical-scanner, crazyflie, crazyflie-indoor"
     );
 }
 

@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_bp::{Event, EventSet};
 use skein_dbp::{Kept, KeptBlock, Roster};
-use skein_disk::{PromiseStore, ScriptStore, next_incarnation};
+use skein_disk::{ListStore, PromiseStore, next_incarnation};
 use skein_wire::{KeptScript, Saving, Store};
 
 use crate::packets::node;
@@ -43,10 +43,10 @@ fn promises(input: &[u8]) -> Reached {
 fn scripts(input: &[u8]) -> Reached {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("uav-1.scripts.json"), input).expect("it is written");
-    let (mut store, kept) = ScriptStore::open(folder.path(), &node("uav/1"));
+    let (mut store, kept) = ListStore::of_scripts(folder.path(), &node("uav/1"));
     let Ok(kept) = kept else { return Reached::Refused };
     assert_eq!(store.save(&kept), Saving::Done);
-    let (_, again) = ScriptStore::open(folder.path(), &node("uav/1"));
+    let (_, again) = ListStore::of_scripts(folder.path(), &node("uav/1"));
     assert_eq!(again.expect("what was written is read"), kept);
     Reached::read(kept.len() == 2)
 }
@@ -80,7 +80,7 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
     let folder = tempfile::tempdir().expect("a folder");
     let me = node("uav/1");
     assert_eq!(PromiseStore::open(folder.path(), &me).0.save(&promises), Saving::Done);
-    assert_eq!(ScriptStore::open(folder.path(), &me).0.save(&scripts), Saving::Done);
+    assert_eq!(ListStore::of_scripts(folder.path(), &me).0.save(&scripts), Saving::Done);
     next_incarnation(folder.path(), &me, 0, SystemTime::UNIX_EPOCH + Duration::from_secs(1_790_000_000))
         .expect("a number");
     let file = |name: &str| fs::read(folder.path().join(name)).expect("it was written");

@@ -97,6 +97,52 @@ impl Operator {
         anyhow::bail!("`{what}` was not acknowledged by all: {newest}")
     }
 
+    /// Draws a zone; returns how long it took until every vehicle kept it, on its disk.
+    ///
+    /// # Errors
+    /// Somebody has not within two minutes, or refuses it.
+    pub fn draw(&mut self, zone: &Value) -> anyhow::Result<Duration> {
+        let kept = |records: &[Value]| {
+            let drawn = records.iter().find(|record| record["zone"]["name"] == zone["name"]);
+            let answers = drawn.filter(|record| record["going"] == false).map(|record| &record["answers"]);
+            let answers = answers.and_then(Value::as_object);
+            answers.is_some_and(|all| all.values().all(|answer| answer["state"] == "acknowledged"))
+        };
+        self.change_map(&json!({ "type": "draw", "tag": "draw", "zone": zone }), kept)
+    }
+
+    /// Removes a zone; returns how long it took until no vehicle had regard for it.
+    ///
+    /// # Errors
+    /// Somebody has within two minutes.
+    pub fn erase(&mut self, name: &str) -> anyhow::Result<Duration> {
+        let gone = |records: &[Value]| records.iter().all(|record| record["zone"]["name"] != name);
+        self.change_map(&json!({ "type": "erase", "tag": "erase", "name": name }), gone)
+    }
+
+    fn change_map(
+        &mut self,
+        request: &Value,
+        is_done: impl Fn(&[Value]) -> bool,
+    ) -> anyhow::Result<Duration> {
+        let began = Instant::now();
+        self.socket.send(Message::text(request.to_string()))?;
+        let (mut answered, mut done) = (false, false);
+        while began.elapsed() < PATIENCE {
+            let message = self.next()?;
+            match message["type"].as_str() {
+                Some("mapped") => answered = true,
+                Some("zones") => done = message["zones"].as_array().is_some_and(|all| is_done(all)),
+                Some("error") => anyhow::bail!("{request} is refused: {}", message["message"]),
+                _ => continue,
+            }
+            if answered && done {
+                return Ok(began.elapsed());
+            }
+        }
+        anyhow::bail!("{request} was not taken in by all")
+    }
+
     fn next(&mut self) -> anyhow::Result<Value> {
         loop {
             if let Message::Text(text) = self.socket.read()? {

@@ -232,6 +232,7 @@ impl Author {
             loss: self.pick(&[0.0, 0.05, 0.1, 0.2, 0.3]),
             duplicate: self.pick(&[0.0, 0.1, 0.3]),
             reorder: self.pick(&[0.0, 0.2, 0.5]),
+            range_m: None,
         }
     }
 

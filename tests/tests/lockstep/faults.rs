@@ -105,6 +105,7 @@ fn a_poor_network_costs_no_collision() {
             loss: 0.2,
             duplicate: 0.05,
             reorder: 0.1,
+            range_m: None,
         });
         lockstep.run_until(Duration::from_secs(180));
         let truth = lockstep.swarm.truth();

@@ -52,6 +52,16 @@ fn go_to_moves_one_vehicle_and_resume_brings_it_back_to_its_mission() {
 }
 
 #[test]
+fn a_zone_is_drawn_by_clicks_confirmed_by_all_flown_round_and_removed() {
+    let Some(browser) = Browser::find() else { return };
+    let flight = Flight::start(&["open"]);
+    browser.run("zone.mjs", &flight);
+    let (status, summary) = flight.end();
+    assert!(status.success() && summary.succeeded, "{status}: {:?}", summary.reason);
+    assert_eq!(summary.collisions, Collisions::default());
+}
+
+#[test]
 fn without_webgl_some_are_sent_home_or_down_and_the_rest_fly_on() {
     let Some(browser) = Browser::find() else { return };
     let flight = Flight::start(&["open"]);

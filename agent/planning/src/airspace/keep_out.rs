@@ -59,6 +59,12 @@ impl KeepOut {
     }
 
     fn off_zones_m(&self, point: &Vector3<f64>) -> f64 {
+        let low = self.airspace.low.iter().map(|zone| zone.off_m(point));
+        low.fold(self.off_columns_m(point), f64::min)
+    }
+
+    /// The same of what a vehicle that goes straight up or down must not pass through either.
+    fn off_columns_m(&self, point: &Vector3<f64>) -> f64 {
         let Airspace { threats, no_fly, prisms, stay_inside, .. } = &self.airspace;
         let threats = threats.iter().map(|zone| zone.off_m(point));
         let no_fly = no_fly.iter().map(|zone| zone.off_m(point));
@@ -100,7 +106,9 @@ impl KeepOut {
         let no_fly = no_fly.iter().map(|zone| zone.nearest(point));
         let prisms = prisms.iter().flat_map(|zone| zone.nearest(point));
         let borders = stay_inside.iter().flat_map(|zone| zone.border(point));
-        let zones = threats.chain(no_fly).chain(prisms).chain(borders).chain(self.ground_near(point));
+        let low = self.airspace.low.iter().flat_map(|zone| zone.nearest(point));
+        let zones =
+            threats.chain(no_fly).chain(prisms).chain(low).chain(borders).chain(self.ground_near(point));
         zones.filter(|wall| (wall - point).norm() < reach_m).collect()
     }
 
@@ -148,13 +156,41 @@ impl KeepOut {
         places_around(point, FURTHEST_M).find(is_open)
     }
 
+    /// Where whoever is at `point` leaves what is closed by about the shortest way, to its side, up or down; of the
+    /// places that `accepts` takes, no further than 100 m away. `point` itself if it is open.
+    pub fn way_out(
+        &self,
+        point: &Vector3<f64>,
+        accepts: impl Fn(&Vector3<f64>) -> bool,
+    ) -> Option<Vector3<f64>> {
+        let upright = [1.0, -1.0].into_iter().filter_map(|up| self.out_along(point, up * Vector3::z()));
+        let upright =
+            upright.filter(&accepts).min_by(|a, b| (a.z - point.z).abs().total_cmp(&(b.z - point.z).abs()));
+        let upright_m = upright.map_or(FURTHEST_M, |place| (place.z - point.z).abs());
+        let is_open = |place: &Vector3<f64>| self.room_m(place) >= 0.0 && accepts(place);
+        places_around(point, upright_m.min(FURTHEST_M)).find(is_open).or(upright)
+    }
+
+    /// The first open place in a direction.
+    fn out_along(&self, point: &Vector3<f64>, direction: Vector3<f64>) -> Option<Vector3<f64>> {
+        let mut at_m = 0.0;
+        while at_m < FURTHEST_M {
+            let place = point + direction * at_m;
+            match self.room_m(&place) {
+                room_m if room_m >= 0.0 => return Some(place),
+                room_m => at_m += room_m.abs().max(STEP_M),
+            }
+        }
+        None
+    }
+
     /// Least distance to a zone, margin included, of the way straight down from `point` to the ground, metres:
     /// negative where it leads through one. The ground is at `ground_m`, or is the terrain.
     pub fn room_below_m(&self, point: &Vector3<f64>, ground_m: f64) -> f64 {
         let mut below = *point;
         let mut room_m = f64::INFINITY;
         while below.z >= ground_m && self.off_terrain_m(&below, 0.0) >= 0.0 {
-            let here_m = self.off_zones_m(&below) - self.margin_m;
+            let here_m = self.off_columns_m(&below) - self.margin_m;
             room_m = room_m.min(here_m);
             below.z -= here_m.abs().max(STEP_M);
         }
@@ -198,7 +234,7 @@ impl NoFlyZone {
         upright(level_m, off_band_m(point.z, self.floor_m, self.ceiling_m))
     }
 
-    fn nearest(&self, point: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn nearest(&self, point: &Vector3<f64>) -> Vector3<f64> {
         let offset = point.xy() - self.centre;
         let level = self.centre + offset * (self.radius_m / offset.norm()).min(1.0);
         at_height(level, point.z, self.floor_m, self.ceiling_m)
@@ -211,7 +247,7 @@ impl NoFlyPrism {
     }
 
     /// Of each edge; straight above or below the zone, of the whole.
-    fn nearest(&self, point: &Vector3<f64>) -> Vec<Vector3<f64>> {
+    pub(super) fn nearest(&self, point: &Vector3<f64>) -> Vec<Vector3<f64>> {
         let onto = |level| at_height(level, point.z, self.floor_m, self.ceiling_m);
         if self.off_outline_m(point.xy()) < 0.0 {
             return vec![onto(point.xy())];
@@ -239,7 +275,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::airspace::{HeightGrid, Mountain};
+    use crate::airspace::{Area, HeightGrid, Mountain};
 
     /// One of each kind: a threat, a cylinder, an L, and a hill.
     fn airspace() -> Airspace {
@@ -297,6 +333,44 @@ mod tests {
         assert!(south.y < 18.0 && keep_out.room_m(&south) >= 0.0);
         let outside = Vector3::new(0.0, 0.0, 5.0);
         assert_eq!(keep_out.nearest_open(&outside, |_| true), Some(outside));
+    }
+
+    #[test]
+    fn the_way_out_is_the_shortest_also_if_it_leads_up_or_down() {
+        let out = |x, y, z, accepts: fn(&Vector3<f64>) -> bool| {
+            let from = Vector3::new(x, y, z);
+            keep_out().way_out(&from, accepts).map(|to| to - from)
+        };
+        let up = out(-20.0, 20.0, 11.5, |_| true).unwrap();
+        assert!(up.xy().norm() < 1e-9 && (up.z - 1.5).abs() < 0.1, "{up}");
+        let beneath = out(-20.0, 20.0, 2.5, |_| true).unwrap();
+        assert!(beneath.z == 0.0 && (beneath.norm() - 6.0).abs() < 0.6, "too near to the ground: {beneath}");
+        let aside = out(-20.0, 24.0, 7.0, |_| true).unwrap();
+        assert!(aside.z == 0.0 && aside.norm() < 2.6, "{aside}");
+        assert!(
+            out(-20.0, 20.0, 11.5, |place| place.z < 12.0).unwrap().z.abs() < 1e-9,
+            "where that is not accepted"
+        );
+        assert_eq!(out(0.0, 0.0, 5.0, |_| true), Some(Vector3::zeros()));
+        let nowhere =
+            Airspace { stay_inside: vec![super::super::StayInside::default()], ..Airspace::default() };
+        assert_eq!(KeepOut::new(nowhere, 1.0, 0.0).way_out(&Vector3::zeros(), |_| true), None);
+    }
+
+    #[test]
+    fn who_lands_or_takes_off_passes_through_what_is_too_low_to_fly_in() {
+        let low = vec![Area::Round(NoFlyZone {
+            centre: Vector2::zeros(),
+            radius_m: f64::INFINITY,
+            floor_m: f64::NEG_INFINITY,
+            ceiling_m: 4.0,
+        })];
+        let keep_out = KeepOut::new(Airspace { low, ..Airspace::default() }, 1.0, 0.0);
+        let (above, in_it) = (Vector3::new(3.0, 0.0, 7.0), Vector3::new(3.0, 0.0, 2.0));
+        assert_eq!((keep_out.room_m(&above), keep_out.room_m(&in_it)), (2.0, -3.0));
+        assert_eq!(keep_out.walls(&above, 9.0), [Vector3::new(3.0, 0.0, 4.0)]);
+        assert_eq!(keep_out.room_below_m(&above, 0.0), f64::INFINITY);
+        assert_eq!(keep_out.way_out(&in_it, |_| true), Some(Vector3::new(3.0, 0.0, 5.0)));
     }
 
     #[test]

@@ -32,6 +32,19 @@ impl Area {
         }
     }
 
+    /// Distance from it, metres; negative inside.
+    pub(super) fn off_m(&self, point: &Vector3<f64>) -> f64 {
+        -self.depth_m(point)
+    }
+
+    /// Its points that are nearest to `point`, which is outside: one, or one for each edge.
+    pub(super) fn nearest(&self, point: &Vector3<f64>) -> Vec<Vector3<f64>> {
+        match self {
+            Self::Round(zone) => vec![zone.nearest(point)],
+            Self::Cornered(zone) => zone.nearest(point),
+        }
+    }
+
     /// Points of its upright border that are nearest to `point`, at its height: one, or one for each edge.
     fn border(&self, point: &Vector3<f64>) -> Vec<Vector3<f64>> {
         match self {

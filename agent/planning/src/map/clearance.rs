@@ -86,6 +86,11 @@ impl ClearanceMap {
         ClearanceMap { keep_out: Some(keep_out), ..self }
     }
 
+    /// From now on these places are known to be closed, in place of those before.
+    pub fn set_keep_out(&mut self, keep_out: KeepOut) {
+        self.keep_out = Some(keep_out);
+    }
+
     /// Keeps so far out of zones, and so high above terrain, from now on; see [`KeepOut::new`].
     pub fn set_margins(&mut self, margin_m: f64, terrain_clearance_m: f64) {
         if let Some(keep_out) = &mut self.keep_out {

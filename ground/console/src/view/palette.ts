@@ -19,6 +19,9 @@ export interface Palette {
   lost: Color;
   selected: Color;
   target: Color;
+  /** Of zones that keep vehicles out, and in. */
+  zoneOut: Color;
+  zoneIn: Color;
   vehicles: Color[];
 }
 
@@ -38,6 +41,8 @@ export function readPalette(): Palette {
     lost: colour('lost'),
     selected: colour('selected'),
     target: colour('target'),
+    zoneOut: colour('zone-out'),
+    zoneIn: colour('zone-in'),
     vehicles: Array.from({ length: COLOURS }, (_, i) => colour(`vehicle-${i}`)),
   };
 }

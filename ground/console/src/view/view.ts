@@ -5,7 +5,8 @@
 import { type Group, Scene as ThreeScene } from 'three';
 import { html, setText } from '../dom';
 import { type Identity, identities } from '../identity';
-import type { Bounds, Fleet, Point, Scene, Vec3, Vehicle } from '../protocol';
+import type { Place } from '../drawing';
+import type { Bounds, Fleet, Point, Scene, Vec3, Vehicle, Zone } from '../protocol';
 import { dispose } from './dispose';
 import { Eye } from './eye';
 import { gridStep, makeGround } from './ground';
@@ -18,6 +19,7 @@ import { type Palette, readPalette } from './palette';
 import { Pointing } from './pointing';
 import { Swarm } from './swarm';
 import { Target } from './target';
+import { Zones } from './zones';
 
 /** A vehicle is hit by a click this near to it, in pixels. */
 const REACH_PX = 20;
@@ -38,6 +40,7 @@ export class View {
   private readonly scene = new ThreeScene();
   private readonly swarm: Swarm;
   private readonly target: Target;
+  private readonly zoneLines: Zones;
   private readonly labels = new Labels();
   private readonly instruments = new Instruments();
   private readonly cursor = html('p', { class: 'cursor', 'aria-hidden': 'true' });
@@ -52,6 +55,9 @@ export class View {
   private looks: ReadonlyMap<string, Identity> = new Map();
   private selected: ReadonlySet<string> = new Set();
   private goal: Point | null = null;
+  private zones: readonly Zone[] = [];
+  private drawn: readonly Place[] = [];
+  private radius: number | null = null;
   private pointed: [x: number, y: number] | null = null;
   private placing = false;
   /** How much is known of where things are; each step from nothing fits the view once. */
@@ -77,7 +83,8 @@ export class View {
     this.eye = new Eye(container, () => this.pacing.ask());
     this.swarm = new Swarm(this.painter.kind, this.palette);
     this.target = new Target(this.painter.kind);
-    this.scene.add(this.swarm.object, this.target.object);
+    this.zoneLines = new Zones(this.painter.kind);
+    this.scene.add(this.swarm.object, this.target.object, this.zoneLines.object);
     new Pointing(container, {
       clicked: (x, y, more) => this.click(x, y, more),
       hovered: (x, y) => this.hover(x, y),
@@ -96,6 +103,7 @@ export class View {
     this.bounds = scene.bounds;
     this.obstacles = scene.obstacles;
     this.build();
+    this.showZones();
     if (this.fitted !== 'world' && (this.bounds || this.obstacles.length > 0)) {
       this.fitted = 'world';
       this.fit();
@@ -118,6 +126,24 @@ export class View {
 
   setSelection(selected: ReadonlySet<string>): void {
     this.selected = selected;
+    this.pacing.ask();
+  }
+
+  setZones(zones: readonly Zone[]): void {
+    this.zones = zones;
+    this.showZones();
+  }
+
+  /** The corners of a zone that is being drawn, or its middle and its radius. */
+  setDrawn(drawn: readonly Place[], radius: number | null): void {
+    this.drawn = drawn;
+    this.radius = radius;
+    this.showZones();
+  }
+
+  private showZones(): void {
+    const { min, max } = this.area();
+    this.zoneLines.show(this.zones, this.drawn, this.radius, [min[2], max[2]], this.palette);
     this.pacing.ask();
   }
 
@@ -149,6 +175,7 @@ export class View {
     this.palette = readPalette();
     this.swarm.repaint(this.palette);
     this.build();
+    this.showZones();
     this.pacing.ask();
   }
 

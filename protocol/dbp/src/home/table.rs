@@ -370,6 +370,14 @@ impl BidTable {
         (!bid.block.is_none()).then_some(&bid.asked_block)
     }
 
+    /// What each remote b-thread blocks here, under its node and its name, as it was asked for.
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = (&NodeName, &str, &EventSet)> {
+        self.bidders.iter().flat_map(|(node, bidder)| {
+            let blocking = bidder.bids.iter().filter(|(_, bid)| !bid.block.is_none());
+            blocking.map(move |(bthread, bid)| (node, bthread.as_str(), &bid.asked_block))
+        })
+    }
+
     /// The node of the remote b-thread behind a proxy.
     pub(super) fn party_name(&self, proxy: &str) -> Option<&NodeName> {
         let (node, _) = proxy.split_once('#')?;

@@ -5,9 +5,10 @@ use std::time::Duration;
 
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, COMMAND_LONG_DATA, ESTIMATOR_STATUS_DATA,
-    EXTENDED_SYS_STATE_DATA, GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA,
-    LOCAL_POSITION_NED_DATA, MavCmd, SYS_STATUS_DATA,
+    ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, COMMAND_LONG_DATA, DISTANCE_SENSOR_DATA,
+    ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA, HEARTBEAT_DATA,
+    HIGHRES_IMU_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, MavCmd, OPTICAL_FLOW_RAD_DATA,
+    SYS_STATUS_DATA,
 };
 
 /// A message that is missing is asked for this often at most.
@@ -20,6 +21,8 @@ enum Wish {
     Every(Duration),
     /// One at a time, at this interval: the autopilot refuses to send it as a stream.
     Singly(Duration),
+    /// As a stream with this interval, from an autopilot that may not have it at all.
+    IfItHas(Duration),
     /// Once; the autopilot repeats it by itself when it changes.
     Once,
 }
@@ -36,10 +39,12 @@ struct Subscription {
 #[derive(Debug, Clone)]
 pub(super) struct Subscriptions {
     list: Vec<Subscription>,
+    with_measured: bool,
 }
 
-impl Default for Subscriptions {
-    fn default() -> Self {
+impl Subscriptions {
+    /// With or without what instruments measure.
+    pub(super) fn new(with_measured: bool) -> Self {
         let every = |message_id, interval_ms| (message_id, Wish::Every(Duration::from_millis(interval_ms)));
         let wishes = [
             // A pilot's mode change is to be known at once, not with the next second.
@@ -54,13 +59,23 @@ impl Default for Subscriptions {
             every(GPS_RAW_INT_DATA::ID, 200),
             every(BATTERY_STATUS_DATA::ID, 1000),
         ];
-        let list =
-            wishes.map(|(message_id, wish)| Subscription { message_id, wish, seen_at: None, asked_at: None });
-        Self { list: list.into() }
+        let if_it_has =
+            |message_id, interval_ms| (message_id, Wish::IfItHas(Duration::from_millis(interval_ms)));
+        let measured = [
+            if_it_has(HIGHRES_IMU_DATA::ID, 8),
+            if_it_has(OPTICAL_FLOW_RAD_DATA::ID, 20),
+            if_it_has(DISTANCE_SENSOR_DATA::ID, 40),
+        ];
+        let measured = measured.into_iter().filter(|_| with_measured);
+        let list = wishes.into_iter().chain(measured).map(|(message_id, wish)| Subscription {
+            message_id,
+            wish,
+            seen_at: None,
+            asked_at: None,
+        });
+        Self { list: list.collect(), with_measured }
     }
-}
 
-impl Subscriptions {
     /// A message of this kind arrived.
     pub(super) fn seen(&mut self, now: Duration, message_id: u32) {
         if let Some(known) = self.list.iter_mut().find(|known| known.message_id == message_id) {
@@ -74,13 +89,13 @@ impl Subscriptions {
         known.wish = match known.wish {
             Wish::Every(interval) => Wish::Singly(interval),
             Wish::Singly(interval) => Wish::Every(interval),
-            Wish::Once => Wish::Once,
+            wish @ (Wish::IfItHas(_) | Wish::Once) => wish,
         };
     }
 
     /// Everything is to be asked for anew.
     pub(super) fn forget(&mut self) {
-        *self = Self::default();
+        *self = Self::new(self.with_measured);
     }
 
     /// The message that is overdue, and the command that asks for it: of several, the one not asked for the
@@ -101,7 +116,7 @@ impl Subscriptions {
             id => id,
         } as f32;
         let request = match overdue.wish {
-            Wish::Every(interval) => COMMAND_LONG_DATA {
+            Wish::Every(interval) | Wish::IfItHas(interval) => COMMAND_LONG_DATA {
                 command: MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL,
                 param1,
                 param2: interval.as_micros() as f32,
@@ -129,7 +144,7 @@ impl Subscription {
         match (self.wish, since(self.seen_at)) {
             (_, None) => true,
             (Wish::Once, Some(_)) => false,
-            (Wish::Every(interval) | Wish::Singly(interval), Some(age)) => {
+            (Wish::Every(interval) | Wish::Singly(interval) | Wish::IfItHas(interval), Some(age)) => {
                 self.asked_at.is_none() || age > ASK_AGAIN + 3 * interval
             }
         }

@@ -9,7 +9,10 @@ use crate::axes;
 use crate::command::{Command, CommandResult};
 use crate::dialect::Dialect;
 use crate::ekf_status;
+use crate::external::External;
 use crate::failsafe::Failsafe;
+use crate::frame::FrameWriter;
+use crate::geodesy::LocalFrame;
 use crate::handling::Handling;
 use crate::mode::FlightMode;
 use crate::parameter::ParameterEncoding;
@@ -93,6 +96,19 @@ impl Dialect for ArduPilot {
 
     fn is_spoken_by(&self, heartbeat: &HEARTBEAT_DATA) -> bool {
         heartbeat.autopilot == MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA
+    }
+
+    fn external(
+        &self,
+        time: Duration,
+        external: &External,
+        local: &LocalFrame,
+        output: &mut FrameWriter,
+    ) -> bool {
+        let Some((place, speed)) = external.vision(time, local) else { return false };
+        output.write(&place);
+        output.write(&speed);
+        true
     }
 
     fn estimator_message(&self) -> u32 {

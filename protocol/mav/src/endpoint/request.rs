@@ -3,6 +3,7 @@
 use mavlink::dialects::common::MavCmd;
 use nalgebra::Vector3;
 
+use crate::external::External;
 use crate::frame::Address;
 use crate::mode::FlightMode;
 use crate::set_point::SetPoint;
@@ -63,6 +64,8 @@ pub enum Request {
     },
     /// A set-point.
     SetPoint { set_point: SetPoint, from: Address },
+    /// An estimate of the vehicle's motion, to fly by where there is nothing better.
+    External(Box<External>),
     /// A pilot's sticks, each -1..1.
     Sticks {
         forward: f64,

@@ -5,9 +5,9 @@ use std::time::Duration;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA,
-    ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA,
-    GPS_RAW_INT_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, MISSION_CURRENT_DATA,
-    SYS_STATUS_DATA, VFR_HUD_DATA,
+    DISTANCE_SENSOR_DATA, ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA,
+    GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA, HEARTBEAT_DATA, HIGHRES_IMU_DATA, HOME_POSITION_DATA,
+    LOCAL_POSITION_NED_DATA, MISSION_CURRENT_DATA, OPTICAL_FLOW_RAD_DATA, SYS_STATUS_DATA, VFR_HUD_DATA,
 };
 
 use crate::frame::Address;
@@ -87,6 +87,9 @@ impl Default for Streams {
             (HOME_POSITION_DATA::ID, ms(2000)),
             (ESTIMATOR_STATUS_DATA::ID, ms(1000)),
             (AUTOPILOT_VERSION_DATA::ID, OFF),
+            (HIGHRES_IMU_DATA::ID, OFF),
+            (OPTICAL_FLOW_RAD_DATA::ID, OFF),
+            (DISTANCE_SENSOR_DATA::ID, OFF),
         ];
         let list = defaults.map(|(message_id, default)| Stream {
             message_id,
@@ -102,6 +105,11 @@ impl Streams {
     /// Whether the autopilot can send this message.
     pub(super) fn contains(&self, message_id: u32) -> bool {
         self.list.iter().any(|stream| stream.message_id == message_id)
+    }
+
+    /// Whether anybody wants it regularly.
+    pub(super) fn is_on(&self, message_id: u32) -> bool {
+        self.list.iter().any(|stream| stream.message_id == message_id && stream.interval() != OFF)
     }
 
     /// The interval of a stream in microseconds as `MESSAGE_INTERVAL` reports it: -1 for off, 0 for unknown.

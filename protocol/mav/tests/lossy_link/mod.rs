@@ -45,6 +45,29 @@ pub fn parameters() -> ParameterTable {
     ])
 }
 
+/// What an autopilot tells that stands on the ground.
+pub fn standing() -> VehicleState {
+    VehicleState {
+        measured: Duration::ZERO,
+        mode: FlightMode::Hold,
+        armed: false,
+        landed: Landed::OnGround,
+        position: Some(Vector3::new(10.0, -4.0, 0.15)),
+        velocity: Vector3::new(1.0, 2.0, 3.0),
+        position_sigma_m: [0.4, 0.7],
+        has_fix: true,
+        attitude: UnitQuaternion::from_euler_angles(0.1, -0.2, 0.3),
+        angular_rate: Vector3::new(0.01, 0.02, 0.03),
+        battery: Battery { fraction: 0.83, voltage_v: 16.2 },
+        home: Some(Vector3::new(10.0, -4.0, 0.15)),
+        sensors_ok: true,
+        ready_to_arm: true,
+        failsafe: false,
+        throttle: 0.0,
+        mission_item: 0,
+    }
+}
+
 impl Pair {
     pub fn new(loss: f64, seed: u64) -> Self {
         Self {
@@ -57,25 +80,7 @@ impl Pair {
                 accepts_fence: |items| items.len() != 2,
                 accepts_rally: |_| true,
             }),
-            state: VehicleState {
-                measured: Duration::ZERO,
-                mode: FlightMode::Hold,
-                armed: false,
-                landed: Landed::OnGround,
-                position: Some(Vector3::new(10.0, -4.0, 0.15)),
-                velocity: Vector3::new(1.0, 2.0, 3.0),
-                position_sigma_m: [0.4, 0.7],
-                has_fix: true,
-                attitude: UnitQuaternion::from_euler_angles(0.1, -0.2, 0.3),
-                angular_rate: Vector3::new(0.01, 0.02, 0.03),
-                battery: Battery { fraction: 0.83, voltage_v: 16.2 },
-                home: Some(Vector3::new(10.0, -4.0, 0.15)),
-                sensors_ok: true,
-                ready_to_arm: true,
-                failsafe: false,
-                throttle: 0.0,
-                mission_item: 0,
-            },
+            state: standing(),
             late: Duration::ZERO,
             is_frozen: false,
             events: Vec::new(),

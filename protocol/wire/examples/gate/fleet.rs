@@ -20,6 +20,7 @@ const HOSTILE: NetworkConfig = NetworkConfig {
     loss: 0.3,
     duplicate: 0.2,
     reorder: 0.5,
+    range_m: None,
 };
 
 /// Vehicles may keep each other out of the gate; the ground may lift such a block, and nothing else.

@@ -7,7 +7,7 @@ use skein_bp::catalogue::{Declaration, Field, Whose};
 use skein_dbp::RULES;
 use skein_dbp::facts::FACTS;
 
-use super::{JOINT, MISSION, MOTION, ORDERS, SCRIPT_FACTS, SCRIPTS, SENSES, STATED, STATION};
+use super::{AIRSPACE, JOINT, MISSION, MOTION, ORDERS, SCRIPT_FACTS, SCRIPTS, SENSES, STATED, STATION};
 
 /// Events that belong together.
 #[derive(Clone, Copy, Debug)]
@@ -21,11 +21,12 @@ pub struct Subject {
 /// The home of a vehicle's events.
 const VEHICLE: &str = "uav/*";
 
-const STANDARD: [Subject; 11] = [
+const STANDARD: [Subject; 12] = [
     Subject { title: "A vehicle's motion", home: VEHICLE, events: MOTION },
     Subject { title: "What b-threads state of a vehicle's motion", home: VEHICLE, events: STATED },
     Subject { title: "A vehicle's flight and mission", home: VEHICLE, events: MISSION },
     Subject { title: "What a vehicle finds out on its way", home: VEHICLE, events: SENSES },
+    Subject { title: "What is drawn on the map for a vehicle", home: VEHICLE, events: AIRSPACE },
     Subject { title: "Orders to a vehicle", home: VEHICLE, events: ORDERS },
     Subject { title: "Scripts on a vehicle", home: VEHICLE, events: SCRIPTS },
     Subject { title: "What is told to scripts", home: VEHICLE, events: SCRIPT_FACTS },

@@ -13,6 +13,7 @@
 //! assert!(<(Goto, Arrived)>::any_at("uav/3").and(Goto::leg(0)).contains(&goto));
 //! ```
 
+mod airspace;
 mod catalogue;
 mod limit;
 mod mission;
@@ -29,7 +30,9 @@ pub use skein_bp::catalogue::{Declaration, Declared, Events, Field, Kind, Whose}
 use skein_bp::{Event, EventSet};
 
 pub use self::catalogue::{Catalogue, Subject, any_of};
-pub use self::{limit::*, mission::*, motion::*, order::*, script::*, sense::*, station::*, swarm::*};
+pub use self::{
+    airspace::*, limit::*, mission::*, motion::*, order::*, script::*, sense::*, station::*, swarm::*,
+};
 
 /// A text in an event's data. Cloning is cheap.
 pub type Text = Arc<str>;

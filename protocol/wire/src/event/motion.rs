@@ -56,6 +56,11 @@ skein_bp::events! {
         /// Of which one.
         of: Text,
     }
+    /// Fly by this source of position from now on: `autopilot`, `markers`, `lidar`, or `dead_reckoning` for inertia and
+    /// flow alone.
+    FlyBy = "fly_by", Anyone {
+        source: Text,
+    }
     /// Stop and hover at once.
     Hold = "hold", Own {
         why: Text,

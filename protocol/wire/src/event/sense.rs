@@ -43,6 +43,8 @@ skein_bp::events! {
         /// As in `goto`.
         leg: i64,
         why: Text,
+        /// The zone in the way, if one is: the vehicle waits for its end.
+        zone: Option<Text>,
     }
     /// The path ahead runs into an obstacle that was not known when it was planned.
     PathBlocked = "path_blocked", Own;
@@ -123,4 +125,13 @@ skein_bp::events! {
     }
     /// It knows where it is again.
     PositionTrusted = "position_trusted", Own;
+    /// A source of position can be flown by: `autopilot`, `markers` or `lidar`.
+    SourceFound = "source_found", Own {
+        source: Text,
+    }
+    /// It cannot any more: it is silent, or disagrees.
+    SourceLost = "source_lost", Own {
+        source: Text,
+        why: Text,
+    }
 }

@@ -42,6 +42,20 @@ skein_bp::events! {
         /// The points of a `route`, in m: `x y z; x y z`.
         way: Option<Text>,
     }
+    /// The operator has drawn a zone for all vehicles, or drawn the zone of this name anew.
+    Drawn = "drawn", Anyone {
+        /// Its name.
+        name: Text,
+        /// The zone, as JSON.
+        zone: Text,
+        by: Text,
+    }
+    /// The operator has removed a zone.
+    Erased = "erased", Anyone {
+        /// Its name.
+        name: Text,
+        by: Text,
+    }
     /// An order is not brought to this vehicle any more: another person or program holds it.
     Overruled = "overruled", Anyone {
         vehicle: NodeName,

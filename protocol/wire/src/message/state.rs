@@ -14,6 +14,7 @@ use super::record::{Addressee, Kind, Record};
 use crate::decode_error::DecodeError;
 use crate::event::Right;
 use crate::proto;
+use crate::zone::Zone;
 
 /// A vehicle's state. World frame ENU, SI units.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,6 +46,9 @@ pub struct State {
     pub mission: MissionState,
     /// The names of the scripts that run on it; only the first [`State::MAX_SCRIPTS`] travel.
     pub scripts: Vec<String>,
+    /// The names of the zones that it has regard for, because somebody has drawn them; only the first
+    /// [`State::MAX_ZONES`] travel.
+    pub zones: Vec<String>,
     /// The person or program whose orders it takes; empty while nobody holds it.
     pub holder: String,
     /// Who asks the holder for it; empty if nobody does.
@@ -86,6 +90,9 @@ impl State {
     /// So many names of scripts travel.
     pub const MAX_SCRIPTS: usize = 8;
 
+    /// So many names of zones travel.
+    pub const MAX_ZONES: usize = 2 * Zone::MOST;
+
     /// A vehicle that stands disarmed at the origin with a full battery: a start to fill in.
     pub fn new(node: NodeName) -> Self {
         Self {
@@ -105,6 +112,7 @@ impl State {
             path: Vec::new(),
             mission: MissionState::default(),
             scripts: Vec::new(),
+            zones: Vec::new(),
             holder: String::new(),
             asked_by: String::new(),
             right: Right::Free,
@@ -159,6 +167,7 @@ impl From<&State> for proto::State {
             path: state.path.iter().take(State::MAX_PATH).map(Into::into).collect(),
             mission: proto::Mission::from(state.mission).into(),
             scripts: state.scripts.iter().take(State::MAX_SCRIPTS).cloned().collect(),
+            zones: state.zones.iter().take(State::MAX_ZONES).cloned().collect(),
             holder: words(&state.holder),
             asked_by: words(&state.asked_by),
             right: proto::Right::from(state.right).into(),
@@ -179,6 +188,7 @@ impl TryFrom<proto::State> for State {
     fn try_from(state: proto::State) -> Result<Self> {
         at_most("State.path", state.path.len(), Self::MAX_PATH, "at most 32 points")?;
         at_most("State.scripts", state.scripts.len(), Self::MAX_SCRIPTS, "at most 8 names")?;
+        at_most("State.zones", state.zones.len(), Self::MAX_ZONES, "at most 64 names")?;
         if !(0.0..=1.0).contains(&state.battery) {
             return Err(out_of_range("State.battery", state.battery, "a share from 0 to 1"));
         }
@@ -200,6 +210,7 @@ impl TryFrom<proto::State> for State {
             // In a word of a later version, it is not over as far as this one can tell.
             mission: proto::Mission::try_from(state.mission).unwrap_or_default().into(),
             scripts: state.scripts.into_iter().map(words).collect(),
+            zones: state.zones.into_iter().map(words).collect(),
             holder: words(state.holder),
             asked_by: words(state.asked_by),
             right: proto::Right::try_from(state.right).unwrap_or_default().into(),

@@ -24,6 +24,7 @@ pub fn hostile() -> NetworkConfig {
         loss: 0.3,
         duplicate: 0.2,
         reorder: 0.5,
+        range_m: None,
     }
 }
 

@@ -9,12 +9,12 @@
 use std::time::Duration;
 
 use nalgebra::{UnitQuaternion, Vector3};
-use skein_mav::axes;
+use skein_mav::{External, axes};
 
 use crate::position_error::Drift;
 use crate::quadrotor::STEP;
-use crate::sensors::{Gps, Imu, SensorReadings};
-use crate::vehicle::{GRAVITY_M_S2, VehicleModel};
+use crate::sensors::{Imu, SensorReadings};
+use crate::vehicle::{GRAVITY_M_S2, GpsModel, VehicleModel};
 
 /// Power spectral density of the error of the predicted acceleration, (m/s^2)^2/Hz: tilt error and
 /// accelerometer bias.
@@ -36,6 +36,10 @@ const SETTLING_TIME: Duration = Duration::from_secs(2);
 const READY_SIGMA_M: f64 = 0.5;
 /// A position this many standard deviations beside the estimate is taken over, and a height by pressure with it.
 const RESET_SIGMAS: f64 = 10.0;
+/// An estimate of somebody else's is not believed to be better than this, m and m/s: it has taken in the same
+/// instruments, and its errors last.
+const EXTERNAL_M: f64 = 0.02;
+const EXTERNAL_M_S: f64 = 0.05;
 /// Nor after this long without a fix.
 const FIX_TIMEOUT: Duration = Duration::from_secs(1);
 
@@ -78,18 +82,35 @@ pub(super) struct Estimator {
     heading_known: bool,
     started: Option<Duration>,
     last_fix: Option<Duration>,
+    /// Of these, the last by satellites, and the last estimate of somebody else's.
+    last_gps: Option<Duration>,
+    last_external: Option<Duration>,
+}
+
+/// A position and velocity from outside, with standard deviations.
+struct Fix {
+    position: Vector3<f64>,
+    velocity: Vector3<f64>,
+    position_sigma_m: Vector3<f64>,
+    velocity_sigma_m_s: f64,
 }
 
 impl Estimator {
     /// `drift` is what the instruments are known to do, and is told.
     pub(super) fn new(model: &VehicleModel, drift: Drift) -> Self {
-        let (horizontal, vertical) = (model.gps.sigma_horizontal_m, model.gps.sigma_vertical_m);
+        let gps = model.gps.unwrap_or(GpsModel {
+            sigma_horizontal_m: 0.0,
+            sigma_vertical_m: 0.0,
+            sigma_velocity_m_s: 0.0,
+            rate_hz: 0.0,
+        });
+        let (horizontal, vertical) = (gps.sigma_horizontal_m, gps.sigma_vertical_m);
         // An instrument without noise in the model is still not believed to the last digit.
         let floor = |sigma: f64| sigma.max(0.005);
         Self {
             trust: Trust {
                 gps_position_m: Vector3::new(horizontal, horizontal, vertical).map(floor),
-                gps_velocity_m_s: floor(model.gps.sigma_velocity_m_s),
+                gps_velocity_m_s: floor(gps.sigma_velocity_m_s),
                 // Twice what it is: its offset is learnt from the same filter.
                 baro_m: 2.0 * floor(model.baro.sigma_m),
             },
@@ -106,6 +127,8 @@ impl Estimator {
             heading_known: false,
             started: None,
             last_fix: None,
+            last_gps: None,
+            last_external: None,
         }
     }
 
@@ -125,13 +148,19 @@ impl Estimator {
         told_m.unwrap_or([east.max(north).hypot(sigma_m), up.hypot(sigma_vertical_m)])
     }
 
-    pub(super) fn has_fix(&self, now: Duration) -> bool {
-        self.last_fix.is_some_and(|fix| now.saturating_sub(fix) <= FIX_TIMEOUT)
+    /// Whether there is a fix by satellites.
+    pub(super) fn has_gps(&self, now: Duration) -> bool {
+        is_recent(self.last_gps, now)
+    }
+
+    /// Whether there is a fix by anything.
+    fn has_fix(&self, now: Duration) -> bool {
+        is_recent(self.last_fix, now)
     }
 
     /// Begins anew with the next fix; attitude and motion go on.
     pub(super) fn forget_position(&mut self) {
-        self.last_fix = None;
+        (self.last_fix, self.last_gps, self.last_external) = (None, None, None);
         self.baro_offset_m = None;
     }
 
@@ -142,7 +171,7 @@ impl Estimator {
         if !self.heading_known {
             Err("no compass")
         } else if !self.has_fix(now) {
-            Err("no GPS fix")
+            Err("no position: neither satellites nor an external estimate")
         } else if age(self.started).is_none_or(|age| age < SETTLING_TIME) || sigma > READY_SIGMA_M {
             Err("estimator is still settling")
         } else {
@@ -157,11 +186,20 @@ impl Estimator {
             self.estimate.attitude = level_with(&readings.imu.specific_force);
         }
         self.predict(&readings.imu);
-        if let Some(heading) = readings.magnetic_heading {
+        let heading = readings.magnetic_heading.filter(|_| !is_recent(self.last_external, now));
+        if let Some(heading) = heading {
             self.correct_heading(heading);
         }
         if let Some(gps) = &readings.gps {
-            self.correct_by_gps(now, gps);
+            self.last_gps = Some(now);
+            let trust = &self.trust;
+            let fix = Fix {
+                position: gps.position,
+                velocity: gps.velocity,
+                position_sigma_m: trust.gps_position_m,
+                velocity_sigma_m_s: trust.gps_velocity_m_s,
+            };
+            self.correct_by(now, &fix);
         }
         if let Some(height_m) = readings.baro_height_m {
             self.correct_height(height_m);
@@ -197,9 +235,27 @@ impl Estimator {
         self.heading_known = true;
     }
 
-    fn correct_by_gps(&mut self, now: Duration, gps: &Gps) {
+    /// Takes in an estimate of somebody else's, where there are no satellites.
+    pub(super) fn take_external(&mut self, now: Duration, external: &External) {
+        if self.has_gps(now) {
+            self.last_external = None;
+            return;
+        }
+        let sigma = |index: usize| external.motion_covariance[(index, index)].max(0.0).sqrt();
+        let fix = Fix {
+            position: external.position,
+            velocity: external.velocity,
+            position_sigma_m: Vector3::new(sigma(0), sigma(1), sigma(2)).map(|it| it.max(EXTERNAL_M)),
+            velocity_sigma_m_s: sigma(3).max(sigma(4)).max(sigma(5)).max(EXTERNAL_M_S),
+        };
+        self.correct_by(now, &fix);
+        self.correct_heading(axes::yaw(&external.attitude));
+        self.last_external = Some(now);
+    }
+
+    fn correct_by(&mut self, now: Duration, fix: &Fix) {
         let Some(last_fix) = self.last_fix.replace(now) else {
-            let fixes = gps.position.iter().zip(gps.velocity.iter());
+            let fixes = fix.position.iter().zip(fix.velocity.iter());
             for (filter, (position, velocity)) in self.filters.iter_mut().zip(fixes) {
                 *filter = AxisFilter::at(*position, *velocity);
             }
@@ -207,14 +263,14 @@ impl Estimator {
         };
         let mut innovation = Vector3::zeros();
         let mut velocity_gain = 0.0;
-        let variance = self.trust.gps_velocity_m_s * self.trust.gps_velocity_m_s;
+        let variance = fix.velocity_sigma_m_s * fix.velocity_sigma_m_s;
         for (axis, filter) in self.filters.iter_mut().enumerate() {
-            let sigma = self.trust.gps_position_m[axis];
-            filter.take_position(gps.position[axis], sigma * sigma);
-            innovation[axis] = gps.velocity[axis] - filter.velocity;
-            velocity_gain = filter.correct_velocity(gps.velocity[axis], variance);
+            let sigma = fix.position_sigma_m[axis];
+            filter.take_position(fix.position[axis], sigma * sigma);
+            innovation[axis] = fix.velocity[axis] - filter.velocity;
+            velocity_gain = filter.correct_velocity(fix.velocity[axis], variance);
         }
-        let interval = now.saturating_sub(last_fix).as_secs_f64();
+        let interval = now.saturating_sub(last_fix).max(STEP).as_secs_f64();
         self.correct_tilt(&innovation, velocity_gain, interval);
     }
 
@@ -249,6 +305,10 @@ impl Estimator {
     fn rotate(&mut self, by: &Vector3<f64>) {
         self.estimate.attitude = UnitQuaternion::from_scaled_axis(*by) * self.estimate.attitude;
     }
+}
+
+fn is_recent(at: Option<Duration>, now: Duration) -> bool {
+    at.is_some_and(|at| now.saturating_sub(at) <= FIX_TIMEOUT)
 }
 
 /// The attitude with heading east whose "up" is the direction of a specific force at rest.

@@ -18,12 +18,15 @@ mod telling;
 use std::time::Duration;
 
 use nalgebra::{Vector2, Vector3};
-use skein_mav::{Datum, Endpoint, EndpointConfig, MissionItem, ParameterTable, Request, VehicleState};
+use skein_mav::{
+    Datum, Distance, Endpoint, EndpointConfig, Inertial, Measured, MissionItem, ParameterTable, Request,
+    VehicleState,
+};
 
 use crate::position_error::PositionErrors;
 use crate::quadrotor::MotorCommands;
 use crate::sensors::SensorReadings;
-use crate::vehicle::VehicleModel;
+use crate::vehicle::{RangefinderModel, VehicleModel};
 use attitude_control::AttitudeControl;
 use estimator::{Estimate, Estimator};
 use fence::GeoFence;
@@ -98,6 +101,7 @@ struct Situation<'a> {
 ///     fix_error: Vector3::zeros(),
 ///     magnetic_heading: None,
 ///     rangefinder_down_m: None,
+///     flow: None,
 ///     contact: true,
 ///     battery: Battery { fraction: 1.0, voltage_v: 16.8 },
 /// };
@@ -119,6 +123,7 @@ pub struct Autopilot {
     fence: GeoFence,
     /// Places to return to, ENU, m.
     rally: Vec<Vector2<f64>>,
+    rangefinder: RangefinderModel,
     /// Time of the last step: bytes that arrive between two steps are stamped with it.
     now: Duration,
 }
@@ -148,6 +153,7 @@ impl Autopilot {
             }),
             fence: GeoFence::default(),
             rally: Vec::new(),
+            rangefinder: config.vehicle.rangefinder,
         }
     }
 
@@ -170,6 +176,7 @@ impl Autopilot {
         }
         self.endpoint.move_origin(self.telling.origin(now));
         self.estimator.update(now, readings);
+        self.pass_on(readings);
         while let Some(request) = self.endpoint.next_request() {
             self.serve(request, readings);
         }
@@ -178,6 +185,25 @@ impl Autopilot {
         let commands = self.drive(drive);
         self.report(readings, &commands);
         commands
+    }
+
+    /// Passes on what the instruments have measured, to who asks for it.
+    fn pass_on(&mut self, readings: &SensorReadings) {
+        let inertial = Inertial { rate: readings.imu.angular_rate, force: readings.imu.specific_force };
+        self.endpoint.measure(self.now, &Measured::Inertial(inertial));
+        if let Some(flow) = readings.flow {
+            self.endpoint.measure(self.now, &Measured::Flow(flow));
+        }
+        if let Some(distance_m) = readings.rangefinder_down_m {
+            let distance = Distance {
+                distance_m,
+                least_m: 0.0,
+                most_m: self.rangefinder.range_m,
+                sigma_m: Some(self.rangefinder.sigma_m),
+                half_cone_rad: 0.0,
+            };
+            self.endpoint.measure(self.now, &Measured::Distance(distance));
+        }
     }
 
     /// The state machine, and what it decides from.
@@ -206,6 +232,7 @@ impl Autopilot {
                 self.read_settings();
                 self.endpoint.answer(ticket, result);
             }
+            Request::External(external) => self.estimator.take_external(now, &external),
             Request::SetPoint { set_point, .. } => self.modes.on_set_point(now, set_point),
             Request::Sticks { forward, left, up, turn_left } => {
                 let sticks = Sticks { forward, left, up, turn_left };
@@ -265,7 +292,7 @@ impl Autopilot {
             position: self.estimator.has_position().then_some(estimate.position),
             velocity: estimate.velocity,
             position_sigma_m: self.estimator.position_sigma_m(),
-            has_fix: self.estimator.has_fix(self.now),
+            has_fix: self.estimator.has_gps(self.now),
             attitude: estimate.attitude,
             angular_rate: estimate.angular_rate,
             battery: readings.battery,

@@ -82,10 +82,25 @@ pub fn measure(
     full_disk: Option<Moment>,
     port_offset: u16,
 ) -> anyhow::Result<Vec<f64>> {
+    with_operator("hold", vehicles, full_disk, port_offset, move |operator| hold(operator, holds))
+}
+
+/// What an operator measures in a swarm whose vehicles have a process each, once they are all in the air.
+///
+/// # Errors
+/// The swarm does not start or fly, or those of `measure`.
+pub fn with_operator(
+    what: &str,
+    vehicles: usize,
+    full_disk: Option<Moment>,
+    port_offset: u16,
+    measure: impl FnOnce(&mut Operator) -> anyhow::Result<Vec<f64>> + Send + 'static,
+) -> anyhow::Result<Vec<f64>> {
     let overrides = Overrides { vehicles: Some(vehicles), ..Overrides::default() };
     // Nobody sets out there before everybody is in the air.
     let scenario = Scenario::open("antipodal", &overrides, 1)?;
-    let folder = std::env::temp_dir().join(format!("skein-bench-hold-{}-{port_offset}", std::process::id()));
+    let folder =
+        std::env::temp_dir().join(format!("skein-bench-{what}-{}-{port_offset}", std::process::id()));
     let disk = full_disk.map(|_| SmallDisk::mount(&folder.join("state"))).transpose()?;
     let fill = || disk.as_ref().map_or(Ok(()), SmallDisk::fill);
     if full_disk == Some(Moment::Start) {
@@ -102,7 +117,7 @@ pub fn measure(
         // Whoever measures is there as long as this thread.
         let _ = in_the_air.send(());
         let _ = goes_on.recv();
-        hold(&mut operator, holds)
+        measure(&mut operator)
     });
     while !operator.is_finished() {
         swarm.step();

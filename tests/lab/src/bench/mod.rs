@@ -7,6 +7,8 @@ mod link;
 mod mesh;
 mod nav;
 pub mod plan;
+mod slam;
+mod zone;
 
 use crate::task::Entry;
 
@@ -15,9 +17,11 @@ pub const TASKS: &[Entry] = &[
     Entry::of::<plan::Plan>(),
     Entry::of::<nav::Nav>(),
     Entry::of::<mesh::Meshes>(),
+    Entry::of::<slam::Slams>(),
     Entry::of::<fleet::Sizes>(),
     Entry::of::<fleet::OneSize>(),
     Entry::of::<link::Extent>(),
     Entry::of::<link::peer::Part>(),
     Entry::of::<hold::Holds>(),
+    Entry::of::<zone::Zones>(),
 ];

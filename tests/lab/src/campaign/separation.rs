@@ -121,7 +121,8 @@ fn fly_all(args: &Separation) -> anyhow::Result<Vec<Run>> {
 
 fn fly_one(args: &Separation, scenario: &str, seed: u64) -> anyhow::Result<Run> {
     let mut scenario = Scenario::built_in(scenario, Some(args.vehicles), seed)?;
-    scenario.network = Network { latency_ms: args.latency_ms, loss: args.loss, lease_ms: args.lease_ms };
+    let Separation { latency_ms, loss, lease_ms, .. } = *args;
+    scenario.network = Network { latency_ms, loss, lease_ms, ..Network::default() };
     scenario.validate()?;
     Ok(Run::of(Trial::new(&scenario, Controller::Bp).fly(&mut |_, _| {})?.summary))
 }

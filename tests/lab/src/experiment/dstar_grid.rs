@@ -23,9 +23,9 @@ use crate::reported::Experiment;
 use crate::runs;
 
 /// Cells along a side of the marker grid.
-const MARKERS: usize = 10;
+pub(super) const MARKERS: usize = 10;
 /// Its blocked cells, a reconstruction: the paper's picture is not legible.
-const BLOCKED: [usize; 9] = [24, 32, 33, 34, 42, 45, 46, 47, 57];
+pub(super) const BLOCKED: [usize; 9] = [24, 32, 33, 34, 42, 45, 46, 47, 57];
 /// The ends of the published routes.
 const ENDS: [usize; 2] = [3, 66];
 /// The published routes, by the cells' numbers, row by row from 1.
@@ -68,7 +68,7 @@ impl Experiment for DstarGrid {
 }
 
 /// The cell with a number on the marker grid.
-fn marker(number: usize) -> VoxelIndex {
+pub(super) fn marker(number: usize) -> VoxelIndex {
     VoxelIndex { x: (number - 1) % MARKERS, y: (number - 1) / MARKERS, z: 0 }
 }
 
@@ -78,6 +78,11 @@ fn cross(costs: StepCosts) -> anyhow::Result<Vec<VoxelIndex>> {
     BLOCKED.iter().for_each(|number| grid.cells.set_blocked(marker(*number), true));
     let [start, goal] = ENDS.map(marker);
     Ok(DStarLite::new(&grid, start, goal).plan(&grid, usize::MAX)?.cells)
+}
+
+/// The ends of the straight parts of the way that a vehicle may fly: no corner of a blocked cell is cut.
+pub(super) fn flying_route() -> Vec<VoxelIndex> {
+    cross(StepCosts::FLYING).map(|cells| elided(&cells)).unwrap_or_default()
 }
 
 /// The waypoints that are flown of a route: of collinear ones the ends.

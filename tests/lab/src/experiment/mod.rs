@@ -5,8 +5,9 @@ mod autopilots;
 mod circle;
 mod dstar_grid;
 mod feasibility;
+mod indoor;
 mod lsc;
-mod naive_right_of_way;
+pub mod naive_right_of_way;
 mod narrow;
 mod performance;
 mod potential;
@@ -32,6 +33,7 @@ pub const TASKS: &[Entry] = &[
     Entry::of::<Reported<narrow::Narrow>>(),
     Entry::of::<Reported<sphere::Sphere>>(),
     Entry::of::<Reported<dstar_grid::DstarGrid>>(),
+    Entry::of::<Reported<indoor::Indoor>>(),
     Entry::of::<Reported<lsc::Lsc>>(),
     Entry::of::<Reported<swarm_planning::SwarmPlanning>>(),
 ];

@@ -347,11 +347,11 @@ fn model(agent: &LscAgent) -> anyhow::Result<VehicleModel> {
     let mut model = VehicleModel::built_in("crazyflie")?;
     model.hull_radius_m = agent.radius_m;
     (model.max_climb_m_s, model.max_descent_m_s) = (agent.max_speed_m_s.z, agent.max_speed_m_s.z);
-    model.gps = GpsModel {
+    model.gps = Some(GpsModel {
         sigma_horizontal_m: 0.005,
         sigma_vertical_m: 0.005,
         sigma_velocity_m_s: 0.05,
         rate_hz: 50.0,
-    };
+    });
     Ok(model)
 }

@@ -16,6 +16,8 @@ const ROOM_M: f64 = 7.0;
 const APART_M: f64 = 2.0;
 /// The height of flight, m: low enough that who takes off between two walls takes neither for a roof.
 const HEIGHT_M: f64 = 1.5;
+/// The speed of flight, m/s.
+pub const CRUISE_M_S: f64 = 1.5;
 
 /// The shapes of places.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -39,6 +41,13 @@ pub enum Shape {
 impl Shape {
     pub const ALL: [Self; 7] =
         [Self::Corridor, Self::Bend, Self::Crossing, Self::Junction, Self::Door, Self::DeadEnd, Self::Maze];
+
+    /// The shape of the mission with this seed: of five one meets head-on behind a bend.
+    pub fn of(seed: u64) -> Self {
+        let others = Self::ALL.map(|shape| (shape != Self::Bend).then_some(shape));
+        let mut others = others.into_iter().flatten().cycle().skip((seed % 6) as usize);
+        others.next().filter(|_| !seed.is_multiple_of(5)).unwrap_or(Self::Bend)
+    }
 
     pub fn name(self) -> &'static str {
         match self {
@@ -247,17 +256,34 @@ fn can_all_arrive(ways: &BTreeMap<Square, Vec<Square>>, starts: &[Square], goals
 }
 
 impl Place {
-    /// The vehicle with the longest way, straight on.
-    pub fn longest(&self) -> usize {
-        let far = |[from, to]: &[[f64; 2]; 2]| (from[0] - to[0]).hypot(from[1] - to[1]);
-        let longest = self.routes.iter().enumerate().max_by(|a, b| far(a.1).total_cmp(&far(b.1)));
-        longest.map_or(0, |(index, _)| index)
+    /// From where to where each vehicle flies, m.
+    pub fn routes(&self) -> &[[[f64; 2]; 2]] {
+        &self.routes
     }
 
-    /// The scenario of all vehicles, or of one of them alone.
-    pub fn scenario(&self, only: Option<usize>, network: &str) -> String {
+    /// The corners of all that is open, m.
+    pub fn extent_m(&self) -> [[f64; 2]; 2] {
+        let [least, most] = self.corners();
+        let side = |index: i32| f64::from(index) * self.width_m;
+        [least.map(side), most.map(|index| side(index + 1))]
+    }
+
+    /// The distance of a point from the nearest wall, m, as far as the next but one square.
+    pub fn clearance_m(&self, point: [f64; 2]) -> f64 {
+        let square = point.map(|metres| (metres / self.width_m).floor() as i32);
+        let around = (-2..=2).flat_map(|x| (-2..=2).map(move |y| [square[0] + x, square[1] + y]));
+        let outside = |axis: usize, index: i32| {
+            let low = f64::from(index) * self.width_m;
+            (low - point[axis]).max(point[axis] - low - self.width_m).max(0.0)
+        };
+        let to = |wall: Square| outside(0, wall[0]).hypot(outside(1, wall[1]));
+        around.filter(|square| !self.open.contains(square)).map(to).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The scenario of vehicles on these routes, m.
+    pub fn scenario(&self, routes: &[[[f64; 2]; 2]], network: &str) -> String {
         let mut text = format!(
-            "about = \"{} of {:.1} m\"\ncruise_speed_m_s = 1.5\ntakeoff_height_m = {HEIGHT_M:?}\n\
+            "about = \"{} of {:.1} m\"\ncruise_speed_m_s = {CRUISE_M_S:?}\ntakeoff_height_m = {HEIGHT_M:?}\n\
              time_limit_s = 600.0\n{network}\n",
             self.shape.name(),
             self.width_m
@@ -281,9 +307,7 @@ impl Place {
                 self.width_m
             );
         }
-        for (_, [from, to]) in
-            self.routes.iter().enumerate().filter(|(index, _)| only.is_none_or(|only| only == *index))
-        {
+        for [from, to] in routes {
             let _ = writeln!(
                 text,
                 "[[vehicle]]\nstart_m = [{}, {}]\nwaypoints_m = [[{}, {}, {HEIGHT_M}]]",

@@ -1,0 +1,3 @@
+//! Positioning on known answers.
+
+mod ekf;
