@@ -3,6 +3,8 @@
 mod opencv;
 mod pose;
 
+use std::sync::OnceLock;
+
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use skein_positioning::markers::{self, Camera, Detection, Dictionary, Layout, Lens, Placed};
 use skein_world::{FloorCamera, Glare, ImageFaults, Picture, View};
@@ -14,6 +16,12 @@ const LENS: Lens = Lens::Radial { k: [-0.12, 0.03, -0.004, 0.0, 0.0, 0.0], p: [0
 
 fn camera() -> Camera {
     Camera::new([640, 480], FOCAL_PX, MIDDLE_PX, LENS).unwrap()
+}
+
+/// The camera with the rays of its pixels, which take long to look up.
+fn floor_camera() -> &'static FloorCamera {
+    static CAMERA: OnceLock<FloorCamera> = OnceLock::new();
+    CAMERA.get_or_init(|| FloorCamera::new(camera()))
 }
 
 /// The paper's floor: 100 markers of 18 cm, 36 cm from centre to centre.
@@ -40,7 +48,7 @@ fn body(position: [f64; 3], roll: f64, pitch: f64, yaw: f64) -> Isometry3<f64> {
 }
 
 fn picture(body: &Isometry3<f64>, faults: &ImageFaults, seed: u64) -> Picture {
-    FloorCamera::new(camera()).render(&floor(), &View::at(body * mounting()), faults, seed)
+    floor_camera().render(&floor(), &View::at(body * mounting()), faults, seed)
 }
 
 fn found(picture: &Picture) -> Vec<Detection> {
@@ -119,10 +127,10 @@ fn motion_blurs_along_the_way_and_glare_hides_what_it_covers() {
     let mut view = View::at(body * mounting());
     view.velocity = Vector3::new(2.0, 0.0, 0.0);
     let blurred = ImageFaults { exposure_s: 0.06, ..noisy() };
-    let smeared = FloorCamera::new(camera()).render(&floor(), &view, &blurred, 1);
+    let smeared = floor_camera().render(&floor(), &view, &blurred, 1);
     assert!(found(&smeared).len() < sharp, "12 cm in one exposure");
     let slow = ImageFaults { exposure_s: 0.004, ..noisy() };
-    let hardly = found(&FloorCamera::new(camera()).render(&floor(), &view, &slow, 1));
+    let hardly = found(&floor_camera().render(&floor(), &view, &slow, 1));
     assert_eq!(hardly.len(), sharp);
     // The middle of the exposure is the moment of the image.
     let off = hardly[0].corners[0] - truth(&body, hardly[0].id).unwrap()[0];
