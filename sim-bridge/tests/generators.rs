@@ -43,7 +43,16 @@ fn every_built_in_scenario_is_listed_with_what_it_is() {
     let names = Scenario::names();
     let only_names: Vec<_> = names.iter().map(|(name, _)| *name).collect();
     let built_in = [
-        "forest", "antipodal", "window", "open", "survey", "geese", "valley", "indoor", "warehouse", "canyon",
+        "forest",
+        "antipodal",
+        "window",
+        "open",
+        "survey",
+        "geese",
+        "valley",
+        "indoor",
+        "warehouse",
+        "canyon",
     ];
     assert_eq!(only_names, built_in);
     assert!(names.iter().all(|(_, about)| about.len() > 20));

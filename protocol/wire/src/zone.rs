@@ -38,7 +38,7 @@ pub enum Outline {
 /// let zone: Zone = r#"{"name":"pond","kind":"no_fly","centre_m":[3,4],"radius_m":5,"ceiling_m":30}"#.parse()?;
 /// assert_eq!(zone.heights_m(), [f64::NEG_INFINITY, 30.0]);
 /// let wrong = r#"{"name":"pond","kind":"threat","centre_m":[3,4],"radius_m":-5}"#.parse::<Zone>().unwrap_err();
-/// assert!(wrong.to_string().contains("`radius_m` is -5: expected"));
+/// assert!(wrong.to_string().contains("`radius_m` is -5.0: expected"));
 /// # Ok::<(), skein_wire::UnfitZone>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
