@@ -512,7 +512,11 @@ impl Control {
         }
         self.flight.carry_out(now, instruction, &mut self.companion);
         match instruction {
-            Instruction::GoTo(waypoint) => self.guidance.head_for(waypoint),
+            Instruction::GoTo(waypoint) => {
+                // One that was sent on the way may be higher than all of the mission.
+                self.perception.reach(Some(waypoint.target.z).filter(|_| !waypoint.lands));
+                self.guidance.head_for(waypoint);
+            }
             Instruction::Plan { is_stuck } => {
                 let (motion, map) = (self.motion()?, self.perception.map_mut());
                 let report = self.guidance.plan(is_stuck, &motion, map, self.neighbours.around());

@@ -6,8 +6,18 @@ use skein_dbp::NodeName;
 use skein_swarm::route::{Assessment, Conflict, Flight, conflicts};
 use skein_wire::{Route, UnfitRoute};
 
-use super::planner::Method;
 use super::problem::{FleetProblem, LeftOut};
+
+/// A planner of routes. Both have the same cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(ts_rs::TS))]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// The particle swarm with tabu search.
+    Swarm,
+    /// A* on a lattice.
+    Lattice,
+}
 
 /// What a vehicle is to do.
 #[derive(Clone, Debug, PartialEq)]

@@ -12,8 +12,8 @@ mod problem;
 mod stand_ins;
 mod theatre;
 
-pub use fleet_plan::{Alternative, Encounter, FleetPlan, Journey};
-pub use planner::{Method, plan};
+pub use fleet_plan::{Alternative, Encounter, FleetPlan, Journey, Method};
+pub use planner::plan;
 pub use problem::{FleetProblem, Flyer, LeftOut, MOST_TARGETS, Other, PlanError};
 pub(crate) use stand_ins::{CalledOff, Orphaned, StandIns};
 pub use theatre::{Theatre, UnfitTheatre};

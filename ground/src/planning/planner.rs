@@ -1,7 +1,6 @@
 //! The planner of a fleet.
 
 use nalgebra::Vector3;
-use serde::Serialize;
 use skein_dbp::NodeName;
 use skein_swarm::route::{
     AnyAngleConfig, Assessment, Effort, Plan, Planner, RouteCost, RouteProblem, Traffic, any_angle, refined,
@@ -9,7 +8,7 @@ use skein_swarm::route::{
 use skein_wire::Route;
 
 use super::dealing::{Stop, stops};
-use super::fleet_plan::{Alternative, FleetPlan, Journey};
+use super::fleet_plan::{Alternative, FleetPlan, Journey, Method};
 use super::problem::{FleetProblem, Flyer, LeftOut, Open, PlanError};
 
 /// Inner waypoints of a leg that a swarm plans.
@@ -18,17 +17,6 @@ const WAYPOINTS: usize = 8;
 const LATTICE: [usize; 2] = [3_000, 30_000];
 /// Routes looked at to refine the best one, beside those of the searches.
 const REFINEMENT: usize = 800;
-
-/// A planner of routes. Both have the same cost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// The particle swarm with tabu search.
-    Swarm,
-    /// A* on a lattice.
-    Lattice,
-}
 
 /// Plans for the whole fleet. Vehicles that cannot be planned for are left out, as long as any other is there.
 ///
