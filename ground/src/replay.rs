@@ -34,7 +34,7 @@ pub struct Replay {
     moment: Moment,
 }
 
-/// What was so at a moment.
+/// The state at a moment.
 #[derive(Default)]
 pub struct Moment {
     pub states: BTreeMap<NodeName, (Duration, State)>,
@@ -187,7 +187,7 @@ impl Moment {
     }
 }
 
-/// What a recorded mission came to.
+/// The outcome of a recorded mission.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Digest {
     /// Whether the recording was brought to its end.

@@ -59,7 +59,7 @@ pub struct RightOfWay {
     others: BTreeMap<String, Other>,
     /// Their last word of those of them that have a narrow stretch before them.
     told: BTreeMap<String, Told>,
-    /// Who is not heard is out of range.
+    /// Silence of another means that it is out of range.
     radio_is_short: bool,
     /// The time that claims take to cross.
     meeting: Duration,

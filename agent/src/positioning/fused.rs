@@ -65,7 +65,7 @@ const MAP_M2: f64 = 0.005;
 /// A distance to the ground is that of flow for so long.
 const RANGE_LASTS: Duration = Duration::from_millis(200);
 
-/// What is known of one source.
+/// The standing of one source.
 #[derive(Clone, Debug)]
 struct Source {
     source: PositionSource,

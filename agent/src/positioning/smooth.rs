@@ -10,7 +10,7 @@ const FASTEST_M_S: f64 = 0.4;
 /// A larger correction is a jump: whoever placed something by the position shifts it at once, m.
 const JUMP_M: f64 = 1.5;
 
-/// What is still to be made up for.
+/// The correction that is still to be made.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Smooth {
     /// What is told less what is believed, ENU, m.
@@ -24,7 +24,7 @@ impl Smooth {
         self.offset -= step;
     }
 
-    /// What to add to the belief, m.
+    /// Correction of the belief, m.
     pub fn offset(&self) -> Vector3<f64> {
         self.offset
     }

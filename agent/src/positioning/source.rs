@@ -9,7 +9,7 @@ use skein_wire::Scan;
 use super::estimate::Estimate;
 use crate::config::PositionSource;
 
-/// What a sensor tells, beside the autopilot's telemetry.
+/// Measurements of sensors, beside the autopilot's telemetry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sensed {
     /// An instrument of the autopilot.
@@ -45,7 +45,7 @@ pub trait Positioning: std::fmt::Debug + Send {
     /// From now on the vehicle flies by this source; by none but inertia and flow without one.
     fn fly_by(&mut self, _source: Option<PositionSource>) {}
 
-    /// What has become of the sources since the last call.
+    /// News of the sources since the last call.
     fn take_news(&mut self) -> Vec<SourceNews> {
         Vec::new()
     }

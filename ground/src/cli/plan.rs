@@ -9,7 +9,7 @@ use skein_wire::event::{OrderGiven, What};
 use super::caller::{Call, Caller};
 use super::order::{all_acknowledged, answered, answers, route_points, vehicle_name};
 
-/// How vehicles would reach targets together.
+/// The way in which vehicles would reach targets together.
 #[derive(Args)]
 pub(super) struct PlanCommand {
     /// Targets in metres east, north and up, such as "90,20,8 90,40,8", or a file with one on each line.

@@ -1,4 +1,4 @@
-//! Who goes to which targets.
+//! Targets dealt out to vehicles.
 
 use nalgebra::Vector3;
 use skein_planning::airspace::Airspace;

@@ -19,7 +19,7 @@ pub enum Method {
     Lattice,
 }
 
-/// What a vehicle is to do.
+/// The task of a vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Journey {
     pub node: NodeName,

@@ -1,4 +1,4 @@
-//! What is to be planned.
+//! The problem that is planned for.
 
 use nalgebra::Vector3;
 use skein_dbp::NodeName;

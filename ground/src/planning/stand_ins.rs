@@ -47,7 +47,7 @@ pub(crate) struct StandIns {
     tasks: BTreeMap<NodeName, Task>,
     /// Since when vehicles are not heard.
     silent_since: BTreeMap<NodeName, Duration>,
-    /// Who stands in for whom, at which places.
+    /// The stand-ins, for whom and at which places.
     standing: Vec<(NodeName, NodeName, Vec<Vector3<f64>>)>,
 }
 

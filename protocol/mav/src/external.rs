@@ -25,7 +25,7 @@ pub struct External {
     pub motion_covariance: Matrix6<f64>,
     /// Covariance of the attitude about the body's axes, rad squared.
     pub attitude_covariance: Matrix3<f64>,
-    /// How often the position has jumped, modulo 256.
+    /// Jumps of the position, modulo 256.
     pub resets: u8,
 }
 

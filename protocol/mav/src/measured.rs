@@ -1,4 +1,4 @@
-//! What a vehicle's instruments measure, as an autopilot passes it on. Bodies are forward-left-up.
+//! Measurements of a vehicle's instruments, as an autopilot passes them on. Bodies are forward-left-up.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use nalgebra::{Vector2, Vector3};
 
 use crate::axes;
 
-/// What an inertial unit feels.
+/// A sample of an inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inertial {
     /// Angular rate, rad/s.

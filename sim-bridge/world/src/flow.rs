@@ -10,7 +10,7 @@ use crate::noise::Noise;
 use crate::quadrotor::{Quadrotor, STEP};
 use crate::vehicle::FlowModel;
 
-/// What one sensor has summed up since its last reading.
+/// The sum of one sensor since its last reading.
 #[derive(Debug, Clone)]
 pub(crate) struct FlowSensor {
     model: FlowModel,

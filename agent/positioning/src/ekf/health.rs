@@ -28,7 +28,7 @@ impl Aid {
     ];
 }
 
-/// What one source has done.
+/// The record of one source.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Fused {
     /// When the newest measurement was made.
@@ -37,7 +37,7 @@ pub struct Fused {
     pub fused: Option<Duration>,
     /// Since when every one has been further off than noise explains.
     pub off_since: Option<Duration>,
-    /// How many in a row noise explains.
+    /// Measurements in a row that noise explains.
     pub fits: u64,
     /// The squared innovation of the newest by its covariance, per degree of freedom: 1 on the mean where covariances
     /// are honest.

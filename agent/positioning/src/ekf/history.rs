@@ -20,7 +20,7 @@ struct Moment {
     measured: Option<Measurement>,
 }
 
-/// What became of a measurement.
+/// The fate of a measurement.
 pub(super) enum Taken {
     TooLate,
     /// It holds something that is no number, or no covariance.

@@ -1,4 +1,4 @@
-//! What sensors tell, and what they should tell by the state.
+//! Measurements, and those that the state would give.
 
 use std::time::Duration;
 

@@ -19,7 +19,7 @@ use self::history::{History, Taken};
 pub use self::measurement::{Flow, Heading, Measurement, Pressure, Range, Rest, Satellites};
 pub use self::state::State;
 
-/// What an inertial unit has felt on the mean since the sample before. Body FLU.
+/// The mean that an inertial unit has felt since the sample before. Body FLU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inertial {
     /// The end of that time.
@@ -94,7 +94,7 @@ pub struct Start {
 pub struct Ekf {
     history: History,
     health: Health,
-    /// What has been measured later than the newest inertial sample.
+    /// Measurements later than the newest inertial sample.
     early: Vec<(Measurement, bool)>,
 }
 

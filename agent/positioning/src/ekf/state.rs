@@ -22,7 +22,7 @@ pub(super) const SIZE: usize = 17;
 
 pub(super) type Covariance = SMatrix<f64, SIZE, SIZE>;
 
-/// What is not known of a unit that has just been switched on, as standard deviations.
+/// The errors of a unit that has just been switched on, as standard deviations.
 const FORCE_BIAS_M_S2: f64 = 0.1;
 const RATE_BIAS_RAD_S: f64 = 0.01;
 const FLOW_SCALE_SHARE: f64 = 0.1;
@@ -45,13 +45,13 @@ pub struct State {
     pub velocity: Vector3<f64>,
     /// Body FLU to world ENU.
     pub body_to_world: UnitQuaternion<f64>,
-    /// What the accelerometer tells too much, body FLU, m/s².
+    /// Bias of the accelerometer, body FLU, m/s².
     pub force_bias: Vector3<f64>,
-    /// What the gyroscope tells too much, body FLU, rad/s.
+    /// Bias of the gyroscope, body FLU, rad/s.
     pub rate_bias: Vector3<f64>,
     /// The share by which optical flow tells too much.
     pub flow_scale: f64,
-    /// What the barometer tells too much, m.
+    /// Bias of the barometer, m.
     pub pressure_offset_m: f64,
     /// Angular rate by the newest sample, body FLU, rad/s.
     pub rate: Vector3<f64>,

@@ -13,7 +13,7 @@ const GATE: f64 = 4.0;
 /// Shares of what was known that a fusion is tried with.
 const SHARES: u32 = 20;
 
-/// What one vehicle saw of another.
+/// A sighting of another vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sighting {
     /// Where the one that sees was, in its own frame.
@@ -30,7 +30,7 @@ pub struct Sighting {
     pub other_covariance: Matrix2<f64>,
 }
 
-/// How another vehicle's frame lies in one's own.
+/// The pose of another vehicle's frame in one's own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Agreement {
     transform: Isometry2<f64>,

@@ -18,17 +18,17 @@ const FURTHEST: (f64, f64) = (12.0, 0.6);
 const NEAR_M: f64 = 0.3;
 /// Share of the scan that lies on the other place's map when both are one.
 const LEAST_SHARE: f64 = 0.6;
-/// How far from where the path leads a loop may be measured, in standard deviations.
+/// Greatest distance of a loop from where the path leads, in standard deviations.
 const GATE: f64 = 4.0;
 /// A match is surer of itself than two whole neighbourhoods of frames are of one another.
 const WIDER: f64 = 4.0;
 
-/// What the search for loops sees.
+/// The view of the search for loops.
 pub struct Closing<'a> {
     pub frames: &'a KeyFrames,
     /// The frame next to the vehicle.
     pub from: usize,
-    /// How well the path from it to each frame is known, m².
+    /// Variance of the path from it to each frame, m².
     pub apart: &'a [f64],
 }
 

@@ -27,7 +27,7 @@ pub struct KeyFrame {
     pub pose: Isometry2<f64>,
     /// Of `pose`, world axes: m² and rad².
     pub covariance: Matrix3<f64>,
-    /// What the rest of the vehicle knew of its pose when the scan was taken, m² and rad².
+    /// Covariance of the pose by the rest of the vehicle when the scan was taken, m² and rad².
     pub predicted: Matrix3<f64>,
     pub returns: Vec<Return>,
     pub place: Place,
@@ -183,7 +183,7 @@ impl KeyFrames {
     }
 }
 
-/// What two measurements one after the other say.
+/// Two measurements, one after the other.
 fn after(first: &Edge, second: &Edge) -> Edge {
     let covariance = composed(&first.relative, &first.covariance, &second.relative, &second.covariance);
     Edge {

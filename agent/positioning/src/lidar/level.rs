@@ -9,7 +9,7 @@ use nalgebra::{Isometry2, Matrix2, Matrix3, SymmetricEigen, UnitQuaternion, Vect
 const OWN_FRAME_M: f64 = 0.2;
 /// Returns lower than this above the ground are the ground, m, and lower than `GROUND_SLOPE` of their range.
 const GROUND_M: f64 = 0.4;
-/// How badly tilt and slope of the ground are known, rad.
+/// Standard deviation of tilt and slope of the ground, rad.
 const GROUND_SLOPE: f64 = 0.02;
 /// A surface's direction is taken from returns this near, m, where they are not further apart.
 const SURFACE_M: f64 = 0.25;

@@ -9,7 +9,7 @@ use nalgebra::{Isometry2, Matrix3, SymmetricEigen, Vector2, Vector3};
 use super::level::Return;
 use super::local_map::LocalMap;
 
-/// How far off a surface may be, m: in the first steps, and in the last.
+/// Greatest distance of a surface, m: in the first steps, and in the last.
 const REACH_M: [f64; 2] = [0.6, 0.25];
 /// Steps with the wider reach.
 const WIDE_STEPS: usize = 4;
@@ -115,7 +115,7 @@ fn pairs(map: &LocalMap, scan: &[Return], pose: &Isometry2<f64>, reach_m: f64) -
 struct Normal {
     /// Directions, by columns.
     axes: Matrix3<f64>,
-    /// How well each direction is told, 1/m²; `None` for one that is not.
+    /// Information on each direction, 1/m²; `None` for one that is not told.
     told: [Option<f64>; 3],
     /// The step along each.
     steps: Vector3<f64>,

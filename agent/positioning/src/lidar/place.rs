@@ -1,4 +1,4 @@
-//! What a place looks like, whatever the heading: to rank places that a scan may be of.
+//! The looks of a place, whatever the heading: to rank places that a scan may be of.
 
 use super::level::Return;
 

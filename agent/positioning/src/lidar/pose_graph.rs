@@ -20,7 +20,7 @@ const SETTLED: f64 = 0.02;
 /// No covariance is less than this, so that each has an inverse: m² and rad².
 const LEAST_VARIANCE: f64 = 1e-8;
 
-/// What was measured between two frames.
+/// A measurement between two frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
     /// Indices of the frames.
@@ -217,7 +217,7 @@ impl Solve {
     }
 }
 
-/// How far what two poses say is from what was measured: along the axes of the first, m, and of the heading, rad.
+/// Difference of two poses from what was measured: along the axes of the first, m, and of the heading, rad.
 pub fn error(from: &Isometry2<f64>, to: &Isometry2<f64>, measured: &Isometry2<f64>) -> Vector3<f64> {
     let said = from.inverse() * to;
     let off: Vector2<f64> = said.translation.vector - measured.translation.vector;

@@ -36,7 +36,7 @@ pub struct Relocation {
     search: Search,
 }
 
-/// What has come of a search.
+/// The result of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Relocated {
     Searching,

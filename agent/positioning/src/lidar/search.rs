@@ -27,7 +27,7 @@ const ONE_FIND: (f64, f64) = (0.9, 0.3);
 /// Squares in the queue, at most: 32 bytes each.
 const MOST_QUEUED: usize = 200_000;
 
-/// What has come of a search.
+/// The result of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Found {
     /// The budget is used up; more of it goes on.

@@ -27,17 +27,17 @@ const REDRAW_M: f64 = 1.0;
 const MISSES: u32 = 4;
 /// A lost vehicle searches so many times as much in a step as one that looks for loops.
 const LOST_TIMES: usize = 4;
-/// What a match adds to the errors of the frames' poses at least, m² and rad²: surfaces are not quite as they are drawn.
+/// Least variance that a match adds to the errors of the frames' poses, m² and rad²: surfaces are not quite as drawn.
 const LEAST_EDGE: (f64, f64) = (0.004 * 0.004, 0.0004 * 0.0004);
 
-/// How much is done and kept.
+/// Bounds on effort and memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlamConfig {
     /// A scan is kept when the nearest that is kept is this far away, m.
     pub spacing_m: f64,
     /// Scans that are kept, at most; beyond, those nearest to others go. Each takes up to 50 kB.
     pub most_key_frames: usize,
-    /// How far motion without a scan may err, as a share of the distance.
+    /// Error of motion without a scan, as a share of the distance.
     pub odometry_share: f64,
     /// Squares of places that a search looks at in a step: some 0.2 us each.
     pub search_per_step: usize,
@@ -70,7 +70,7 @@ pub enum State {
     Lost,
 }
 
-/// How it goes, for whoever chooses between sources.
+/// Its health, for whoever chooses between sources.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Health {
     pub state: State,
@@ -109,7 +109,7 @@ pub struct Slam {
     frames: KeyFrames,
     map: LocalMap,
     members: Vec<usize>,
-    /// How well the path from the reference frame to each is known, m².
+    /// Variance of the path from the reference frame to each, m².
     apart: Vec<f64>,
     drawn_at: Vector2<f64>,
     /// The frame whose errors the place shares.
@@ -429,7 +429,7 @@ mod tests {
     use super::*;
     use crate::lidar::synthetic::{Flight, World};
 
-    /// What came of a flight.
+    /// The result of a flight.
     #[derive(Debug, Default)]
     struct Flown {
         fixes: usize,

@@ -7,13 +7,13 @@ use thiserror::Error;
 
 /// Sides beyond this many pixels are taken for a mistake.
 const SIDE_LIMIT: usize = 16_384;
-/// How far from the axis a lens is looked at, as a tangent.
+/// Greatest distance from the axis at which a lens is looked at, as a tangent.
 const WIDEST: f64 = 8.0;
 /// Steps of Newton's method from a pixel to its ray, and how near they must come.
 const ROUNDS: usize = 25;
 const NEAR: f64 = 1e-9;
 
-/// How a lens bends what a pinhole would show.
+/// The distortion of a lens beside a pinhole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lens {
     /// Brown's model, OpenCV's and ROS's `plumb_bob` and `rational_polynomial`.
@@ -154,7 +154,7 @@ impl Camera {
         self.middle
     }
 
-    /// How its lens bends.
+    /// The distortion of its lens.
     pub fn lens(&self) -> &Lens {
         &self.lens
     }

@@ -10,7 +10,7 @@ use super::grey::Grey;
 use super::quadrilateral::{self, Corners};
 use super::threshold::Mask;
 
-/// How far the windows of the thresholds reach, pixels: the first parts small cells, the last bears blur.
+/// Reach of the thresholds' windows, pixels: the first parts small cells, the last bears blur.
 const WINDOWS: [usize; 3] = [2, 6, 11];
 /// A marker that was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]

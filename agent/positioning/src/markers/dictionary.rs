@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// How many wrong bits each dictionary corrects, by name.
+/// Wrong bits that each dictionary corrects, by name.
 const LIMITS: &str = include_str!("dictionaries/limits.txt");
 /// The largest dictionary of each family, whose beginnings the smaller ones are: a code a line, in hexadecimal.
 const FAMILIES: [(&str, usize, &str); 4] = [
@@ -94,7 +94,7 @@ impl Dictionary {
         self.side + 2
     }
 
-    /// How many markers there are; their ids begin at 0.
+    /// The number of markers; their ids begin at 0.
     pub fn count(&self) -> usize {
         self.codes.len()
     }

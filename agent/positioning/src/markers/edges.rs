@@ -74,7 +74,7 @@ fn line(image: &Grey, corner: Vector2<f64>, next: Vector2<f64>, side: f64, reach
     Some(Line { point: corner + out * offset, along: along + out * slope })
 }
 
-/// How far out of a place on an edge the middle of the rise from dark to white is.
+/// Distance of the middle of the rise from dark to white from a place on an edge.
 fn edge(image: &Grey, at: Vector2<f64>, out: Vector2<f64>, reach: f64) -> Option<f64> {
     let step = 2.0 * reach / f64::from(STEPS);
     let (mut rise, mut moment) = (0.0, 0.0);

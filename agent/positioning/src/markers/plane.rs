@@ -22,7 +22,7 @@ pub(super) fn poses(pairs: &[(Vector2<f64>, Vector2<f64>)]) -> Option<[Isometry3
     Some(if one_miss <= other_miss { [one, other] } else { [other, one] })
 }
 
-/// How the ray changes with the point of the plane, at the middle.
+/// Derivative of the ray by the point of the plane, at the middle.
 fn jacobian(h: &Matrix3<f64>) -> Matrix2<f64> {
     Matrix2::new(
         h[(0, 0)] - h[(2, 0)] * h[(0, 2)],

@@ -12,7 +12,7 @@ use super::layout::{Layout, Placed};
 use super::plane;
 use crate::fix::PoseFix;
 
-/// How well corners are found at best, standard deviation across and down, pixels.
+/// Least standard deviation of corners, across and down, pixels.
 const CORNER_SIGMA_PX: f64 = 0.15;
 /// Residuals of few degrees of freedom are small by chance: three sigma grow by this over their number and four, about
 /// as Student's distribution has it.
@@ -234,7 +234,7 @@ impl Solver {
         Some(body)
     }
 
-    /// How far off most markers are, pixels.
+    /// Error of most markers, pixels.
     fn typical(&self, body: &Isometry3<f64>, seen: &[Seen]) -> f64 {
         let mut off: Vec<f64> = seen.iter().map(|marker| self.off(body, marker)).collect();
         off.sort_by(f64::total_cmp);

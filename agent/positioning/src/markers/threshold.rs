@@ -1,4 +1,4 @@
-//! What is darker than its surroundings.
+//! Blobs darker than their surroundings.
 
 use super::grey::Grey;
 

@@ -1,4 +1,4 @@
-//! What a vehicle can do, and the distances that its routes keep.
+//! The abilities of a vehicle, and the distances that its routes keep.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ const CLEARANCE_S: f64 = 1.5;
 /// Share of the height of take-off at which routes may begin.
 const BEGINS_AT: f64 = 0.7;
 
-/// What the vehicles of a fleet can do, and the distances that a plan keeps.
+/// The abilities of a fleet's vehicles, and the distances that a plan keeps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Craft {

@@ -1,4 +1,4 @@
-//! What an inertial unit has felt, until it is told.
+//! The sum that an inertial unit has felt since it was told.
 
 use std::time::Duration;
 

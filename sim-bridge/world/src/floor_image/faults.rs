@@ -1,4 +1,4 @@
-//! What keeps an image from showing what is there.
+//! Faults of an image.
 
 use nalgebra::{Isometry3, Vector2, Vector3};
 use rand_chacha::ChaCha8Rng;
@@ -15,14 +15,14 @@ pub struct Glare {
     pub strength: f64,
 }
 
-/// What is wrong with an image. The default is a perfect one.
+/// Faults of an image. The default is a perfect one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageFaults {
-    /// How long the sensor catches light, s: what moves meanwhile is blurred.
+    /// Exposure, s: what moves meanwhile is blurred.
     pub exposure_s: f64,
-    /// How far out of focus it is: the width of a point, pixels.
+    /// Defocus: the width of a point, pixels.
     pub defocus_px: f64,
-    /// How bright it is beside a good exposure.
+    /// Brightness beside a good exposure.
     pub brightness: f64,
     /// Noise of each pixel, standard deviation, grey levels.
     pub noise: f64,

@@ -102,7 +102,7 @@ fn outage() -> String {
     format!("[[position_fault]]\nat_s = {from_s}\nfor_s = {}\nmarkers_missed = true\n", to_s - from_s)
 }
 
-/// What one flight showed; the first vehicle's in time.
+/// The record of one flight; the first vehicle's in time.
 struct Flight {
     summary: Summary,
     seen: Seen,

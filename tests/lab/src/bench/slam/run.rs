@@ -20,7 +20,7 @@ pub struct Look<'a> {
     pub known: Isometry2<f64>,
 }
 
-/// What came of it.
+/// The result.
 #[derive(Debug, Default)]
 pub struct Outcome {
     pub scans: usize,
@@ -120,7 +120,7 @@ fn prediction(pose: &Isometry2<f64>, covariance: Matrix3<f64>) -> Prediction {
     }
 }
 
-/// How far poses are from those that are known.
+/// Errors of poses beside those that are known.
 #[derive(Debug, Clone, Copy)]
 pub struct Errors {
     /// Root of the mean square distance, after the best rigid move of all, m.

@@ -37,7 +37,7 @@ const VEHICLES: usize = 20;
 const FIRST_SEED: u64 = 20_001;
 /// Inner waypoints of a route that a vehicle plans.
 const WAYPOINTS: usize = 10;
-/// What P3 gives of its vehicles; how they brake and how far apart they keep is chosen.
+/// P3's vehicles; how they brake and how far apart they keep is chosen.
 const ENVELOPE: Envelope = Envelope {
     cruise_m_s: 20.0,
     climb_m_s: 8.0,
@@ -53,7 +53,7 @@ const LONGEST_S: f64 = 600.0;
 /// Runs for which the standard swarm plans too, with so many times the effort.
 const CONVERGED: (usize, usize) = (5, 40);
 
-/// Who plans, and what happens.
+/// The planners and the events of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     Ground,

@@ -18,7 +18,7 @@ const CLEAR_M: f64 = 0.35;
 const BUDGET: usize = 60_000;
 /// Turns of each before a step.
 const ROUNDS: usize = 2;
-/// Who has not arrived after so many steps never will.
+/// Steps after which nobody arrives any more.
 const MOST_STEPS: u32 = 2000;
 
 /// The vehicles of a place on its map.
