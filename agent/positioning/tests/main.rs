@@ -1,3 +1,5 @@
 //! Positioning on known answers.
 
+#![allow(clippy::expect_used, clippy::unwrap_used)] // A test fails by panicking.
+
 mod ekf;

@@ -454,7 +454,7 @@ impl Positioning for Fused {
         }
         let (position, attitude) = self.last.pose_at(now)?;
         let (motion, lies) = (self.last.motion?, self.last.attitude?);
-        (now.saturating_sub(motion.stamp) < FELT_WITHIN).then(|| External {
+        (now.saturating_sub(motion.stamp) < FELT_WITHIN).then_some(External {
             position,
             velocity: motion.value.velocity,
             attitude,

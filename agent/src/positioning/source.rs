@@ -10,6 +10,7 @@ use super::estimate::Estimate;
 use crate::config::PositionSource;
 
 /// Measurements of sensors, beside the autopilot's telemetry.
+#[allow(clippy::large_enum_variant)] // A handful are passed on in each tick, and none is kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sensed {
     /// An instrument of the autopilot.

@@ -215,7 +215,7 @@ impl Endpoint {
         match measured {
             Measured::Inertial(inertial) => self.felt.take_in(inertial),
             Measured::Flow(flow) if self.streams.is_on(OPTICAL_FLOW_RAD_DATA::ID) => {
-                self.writer.write(&flow.encode(time, &self.felt.rate()));
+                self.writer.write(&flow.encode(time, &self.felt.newest_rate()));
             }
             Measured::Distance(distance) if self.streams.is_on(DISTANCE_SENSOR_DATA::ID) => {
                 self.writer.write(&distance.encode(time));

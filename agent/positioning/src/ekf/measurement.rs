@@ -88,6 +88,7 @@ pub struct Heading {
 }
 
 /// A measurement of any sensor.
+#[allow(clippy::large_enum_variant)] // The largest is the usual one, and few are kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Measurement {
     Markers(PoseFix),

@@ -25,7 +25,7 @@ impl Felt {
     }
 
     /// Angular rate by the newest sample, body FLU, rad/s.
-    pub(super) fn rate(&self) -> Vector3<f64> {
+    pub(super) fn newest_rate(&self) -> Vector3<f64> {
         self.newest_rate
     }
 

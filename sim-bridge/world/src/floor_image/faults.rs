@@ -73,7 +73,7 @@ impl Glare {
         let way = camera_to_world.rotation * Vector3::new(ray.x, ray.y, 1.0);
         let from = camera_to_world.translation.vector - self.at;
         let far = -from.z / way.z;
-        if !(far > 0.0) {
+        if far.is_nan() || far <= 0.0 {
             return 0.0;
         }
         let off = (from.xy() + way.xy() * far).norm_squared();

@@ -118,9 +118,11 @@ struct Seen {
     /// The most by which an estimate moved in a tick beside its velocity, m.
     step_m: f64,
     last: Option<(f64, Vector3<f64>)>,
-    /// Time, s; position by belief and truth, m; speed east by belief, truth and flow alone, m/s.
-    track: Vec<(f64, [Vector3<f64>; 2], [Option<f64>; 3])>,
+    track: Vec<TrackPoint>,
 }
+
+/// Time, s; position by belief and truth, m; speed east by belief, truth and flow alone, m/s.
+type TrackPoint = (f64, [Vector3<f64>; 2], [Option<f64>; 3]);
 
 impl Seen {
     fn look(&mut self, swarm: &Swarm, index: usize) {

@@ -442,10 +442,11 @@ fn plan_times(done: &[Run], report: &mut Report) {
 
 fn converged(done: &[Run], report: &mut Report) {
     let pairs: Vec<_> = done.iter().filter_map(|run| Some((run.converged_m?, run.reference_m))).collect();
-    let mean =
-        |of: &dyn Fn(&([f64; 2], f64)) -> f64| statistics::mean(&pairs.iter().map(of).collect::<Vec<_>>());
-    let standard = mean(&|([standard, _], reference)| standard / reference);
-    let onboard = mean(&|([_, onboard], reference)| onboard / reference);
+    let mean = |planner: usize| {
+        let shares: Vec<_> = pairs.iter().map(|(costs, reference)| costs[planner] / reference).collect();
+        statistics::mean(&shares)
+    };
+    let (standard, onboard) = (mean(0), mean(1));
     report.number(
         "standard_pso_converged",
         json!({ "runs": pairs.len(), "times_the_effort": CONVERGED.1, "cost_to_reference": standard,
