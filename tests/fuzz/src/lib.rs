@@ -6,6 +6,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // A target fails by panicking.
 
+mod certificates;
 mod configuration;
 mod event_sets;
 mod kept;
@@ -25,6 +26,7 @@ pub use target::{Allowed, Reached, Target};
 
 /// All targets.
 pub const TARGETS: &[Target] = &[
+    certificates::TARGET,
     configuration::TARGET,
     event_sets::TARGET,
     kept::TARGET,
