@@ -4,10 +4,9 @@ use std::time::Duration;
 
 use skein_bp::behaviour::{Chosen, Host};
 use skein_dbp::{Authority, Kept, NodeName};
-use skein_wire::{Fleet, KeptZone, standard_authority};
+use skein_wire::{Fleet, KeptZone, Order, standard_authority};
 
 use crate::giver::Giver;
-use crate::order::Order;
 use crate::planning::Theatre;
 
 /// The configuration of a ground station.

@@ -9,13 +9,13 @@ use serde::Deserialize;
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_dbp::NodeName;
 use skein_wire::event::{OrderGiven, What};
-use skein_wire::{Route, Zone, ZoneTable};
+use skein_wire::{Destination, Details, Order, Who, Zone, ZoneTable};
 use tokio::sync::oneshot;
 
 use crate::core::GroundCore;
 use crate::giver::Giver;
 use crate::launch_offer::LaunchOffer;
-use crate::order::{Destination, Order, SentScript, Who};
+use crate::order::to_send;
 use crate::planning::{FleetPlan, FleetProblem};
 use crate::refusal::Refusal;
 use crate::replay::Replay;
@@ -359,42 +359,12 @@ impl OrderMessage {
 fn order(
     OrderMessage { what, to, point, points, stops, script, name, .. }: OrderMessage,
 ) -> Result<Order, String> {
-    let who = to.who()?;
-    Ok(match what {
-        What::Launch if who != Who::All => {
-            return Err("a launch is for all: vehicles take off in turn".into());
-        }
-        what if what.is_for_all() && who != Who::All => {
-            return Err("what is decided together is for all".into());
-        }
-        What::Load => {
-            let script = script.ok_or("`load` needs a `script`: {script, with}")?;
-            Order::Load(who, SentScript::new(&script).map_err(|error| error.to_string())?)
-        }
-        What::Unload => Order::Unload(who, name.ok_or("`unload` needs the `name` of a script")?),
-        What::Give => {
-            let to = name.ok_or("`give` needs the `name` of a person or program")?;
-            Order::Give(who, Giver::new(&to).map_err(|error| error.to_string())?)
-        }
-        What::GoTo => {
-            let (x, y, z) = point.ok_or("`goto` needs a `point`: [x, y, z or null], metres")?;
-            let finite = x.is_finite() && y.is_finite() && z.is_none_or(f64::is_finite);
-            if !finite {
-                return Err("`point` must be finite numbers".into());
-            }
-            Order::GoTo(who, Destination { x, y, z })
-        }
-        What::Route => {
-            // Two on one way would meet at its end.
-            if !matches!(&who, Who::These(vehicles) if vehicles.len() == 1) {
-                return Err("a route is for one vehicle: name it in `to`".into());
-            }
-            let points = points.ok_or("`route` needs `points`: [[x, y, z], ...], metres")?;
-            let route = Route::new(points).map_err(|error| error.to_string())?;
-            Order::Route(who, if let Some(stops) = stops { route.with_targets(&stops) } else { route })
-        }
-        what => Order::plain(what, who).ok_or("this order needs more than its word")?,
-    })
+    let script = script.map(|script| to_send(&script)).transpose().map_err(|error| error.to_string())?;
+    let point = point.map(|(x, y, z)| Destination { x, y, z });
+    if let (What::Give, Some(name)) = (what, &name) {
+        Giver::new(name).map_err(|error| error.to_string())?;
+    }
+    Order::read(what, to.who()?, Details { point, points, stops, script, name })
 }
 
 #[cfg(test)]
@@ -412,12 +382,12 @@ mod tests {
     fn orders_are_read_for_one_for_some_and_for_all() {
         let hold = r#"{"type":"order","tag":"7","what":"hold","to":"all"}"#;
         assert_eq!(read(hold).0.as_deref(), Some("7"));
-        assert_eq!(wanted(hold), Ok(Wanted::Order(Order::Hold(Who::All))));
+        assert_eq!(wanted(hold), Ok(Wanted::Order(Order::new(What::Hold, Who::All))));
         let goto = wanted(r#"{"type":"order","what":"goto","to":["uav/3"],"point":[1,-2.5,null]}"#);
         let who = || Who::only(NodeName::new("uav/3").unwrap());
-        assert_eq!(goto, Ok(Wanted::Order(Order::GoTo(who(), Destination { x: 1.0, y: -2.5, z: None }))));
+        assert_eq!(goto, Ok(Wanted::Order(Order::go_to(who(), Destination { x: 1.0, y: -2.5, z: None }))));
         let give = wanted(r#"{"type":"order","what":"give","to":["uav/3"],"name":"Ben"}"#);
-        assert_eq!(give, Ok(Wanted::Order(Order::Give(who(), Giver::new("Ben").unwrap()))));
+        assert_eq!(give, Ok(Wanted::Order(Order::give(who(), "Ben"))));
     }
 
     #[test]
