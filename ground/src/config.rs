@@ -31,7 +31,7 @@ pub struct GroundConfig {
     pub muster: bool,
     /// The behaviours that are switched on; those for other nodes count for nothing.
     pub behaviours: Chosen,
-    /// What the station plans with for the fleet; without it, it makes no plans.
+    /// The station's means to plan for the fleet; without it, it makes no plans.
     pub theatre: Option<Theatre>,
     /// Lease of the station's bids.
     pub lease: Duration,

@@ -38,12 +38,12 @@ pub struct GroundCore {
     roster: BTreeMap<NodeName, State>,
     readiness: BTreeMap<NodeName, Readiness>,
     order_log: OrderLog,
-    /// Who holds each vehicle, as it has told; without those that nobody holds.
+    /// The holder of each vehicle, as it has told; without those that nobody holds.
     holders: BTreeMap<NodeName, String>,
-    /// Who gives the orders that were known in advance. They hold no vehicle for longer than an order takes: whoever is
-    /// there must not ask a plan.
+    /// The givers of the orders that were known in advance. They hold no vehicle for longer than an order takes:
+    /// whoever is there must not ask a plan.
     planners: BTreeSet<Giver>,
-    /// Who is there to give orders now.
+    /// The people and programs that are there to give orders now.
     present: BTreeSet<Giver>,
     keep_due: Duration,
     offers: LaunchOffers,
@@ -218,7 +218,8 @@ impl GroundCore {
         self.give(by, order)
     }
 
-    /// The first of a launch's two messages: what `what`, a launch, would launch. `token` is random, and nobody's guess.
+    /// The first of a launch's two messages: what `what`, a launch, would launch. `token` is random, and nobody's
+    /// guess.
     ///
     /// # Errors
     /// [`Refusal`]: somebody else holds a vehicle, or nobody is there to be launched.
@@ -246,7 +247,8 @@ impl GroundCore {
         self.give(by, &Order::new(offer.what, Who::All))
     }
 
-    /// Who is there to give orders, of whom vehicles are told: whoever holds one and is not there is not kept holding it.
+    /// The people and programs that are there to give orders, of whom vehicles are told: whoever holds one and is not
+    /// there is not kept holding it.
     pub fn attend(&mut self, present: BTreeSet<Giver>) {
         self.present = present;
     }

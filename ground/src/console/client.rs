@@ -249,7 +249,7 @@ async fn change_map(
     }
 }
 
-/// What the station makes of a request. Rights are looked at before anything else is.
+/// The station's answer to a request. Rights are looked at before anything else is.
 async fn wish(session: &Session, order: OrderMessage, mailbox: &Mailbox) -> Result<Granted, String> {
     let by = session.giver(order.what)?;
     granted(by, order.wanted(token::random)?, mailbox).await

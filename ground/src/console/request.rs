@@ -20,7 +20,7 @@ use crate::planning::{FleetPlan, FleetProblem};
 use crate::refusal::Refusal;
 use crate::replay::Replay;
 
-/// What somebody wants of the station.
+/// A wish to the station.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Wanted {
     Order(Order),
@@ -28,7 +28,7 @@ pub(super) enum Wanted {
     Offer(What, String),
     /// The launch that was offered under this token.
     Launch(String),
-    /// What is to be known to plan for these vehicles to these targets.
+    /// The facts needed to plan for these vehicles to these targets.
     Survey(Who, Vec<Vector3<f64>>),
     /// That a zone is drawn.
     Draw(Zone),
@@ -38,17 +38,17 @@ pub(super) enum Wanted {
     Replay(ReplayMessage),
 }
 
-/// What somebody wants, on its way to the station.
+/// A wish on its way to the station.
 pub struct Wish {
     by: Giver,
     wanted: Wanted,
     answer: oneshot::Sender<Given>,
 }
 
-/// What the station has made of a wish, or why nothing.
+/// The station's answer to a wish, or why there is none.
 pub(super) type Given = Result<Granted, Refusal>;
 
-/// What the station has made of a wish.
+/// The station's answer to a wish.
 #[derive(Debug)]
 pub(super) enum Granted {
     /// The number under which it has given an order.
@@ -202,7 +202,7 @@ pub(super) enum Message {
     },
 }
 
-/// How a recording is to go on.
+/// A change in how a recording is played.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(super) struct ReplayMessage {
@@ -217,7 +217,7 @@ pub(super) struct ReplayMessage {
     #[serde(default)]
     #[cfg_attr(test, ts(optional))]
     at_s: Option<f64>,
-    /// How many times as fast it is to play.
+    /// The factor by which it is to play faster.
     #[serde(default)]
     #[cfg_attr(test, ts(optional))]
     speed: Option<f64>,
@@ -333,7 +333,7 @@ pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
 /// Reads a browser's message, and does nothing with it.
 ///
 /// # Errors
-/// What is wrong with it, for people.
+/// The fault in it, for people.
 pub fn check_message(text: &str) -> Result<(), String> {
     match read(text).1? {
         Request::Order(message) => message.wanted(|| Ok(String::new())).map(drop),
@@ -343,7 +343,7 @@ pub fn check_message(text: &str) -> Result<(), String> {
 }
 
 impl OrderMessage {
-    /// What is wanted; a launch without its token is to be offered under `token`.
+    /// The wish; a launch without its token is to be offered under `token`.
     pub(super) fn wanted(mut self, token: impl FnOnce() -> Result<String, String>) -> Result<Wanted, String> {
         let returned = self.token.take();
         let order = order(self)?;
