@@ -8,7 +8,9 @@ use clap::{Args, Subcommand};
 use nalgebra::Isometry3;
 use serde_json::{Value, json};
 use skein_positioning::markers::sheet::{Paper, pages, to_pdf};
-use skein_positioning::markers::{Camera, Detection, Dictionary, Grey, Layout, Sighting, Solution, Solver, detect};
+use skein_positioning::markers::{
+    Camera, Detection, Dictionary, Grey, Layout, Sighting, Solution, Solver, detect,
+};
 
 /// The arguments of `skein-agent markers`.
 #[derive(Subcommand)]
@@ -73,9 +75,7 @@ impl Markers {
     pub fn run(&self) -> anyhow::Result<ExitCode> {
         match self {
             Self::Print(print) => print.run().map(|()| ExitCode::SUCCESS),
-            Self::Look(look) => {
-                look.run().map(|any| if any { ExitCode::SUCCESS } else { ExitCode::FAILURE })
-            }
+            Self::Look(look) => look.run().map(|any| if any { ExitCode::SUCCESS } else { ExitCode::FAILURE }),
         }
     }
 }
@@ -96,7 +96,10 @@ impl Print {
             self.write(&format!("markers-{number}.svg"), page.to_svg().as_bytes())?;
         }
         let (markers, sheets) = (layout.markers().count(), pages.len());
-        println!("{markers} markers on {sheets} sheets of {paper}: {}", self.out.join("markers.pdf").display());
+        println!(
+            "{markers} markers on {sheets} sheets of {paper}: {}",
+            self.out.join("markers.pdf").display()
+        );
         println!("Print at 100 % (no fitting to the page), and measure the line at the foot.");
         println!("Their places stand in {}.", self.out.join("layout.toml").display());
         Ok(())
@@ -104,7 +107,8 @@ impl Print {
 
     fn floor(&self) -> anyhow::Result<Layout> {
         let floor = self.floor.as_deref().unwrap_or_default();
-        let sides = floor.split_once('x').map(|(columns, rows)| (columns.parse::<u32>(), rows.parse::<u32>()));
+        let sides =
+            floor.split_once('x').map(|(columns, rows)| (columns.parse::<u32>(), rows.parse::<u32>()));
         let Some((Ok(columns), Ok(rows))) = sides else {
             bail!("--floor `{floor}`: expected columns and rows, such as 10x10");
         };
@@ -228,7 +232,9 @@ fn tell(dictionary: &str, found: &[Detection], sighting: Option<&Option<Sighting
     }
     match sighting {
         None => {}
-        Some(None) => println!("They do not tell where the camera was: too few of the layout, or not where it says."),
+        Some(None) => {
+            println!("They do not tell where the camera was: too few of the layout, or not where it says.")
+        }
         Some(Some(sighting)) => {
             let best = &sighting.best;
             let place = best.body_to_world.translation.vector;
@@ -239,7 +245,9 @@ fn tell(dictionary: &str, found: &[Detection], sighting: Option<&Option<Sighting
             );
             println!("corners agree to {:.2} px (RMS) over {} markers.", best.rms_px, sighting.used.len());
             if sighting.is_ambiguous {
-                println!("Another pose explains the image as well: more markers, or a steeper look, would tell.");
+                println!(
+                    "Another pose explains the image as well: more markers, or a steeper look, would tell."
+                );
             }
             if !sighting.rejected.is_empty() {
                 println!("Not where the layout says, or misread: {:?}", sighting.rejected);

@@ -12,7 +12,9 @@ use super::camera::{Camera, Lens, NoCamera};
 pub enum NoCalibration {
     #[error("it is no YAML: {0}")]
     Yaml(String),
-    #[error("`{0}` is missing; expected image_width, image_height, camera_matrix and distortion_coefficients")]
+    #[error(
+        "`{0}` is missing; expected image_width, image_height, camera_matrix and distortion_coefficients"
+    )]
     Missing(&'static str),
     #[error("`{field}` is {value}; expected {expected}")]
     Field { field: &'static str, value: String, expected: &'static str },
@@ -42,15 +44,16 @@ impl Camera {
     /// The field that is missing or wrong.
     pub fn from_calibration(text: &str) -> Result<Self, NoCalibration> {
         let fields = fields(text)?;
-        let [width, height] = [("image_width", &["imagewidth", "width"][..]), ("image_height", &["imageheight", "height"])]
-            .map(|(field, names)| side(&fields, field, names));
-        let matrix = list(&fields, &["cameramatrix", "k", "intrinsicmatrix"]).ok_or(NoCalibration::Missing("camera_matrix"))?;
+        let width = side(&fields, "image_width", &["imagewidth", "width"])?;
+        let height = side(&fields, "image_height", &["imageheight", "height"])?;
+        let matrix = list(&fields, &["cameramatrix", "k", "intrinsicmatrix"])
+            .ok_or(NoCalibration::Missing("camera_matrix"))?;
         let [fx, skew, cx, _, fy, cy, ..] = matrix[..] else { return Err(wrong_matrix(matrix)) };
         if matrix.len() != 9 || skew.abs() > 1e-6 * fx.abs() {
             return Err(wrong_matrix(matrix));
         }
         let lens = lens(&fields)?;
-        Ok(Self::new([width?, height?], [fx, fy], [cx, cy], lens)?)
+        Ok(Self::new([width, height], [fx, fy], [cx, cy], lens)?)
     }
 }
 
@@ -74,14 +77,20 @@ fn wrong_matrix(matrix: &[f64]) -> NoCalibration {
     NoCalibration::Field { field: "camera_matrix", value, expected: "[fx, 0, cx, 0, fy, cy, 0, 0, 1]" }
 }
 
-fn side(fields: &BTreeMap<String, Value>, field: &'static str, names: &[&str]) -> Result<usize, NoCalibration> {
+fn side(
+    fields: &BTreeMap<String, Value>,
+    field: &'static str,
+    names: &[&str],
+) -> Result<usize, NoCalibration> {
     match names.iter().find_map(|name| fields.get(*name)) {
         None => Err(NoCalibration::Missing(field)),
         // Camera::new says what size is too large.
         Some(Value::Number(number)) if *number >= 1.0 && number.fract() == 0.0 => Ok(*number as usize),
-        Some(value) => {
-            Err(NoCalibration::Field { field, value: format!("{value:?}"), expected: "a whole number of pixels" })
-        }
+        Some(value) => Err(NoCalibration::Field {
+            field,
+            value: format!("{value:?}"),
+            expected: "a whole number of pixels",
+        }),
     }
 }
 

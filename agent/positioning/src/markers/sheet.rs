@@ -44,7 +44,9 @@ const MOST: usize = 10_000;
 
 /// This is no paper.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("there is no paper `{0}`: expected a4, a3, a2, a1, a0, letter, or WIDTHxHEIGHT in mm, 50 to 5000 each")]
+#[error(
+    "there is no paper `{0}`: expected a4, a3, a2, a1, a0, letter, or WIDTHxHEIGHT in mm, 50 to 5000 each"
+)]
 pub struct NoPaper(String);
 
 /// The layout's markers cannot be printed.
@@ -71,7 +73,8 @@ impl FromStr for Paper {
             return Ok(Self { width, height });
         }
         let side = |text: &str| text.trim().parse().ok().filter(|side| PAPER_SIDES.contains(side));
-        let sides = lower.trim_end_matches("mm").split_once('x').map(|(width, height)| (side(width), side(height)));
+        let sides =
+            lower.trim_end_matches("mm").split_once('x').map(|(width, height)| (side(width), side(height)));
         match sides {
             Some((Some(width), Some(height))) => Ok(Self { width, height }),
             _ => Err(NoPaper(text.to_owned())),
