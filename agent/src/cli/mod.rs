@@ -8,6 +8,7 @@ mod mission_thread;
 mod preflight;
 mod run;
 mod shadow_log;
+mod signing_clock;
 mod verify;
 mod watchdog;
 
