@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use skein_bp::behaviour::{Chosen, Host};
 use skein_bp::script::Assignment;
 use skein_dbp::{Authority, Kept};
-use skein_mav::Datum;
+use skein_mav::{Datum, Signing};
 use skein_planning::airspace::Airspace;
 use skein_wire::event::Catalogue;
 
@@ -231,6 +231,8 @@ pub struct AgentConfig {
     pub incarnation: u64,
     /// MAVLink system id of the autopilot.
     pub system_id: u8,
+    /// The signatures of the autopilot's link, if its frames are signed.
+    pub signing: Option<Signing>,
     /// Where the world's origin lies on the earth.
     pub datum: Datum,
     /// Where the vehicle takes off, metres ENU.

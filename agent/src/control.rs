@@ -119,6 +119,7 @@ impl Control {
                 component_id: 191,
                 datum: config.datum,
                 wants_measured: positioning.wants_measured(),
+                signing: config.signing,
             }),
             station: Station::of(config.system_id),
             texts: Vec::new(),

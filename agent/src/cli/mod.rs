@@ -9,6 +9,7 @@ mod mission_thread;
 mod preflight;
 mod run;
 mod shadow_log;
+mod signing_clock;
 mod verify;
 mod watchdog;
 

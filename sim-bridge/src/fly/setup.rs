@@ -77,6 +77,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             return_altitude_m: (RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64)
                 .min(bounds.max.z - 1.0),
             position: sources(scenario, plan),
+            signing: None,
             sigma_limit_m: DEFAULT_SIGMA_LIMIT_M,
             lidar: plan.model.lidar.is_some(),
             fence,
