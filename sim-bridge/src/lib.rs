@@ -17,6 +17,7 @@ mod model_folders;
 #[cfg(feature = "zenoh")]
 pub mod processes;
 mod program;
+pub mod rehearse;
 pub mod scenario;
 mod scene_view;
 mod sequential;

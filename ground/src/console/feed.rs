@@ -14,7 +14,7 @@ use skein_bp::{Event, Value};
 use skein_dbp::facts::Stalled;
 use skein_dbp::{Happened, NodeName, Peer};
 use skein_wire::event::{Advance, Declared as _, Homeward, What};
-use skein_wire::{Check, Form, MissionState, Scene, SenderStats, Solid, State, Zone};
+use skein_wire::{Check, MissionState, Scene, SenderStats, State, Zone};
 
 use super::plan_view::PlanView;
 use super::request::Granted;
@@ -24,6 +24,7 @@ use crate::core::GroundCore;
 use crate::explain::Explanation;
 use crate::giver::Giver;
 use crate::launch_offer::{Candidate, LaunchOffer, OFFER_LASTS};
+use crate::obstacle::Obstacle;
 use crate::order_log::{Answer, OrderRecord};
 use crate::replay::{Moment, Replay};
 use crate::zone_log::ZoneRecord;
@@ -147,24 +148,6 @@ pub(super) enum Message<'a> {
 pub(super) struct Bounds {
     min: [f64; 3],
     max: [f64; 3],
-}
-
-#[derive(Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-pub(super) struct Obstacle {
-    #[serde(flatten)]
-    form: FormView,
-    position: [f64; 3],
-    orientation: [f64; 4],
-}
-
-#[derive(Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-#[serde(tag = "form", rename_all = "snake_case")]
-pub(super) enum FormView {
-    Box { size: [f64; 3] },
-    Cylinder { radius: f64, height: f64 },
-    Sphere { radius: f64 },
 }
 
 #[derive(Serialize)]
@@ -310,7 +293,7 @@ impl Feed {
     }
 
     pub(super) fn show_scene(&mut self, station: &GroundCore, scene: Option<&Scene>) {
-        let obstacles = scene.iter().flat_map(|scene| &scene.solids).map(obstacle);
+        let obstacles = scene.iter().flat_map(|scene| &scene.solids).map(Obstacle::from);
         let message = Message::Scene {
             fleet: station.node().fleet().as_str(),
             station: station.name().as_str(),
@@ -411,7 +394,7 @@ impl Feed {
             software: env!("CARGO_PKG_VERSION"),
             recording: &self.recording,
             bounds: None,
-            obstacles: replay.moment().solids.iter().map(obstacle).collect(),
+            obstacles: replay.moment().solids.iter().map(Obstacle::from).collect(),
         }
     }
 
@@ -451,18 +434,6 @@ fn recorded_zone<'a>(
     };
     let answers = states.iter().map(|(vehicle, (_, state))| (vehicle.as_str(), answer(state))).collect();
     ZoneView { zone, by, time_s: at.as_secs_f64(), going: false, answers }
-}
-
-fn obstacle(solid: &Solid) -> Obstacle {
-    Obstacle {
-        form: match solid.form {
-            Form::Box(size) => FormView::Box { size: size.into() },
-            Form::Cylinder { radius, height } => FormView::Cylinder { radius, height },
-            Form::Sphere { radius } => FormView::Sphere { radius },
-        },
-        position: solid.pose.translation.vector.into(),
-        orientation: solid.pose.rotation.coords.into(),
-    }
 }
 
 impl<'a> Message<'a> {
