@@ -42,6 +42,7 @@ pub mod recorder;
 mod refusal;
 pub mod rehearsal;
 pub mod replay;
+mod ways;
 mod zone_log;
 
 pub use crate::core::GroundCore;

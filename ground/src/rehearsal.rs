@@ -56,6 +56,29 @@ pub struct Rehearsal {
     pub time_limit_s: f64,
 }
 
+impl Default for Rehearsal {
+    /// Nobody in no air: a start to fill in.
+    fn default() -> Self {
+        Self {
+            vehicles: Vec::new(),
+            min_m: [0.0; 3],
+            max_m: [0.0; 3],
+            airspace: AirspaceTable::default(),
+            zones: Vec::new(),
+            obstacles: Vec::new(),
+            world: None,
+            wind: Wind::default(),
+            cruise_m_s: cruise_m_s(),
+            takeoff_height_m: takeoff_height_m(),
+            model: model(),
+            arrive_together: false,
+            began_s: 0.0,
+            seeds: seeds(),
+            time_limit_s: time_limit_s(),
+        }
+    }
+}
+
 /// A vehicle at the beginning of a rehearsal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -327,18 +350,7 @@ mod tests {
             }],
             min_m: [-10.0, -10.0, -1.0],
             max_m: [20.0, 20.0, 20.0],
-            airspace: AirspaceTable::default(),
-            zones: Vec::new(),
-            obstacles: Vec::new(),
-            world: None,
-            wind: Wind::default(),
-            cruise_m_s: 3.0,
-            takeoff_height_m: 3.0,
-            model: model(),
-            arrive_together: false,
-            began_s: 0.0,
-            seeds: seeds(),
-            time_limit_s: 60.0,
+            ..Rehearsal::default()
         }
     }
 

@@ -26,6 +26,7 @@ use crate::giver::Giver;
 use crate::launch_offer::{Candidate, LaunchOffer, OFFER_LASTS};
 use crate::obstacle::Obstacle;
 use crate::order_log::{Answer, OrderRecord};
+use crate::rehearsal::Rehearsed;
 use crate::replay::{Moment, Replay};
 use crate::zone_log::ZoneRecord;
 
@@ -120,6 +121,13 @@ pub(super) enum Message<'a> {
         tag: Option<String>,
         #[serde(flatten)]
         plan: PlanView<'a>,
+    },
+    /// What came of a rehearsal, and who had no part in it, and why.
+    Rehearsed {
+        tag: Option<String>,
+        rehearsed: Box<Rehearsed>,
+        #[cfg_attr(test, ts(type = "Record<string, string>"))]
+        left_out: BTreeMap<NodeName, String>,
     },
     /// The zone of this name is drawn, or being removed.
     Mapped {
@@ -454,6 +462,7 @@ impl<'a> Message<'a> {
             Granted::Replayed => Self::Replayed { tag },
             // A plan is made of it before anybody is told.
             Granted::Surveyed(_) => Self::Error { tag, message: "the plan is not made yet".to_owned() },
+            Granted::Staged(_) => Self::Error { tag, message: "it is not rehearsed yet".to_owned() },
         }
     }
 

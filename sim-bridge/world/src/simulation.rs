@@ -235,6 +235,7 @@ impl Simulation {
     pub fn charge(&mut self, index: usize, fraction: f64) {
         if let Some(vehicle) = self.vehicles.get_mut(index) {
             vehicle.quadrotor.charge(fraction);
+            vehicle.readings.battery = vehicle.quadrotor.battery();
         }
     }
 
