@@ -174,6 +174,8 @@ pub(super) struct VehicleView<'a> {
     notes: Vec<String>,
     /// Its checks before take-off.
     checks: Vec<CheckView<'a>>,
+    /// The points that it still has to fly, as far as it has told (ENU, metres).
+    way: Vec<[f64; 3]>,
     /// All fields of a [`StateView`], or none.
     #[cfg_attr(test, ts(skip))]
     #[serde(flatten)]
@@ -425,6 +427,7 @@ fn recorded_view<'a>(replay: &Replay, name: &'a NodeName, state: &'a State) -> V
         link: LinkView { alive: replay.is_heard(name), age_ms: None },
         notes: Vec::new(),
         checks: Vec::new(),
+        way: Vec::new(),
         state: Some(state_view(state)),
     }
 }
@@ -508,6 +511,7 @@ fn fleet(now: Duration, station: &GroundCore) -> Message<'_> {
         let checks = station.readiness(name).map_or(&[][..], |said| &said.checks);
         VehicleView {
             checks: checks.iter().map(check_view).collect(),
+            way: station.way_of(name).unwrap_or_default(),
             ..vehicle_view(
                 now,
                 name,
@@ -538,6 +542,7 @@ fn vehicle_view<'a>(
         link: LinkView { alive: peer.is_some_and(|peer| peer.alive), age_ms },
         notes: notes.collect(),
         checks: Vec::new(),
+        way: Vec::new(),
         state: state.map(state_view),
     }
 }

@@ -26,7 +26,7 @@ use skein_mav::{
 use crate::position_error::PositionErrors;
 use crate::quadrotor::MotorCommands;
 use crate::sensors::SensorReadings;
-use crate::vehicle::{GRAVITY_M_S2, RangefinderModel, VehicleModel};
+use crate::vehicle::{RangefinderModel, VehicleModel};
 use attitude_control::AttitudeControl;
 use estimator::{Estimate, Estimator};
 use fence::GeoFence;
@@ -148,7 +148,7 @@ impl Autopilot {
             mixer: Mixer::new(model),
             now: Duration::ZERO,
             hangs_until: None,
-            hover_share: model.mass_kg * GRAVITY_M_S2 / (4.0 * model.max_thrust_n),
+            hover_share: model.hover_share(),
             endpoint: Endpoint::new(EndpointConfig {
                 system_id: config.system_id,
                 datum: config.datum,
