@@ -154,7 +154,7 @@ fn argument(given: &str) -> anyhow::Result<(String, Argument)> {
 /// An order to some vehicles.
 #[derive(Args)]
 pub(super) struct Addressed {
-    /// The vehicles, such as uav/3, or `all`.
+    /// The vehicles by number or name, such as 3 or uav/3, or `all`.
     #[arg(value_name = "VEHICLE", required = true)]
     vehicles: Vec<String>,
     #[command(flatten)]
@@ -166,7 +166,7 @@ impl Addressed {
         let to = if self.vehicles.iter().any(|vehicle| vehicle == OrderGiven::ALL) {
             json!(OrderGiven::ALL)
         } else {
-            json!(self.vehicles)
+            self.vehicles.iter().map(|vehicle| vehicle_name(vehicle)).collect()
         };
         (&self.call, json!({ "type": "order", "what": what.word(), "to": to }))
     }
