@@ -1,4 +1,4 @@
-//! A rehearsal: what is flown in simulation before anything is sent, and what came of it.
+//! A rehearsal: a flight in simulation before anything is sent, and its outcome.
 //!
 //! The station asks a program of its own for it, `skein-sim rehearse`, in JSON: it does not know the simulator.
 
@@ -258,7 +258,7 @@ impl Range {
     }
 }
 
-/// What came of a rehearsal. Times are seconds since the vehicles in the air set out, or since the beginning if none is.
+/// The outcome of a rehearsal. Times are seconds since the vehicles in the air set out, or since the beginning if none is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Rehearsed {
@@ -280,11 +280,11 @@ pub struct Rehearsed {
     pub collisions: [u32; 2],
     /// Simulated time of all flights over the time that it took.
     pub realtime_factor: f64,
-    /// What was left out or moved.
+    /// Notes on what was left out.
     pub notes: Vec<String>,
 }
 
-/// What becomes of a vehicle.
+/// The end of a vehicle's flights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub struct Played {
@@ -297,7 +297,7 @@ pub struct Played {
     /// Share of its battery's energy that is left then, 0 to 1.
     #[cfg_attr(test, ts(optional))]
     pub battery: Option<Range>,
-    /// For what it waits, and how long with each seed on average, the longest first.
+    /// Its waits, and how long they last with each seed on average, the longest first.
     pub waits: Vec<Wait>,
     /// Why it does not arrive, and with how many seeds.
     pub fails: Vec<Failure>,

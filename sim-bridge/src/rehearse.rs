@@ -11,12 +11,12 @@ use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{AgentConfig, Outcome, Parts, Planners};
 use skein_bp::behaviour::Chosen;
 use skein_dbp::NodeName;
+use skein_ground::Giver;
 use skein_ground::rehearsal::{
     Actor, Failure, Nearness, Played, Range, Rehearsal, Rehearsed, UnfitRehearsal, Wait,
 };
-use skein_ground::{Giver, Order, Who};
-use skein_wire::event::{Airborne, Declared as _};
-use skein_wire::{Fleet, Form, Link, Network, NetworkConfig, Solid};
+use skein_wire::event::{Airborne, Declared as _, What};
+use skein_wire::{Fleet, Form, Link, Network, NetworkConfig, Order, Solid, Who};
 use skein_world::{
     Aabb, HANGS, Obstacle, PositionErrors, Scene, Shape, Simulation, Truth, VehicleModel, WindConfig,
 };
@@ -28,9 +28,9 @@ use crate::summary::Traffic;
 
 /// Vehicles in the air are told to go on so long after they are let go.
 const SETTLES: Duration = Duration::from_millis(100);
-/// Who has not set out so long after that does not.
+/// Whoever has not set out so long after that does not.
 const SETS_OUT: Duration = Duration::from_secs(5);
-/// What vehicles wait for is looked at so often.
+/// The waits of vehicles are looked at so often.
 const LOOK: Duration = Duration::from_millis(200);
 /// So many of the nearest pairs are told, and of the waits of a vehicle.
 const NEAREST_TOLD: usize = 10;
@@ -93,14 +93,14 @@ pub fn rehearse(rehearsal: &Rehearsal) -> anyhow::Result<Rehearsed> {
     Ok(told(rehearsal, &scenario, &played, began.elapsed()))
 }
 
-/// What became of a vehicle with one seed.
+/// The end of a vehicle's flight with one seed.
 #[derive(Default)]
 struct Fate {
     /// It has arrived, or why not; none while it is under way.
     end: Option<Result<(), String>>,
     lands_s: Option<f64>,
     battery: f64,
-    /// How long it waited for what, s.
+    /// Its waits by their reason, s.
     waits_s: BTreeMap<String, f64>,
 }
 
@@ -272,7 +272,7 @@ fn fly(rehearsal: &Rehearsal, scenario: &Scenario, seed: u64) -> anyhow::Result<
         let now = swarm.now();
         if !is_told && now >= told_at {
             is_told = true;
-            swarm.order(&Order::Resume(Who::These(going.clone())))?;
+            swarm.order(&Order::new(What::Resume, Who::These(going.clone())))?;
         }
         network.advance(now + skein_world::STEP);
         let happenings = swarm.step();

@@ -1,6 +1,6 @@
 // A route is drawn by clicks for one vehicle, rehearsed, sent, read back, and changed while it is flown.
 //
-//     node route.mjs URL [FOLDER]      beside `skein-sim fly open --headless`; pictures go into FOLDER
+//     node route.mjs URL [FOLDER]      beside `skein-sim fly two-lanes.toml --headless`; pictures go into FOLDER
 
 import assert from 'node:assert/strict';
 import { apart, drive, speed } from './browser.mjs';
@@ -18,8 +18,8 @@ await drive({ ...(process.env.SKEIN_COLOURS && { colorScheme: process.env.SKEIN_
   await console.press('Draw a route…');
   assert.equal(await console.page.getByLabel('Who flies it').inputValue(), WHO);
   const height = console.page.getByLabel('Height of the next point, in metres above ground');
-  const first = [before.at(-1)[0] * 0.2, 6];
-  const end = [before.at(-1)[0] * 0.2 - 4, 9];
+  const first = [40, -6];
+  const end = [36, -12];
   await height.fill('4');
   await console.clickAt(...first);
   await height.fill('6');
@@ -34,7 +34,7 @@ await drive({ ...(process.env.SKEIN_COLOURS && { colorScheme: process.env.SKEIN_
   // The dialog sends what it has shown.
   await console.page.locator('.rehearsal').getByRole('button', { name: 'Send', exact: true }).click();
   await console.acknowledged('route', [WHO]);
-  const near = (point, place) => apart(point, place) < 0.6;
+  const near = (point, place) => apart(point, place) < 1;
   const told = await console.until('it tells the route as its own', () => {
     const { way } = console.vehicle(WHO);
     return way.length > 0 && near(way.at(-1), end) && way;
@@ -44,7 +44,7 @@ await drive({ ...(process.env.SKEIN_COLOURS && { colorScheme: process.env.SKEIN_
   // Changed in flight: what it still has to fly, and one more point.
   await console.press('Draw a route…');
   await console.press('Its own');
-  const beyond = [end[0] - 3, end[1] + 2];
+  const beyond = [31, -15];
   await height.fill('4');
   await console.clickAt(...beyond);
   await picture('edited');

@@ -43,7 +43,7 @@ const GRACE_MS = 1500;
 /** An order that the station has not taken by then was probably not heard. */
 const ANSWER_MS = 3000;
 
-/** How a rehearsal is called, and how long it may take. */
+/** A rehearsal among unanswered requests, and the time that it may take. */
 const REHEARSAL = 'rehearsal';
 const REHEARSED_MS = 150_000;
 /** How requests about zones are called. */

@@ -86,7 +86,7 @@ export type Argument = number | string | Vec3 | Vec3[];
 export type Range = station.Range;
 export type Played = Doubtful<Omit<station.Played, 'lands_s' | 'battery'> & { lands_s: Range; battery: Range }, 'lands_s' | 'battery'>;
 
-/** What came of a rehearsal. */
+/** The outcome of a rehearsal. */
 export interface Rehearsal {
   type: 'rehearsed';
   tag: string;

@@ -1,5 +1,5 @@
 /**
- * What would come of it if the fleet flew on, as the station has had it flown in simulation.
+ * The outcome of a rehearsal: the fleet flown on from here in simulation.
  */
 
 import { html } from './dom';

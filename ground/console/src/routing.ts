@@ -1,6 +1,6 @@
 /**
  * A route by hand: a mode in which clicks on the ground add points, a field says how high each is, and the whole is
- * rehearsed or sent to one vehicle. What a vehicle still has to fly can be taken up and changed.
+ * rehearsed or sent to one vehicle. The way that a vehicle still has to fly can be taken up and changed.
  */
 
 import type { Place } from './drawing';
@@ -26,7 +26,7 @@ export class Routing {
       changed(on: boolean, vehicle: string, points: readonly Vec3[]): void;
       rehearse(vehicle: string, points: readonly Vec3[]): void;
       send(vehicle: string, points: readonly Vec3[]): void;
-      /** What a vehicle still has to fly, as it has told. */
+      /** The points that a vehicle still has to fly, as it has told. */
       told(vehicle: string): readonly Vec3[];
     },
   ) {

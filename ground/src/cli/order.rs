@@ -72,7 +72,7 @@ pub(super) enum OrderCommand {
     Give {
         #[command(flatten)]
         to: Addressed,
-        /// Who shall hold them.
+        /// The person who shall hold them.
         #[arg(long, value_name = "NAME")]
         to_whom: String,
     },
@@ -82,7 +82,7 @@ pub(super) enum OrderCommand {
     Release(Addressed),
 }
 
-/// What is done with a script.
+/// A script is sent, or taken back.
 #[derive(Subcommand)]
 pub(super) enum ScriptCommand {
     /// Vehicles run a script beside whatever they do, such as those of agent/scripts.
@@ -116,7 +116,7 @@ impl ScriptCommand {
                 let script = ScriptFile::parse(&file.display().to_string(), &text)?;
                 let with = with.iter().map(|given| argument(given)).collect::<anyhow::Result<_>>()?;
                 let assignment = Assignment { script, with, called: called.clone() };
-                // What is wrong with it is told before anybody is asked.
+                // Its faults are told before anybody is asked.
                 assignment.bind("uav/1").with_context(|| file.display().to_string())?;
                 let (call, mut request) = to.request(What::Load);
                 request["script"] = serde_json::to_value(&assignment)?;

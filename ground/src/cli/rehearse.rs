@@ -14,14 +14,14 @@ use crate::rehearsal::{Played, Range, Rehearsed};
 /// A station breaks off a rehearsal before.
 const PATIENCE: Duration = Duration::from_secs(150);
 
-/// What would come of it if the fleet flew on.
+/// A rehearsal of the fleet.
 #[derive(Args)]
 pub(super) struct RehearseCommand {
     /// A route that a vehicle is to fly in place of what it has to, such as "uav/3=0,20,3 15,20,3", or a file of points
     /// after the `=`. Once for each vehicle.
     #[arg(long = "route", value_name = "VEHICLE=POINTS|FILE")]
     routes: Vec<String>,
-    /// How often it is flown, with other gusts and errors each time: 1 to 10.
+    /// The number of flights, with other gusts and errors each time: 1 to 10.
     #[arg(long, value_name = "N", default_value_t = 5)]
     flights: usize,
     #[command(flatten)]

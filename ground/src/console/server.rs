@@ -54,7 +54,7 @@ const ASSETS: [Asset; 5] = [
         content_type: "text/css; charset=utf-8",
         body: include_bytes!(concat!(env!("OUT_DIR"), "/console/app.css")),
     },
-    // What is said on `/live`, for other programs: written from the types here, which a test holds true.
+    // The messages on `/live`, for other programs: written from the types here, which a test holds true.
     Asset {
         path: "/messages.ts",
         content_type: "text/plain; charset=utf-8",

@@ -64,7 +64,8 @@ fn a_zone_is_drawn_by_clicks_confirmed_by_all_flown_round_and_removed() {
 #[test]
 fn a_route_is_drawn_rehearsed_sent_read_back_and_changed_in_flight() {
     let Some(browser) = Browser::find() else { return };
-    let flight = Flight::start(&["open"]);
+    let field = browser.scripts.join("two-lanes.toml");
+    let flight = Flight::start(&[field.to_str().unwrap()]);
     let health = flight.get("/health");
     assert!(health.contains("200 OK") && health.contains("{\"ok\":true,\"age_ms\":"), "{health}");
     assert!(
