@@ -727,6 +727,7 @@ impl Control {
             home: self.config.home,
             datum: degrees(&self.config.datum),
             checks: self.preflight.checks().to_vec(),
+            mission: self.config.waypoints.clone(),
         }
     }
 

@@ -1,5 +1,6 @@
 //! The configuration of a ground station.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use skein_bp::behaviour::{Chosen, Host};
@@ -8,6 +9,9 @@ use skein_wire::{Fleet, KeptZone, Order, standard_authority};
 
 use crate::giver::Giver;
 use crate::planning::Theatre;
+
+/// The program that rehearses, unless another is named.
+pub(crate) const REHEARSER: &str = "skein-sim";
 
 /// The configuration of a ground station.
 #[derive(Clone, Debug)]
@@ -33,6 +37,8 @@ pub struct GroundConfig {
     pub behaviours: Chosen,
     /// The station's means to plan for the fleet; without it, it makes no plans.
     pub theatre: Option<Theatre>,
+    /// The program that rehearses: a path, or a name that is looked for beside the station's own and on PATH.
+    pub rehearser: PathBuf,
     /// Lease of the station's bids.
     pub lease: Duration,
     /// The rights of other nodes to request and block events here.
@@ -64,6 +70,7 @@ impl GroundConfig {
             muster: false,
             behaviours: Chosen::default(),
             theatre: None,
+            rehearser: REHEARSER.into(),
             lease,
             authority: standard_authority(),
             kept: Kept::default(),

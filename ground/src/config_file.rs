@@ -16,7 +16,7 @@ use skein_swarm::route::Craft;
 use skein_wire::{Fleet, standard_authority};
 use skein_zenoh::{NetworkSettings, Security};
 
-use crate::config::GroundConfig;
+use crate::config::{GroundConfig, REHEARSER};
 use crate::console::{ConsoleSecurity, Role};
 use crate::planning::Theatre;
 
@@ -62,6 +62,8 @@ pub struct GroundFile {
     pub behaviours: Settings,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     planning: Option<PlanningFile>,
+    #[serde(default = "rehearser", skip_serializing)]
+    rehearser: PathBuf,
     pub network: NetworkSettings,
     #[serde(skip_serializing)]
     authority: Option<Authority>,
@@ -168,6 +170,10 @@ fn state() -> PathBuf {
     "state".into()
 }
 
+fn rehearser() -> PathBuf {
+    REHEARSER.into()
+}
+
 fn lease_ms() -> u64 {
     1000
 }
@@ -230,6 +236,7 @@ impl GroundFile {
             lease_ms: lease_ms(),
             behaviours: station.behaviours.settings(station.name.as_str()),
             planning: station.theatre.as_ref().map(PlanningFile::of),
+            rehearser: rehearser(),
             network,
             authority: None,
         }
@@ -256,6 +263,10 @@ impl GroundFile {
             operators,
             behaviours: known.choose_for(&self.node, &self.behaviours)?,
             theatre: self.planning.map(PlanningFile::check).transpose()?,
+            rehearser: match self.rehearser.components().count() {
+                1 => self.rehearser,
+                _ => folder.join(self.rehearser),
+            },
             lease: Duration::from_millis(self.lease_ms),
             authority: self.authority.unwrap_or_else(standard_authority),
             ..GroundConfig::new(fleet, node, vehicles)

@@ -1,15 +1,17 @@
 //! The ground core: the station's program and roster, without I/O.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::time::Duration;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
 
 use nalgebra::Vector3;
 use skein_bp::catalogue::Whose;
 use skein_bp::{Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Board, Happened, Node, NodeConfig, NodeError, NodeName};
+use skein_planning::airspace::AirspaceTable;
 use skein_wire::event::{Declared as _, Drawn, Erased, Heard, Held, Situation, What};
 use skein_wire::{
-    KeptZone, Link, MissionState, NodeLink, Order, Readiness, Route, Saver, State, Store, Who, Zone,
+    KeptZone, Link, MissionState, NodeLink, Order, Readiness, Route, Saver, Scene, State, Store, Who, Zone,
     joint_roster,
 };
 
@@ -18,15 +20,21 @@ use crate::config::GroundConfig;
 use crate::explain::{Evidence, Explanation, explain};
 use crate::giver::Giver;
 use crate::launch_offer::{Candidate, LaunchOffer, LaunchOffers};
+use crate::obstacle::Obstacle;
 use crate::order::events;
 use crate::order_log::{Answer, OrderLog, OrderRecord};
 use crate::planning::{CalledOff, FleetProblem, Flyer, Orphaned, Other, StandIns, Theatre, plan};
 use crate::refusal::Refusal;
+use crate::rehearsal::{Actor, Rehearsal};
+use crate::ways::Ways;
 use crate::zone_log::{ZoneLog, ZoneRecord};
 
 /// Who holds a vehicle is kept holding it this often while they are there: several times in a holder's absence that a
 /// vehicle bears with.
 const KEEP_PERIOD: Duration = Duration::from_secs(10);
+
+/// The air of a rehearsal reaches so far below the lowest ground, m.
+const BELOW_GROUND_M: f64 = 1.0;
 
 /// The ground station. Tick it every 20 ms with its link.
 pub struct GroundCore {
@@ -53,6 +61,9 @@ pub struct GroundCore {
     selections: Vec<Happened>,
     theatre: Option<Theatre>,
     stand_ins: StandIns,
+    ways: Ways,
+    scene: Option<Scene>,
+    rehearser: PathBuf,
     seed: u64,
 }
 
@@ -114,6 +125,9 @@ impl GroundCore {
             zone_store: None,
             evidence,
             selections: Vec::new(),
+            ways: Ways::default(),
+            scene: None,
+            rehearser: config.rehearser,
             theatre: config.theatre,
             seed: config.seed,
         };
@@ -284,6 +298,98 @@ impl GroundCore {
         })
     }
 
+    /// From now on the station knows what stands in the world.
+    pub fn know(&mut self, scene: &Scene) {
+        self.scene = Some(scene.clone());
+    }
+
+    /// The program that rehearses, by its path or its name.
+    pub fn rehearser(&self) -> &Path {
+        &self.rehearser
+    }
+
+    /// The points that a vehicle still has to fly (ENU, metres), as far as it has told; none if it has not.
+    pub fn way_of(&self, vehicle: &NodeName) -> Option<Vec<[f64; 3]>> {
+        let state = self.roster.get(vehicle)?;
+        let home = self.readiness.get(vehicle).map(|said| said.home);
+        self.ways.ahead(vehicle, state, home)
+    }
+
+    /// A rehearsal of the fleet as it is now, with each of these routes in place of what its vehicle still has
+    /// to fly; and who is left out of it, with the reason.
+    ///
+    /// # Errors
+    /// [`Refusal`]: a vehicle is none of this station's, nobody has anything to fly, or the air is not known.
+    pub fn rehearsal(
+        &self,
+        proposed: &BTreeMap<NodeName, Route>,
+        now: SystemTime,
+    ) -> Result<(Rehearsal, BTreeMap<NodeName, String>), Refusal> {
+        self.refuse_strangers(&Who::These(proposed.keys().cloned().collect()))?;
+        let (mut vehicles, mut left_out) = (Vec::new(), BTreeMap::new());
+        for vehicle in &self.vehicles {
+            match self.actor(vehicle, proposed.get(vehicle)) {
+                Ok(actor) => vehicles.push(actor),
+                Err(why) => drop(left_out.insert(vehicle.clone(), why.to_owned())),
+            }
+        }
+        if vehicles.is_empty() {
+            return Err(Refusal::NobodyToRehearse);
+        }
+        let theatre = self.theatre.as_ref();
+        let space = theatre.map(|theatre| (theatre.airspace.lower, theatre.airspace.upper));
+        let (mut min, max) = match (&self.scene, space) {
+            (Some(scene), _) => (scene.min, scene.max),
+            (None, Some(space)) => space,
+            (None, None) => return Err(Refusal::NoTheatre),
+        };
+        // Who stands on the ground is inside.
+        min.z -= BELOW_GROUND_M;
+        let craft = theatre.map(|theatre| theatre.craft).unwrap_or_default();
+        let began = now.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let standing = self.zones.records().filter(|record| !record.is_going);
+        let rehearsal = Rehearsal {
+            vehicles,
+            min_m: min.into(),
+            max_m: max.into(),
+            airspace: theatre.map(|theatre| AirspaceTable::of(&theatre.airspace)).unwrap_or_default(),
+            zones: standing.map(|record| record.zone.clone()).collect(),
+            obstacles: self.scene.iter().flat_map(|scene| &scene.solids).map(Obstacle::from).collect(),
+            cruise_m_s: craft.cruise_m_s,
+            takeoff_height_m: craft.takeoff_m(),
+            began_s: began.as_secs_f64(),
+            ..Rehearsal::default()
+        };
+        Ok((rehearsal, left_out))
+    }
+
+    /// A vehicle as it is now, or why it has no part in a rehearsal.
+    fn actor(&self, vehicle: &NodeName, proposed: Option<&Route>) -> Result<Actor, &'static str> {
+        let state = self.roster.get(vehicle).ok_or("is not heard")?;
+        if !self.is_alive(vehicle) {
+            return Err("is silent");
+        }
+        if state.mission != MissionState::UnderWay {
+            return Err("has ended its mission");
+        }
+        let route_m = match proposed {
+            Some(route) => route.points().to_vec(),
+            None => self.way_of(vehicle).ok_or("has not told what it has to fly")?,
+        };
+        Ok(Actor {
+            node: vehicle.clone(),
+            position_m: state.position.into(),
+            yaw_rad: state.yaw_rad,
+            airborne: state.armed,
+            held: state.armed && self.ways.is_held(vehicle),
+            home_m: self.readiness.get(vehicle).map(|said| said.home),
+            battery: state.battery,
+            route_m,
+            scripts: self.ways.scripts(vehicle, state),
+            model: None,
+        })
+    }
+
     fn refuse_strangers(&self, who: &Who) -> Result<(), Refusal> {
         let Who::These(named) = who else { return Ok(()) };
         match named.iter().find(|name| !self.vehicles.contains(name)) {
@@ -422,12 +528,14 @@ impl GroundCore {
         }
         for said in self.node.take_readiness() {
             if self.vehicles.contains(&said.node) {
+                self.ways.note_readiness(&said);
                 self.readiness.insert(said.node.clone(), said);
             }
         }
         self.note_boards(link);
         let happened = self.node.node_mut().take_selections();
         happened.iter().for_each(|happened| self.evidence.note_event(happened.clone()));
+        happened.iter().for_each(|happened| self.ways.note(happened));
         happened.iter().for_each(|happened| self.note_holder(happened));
         for overruled in self.order_log.update(now, self.node.node(), &happened, &self.holders) {
             self.node.node_mut().enqueue(overruled.at(&self.name));

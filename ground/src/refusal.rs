@@ -25,6 +25,8 @@ pub enum Refusal {
     LaunchUnasked,
     #[error("this station was not told what to plan with: its configuration needs the table [planning]")]
     NoTheatre,
+    #[error("nobody has told what it has to fly: there is nothing to rehearse")]
+    NobodyToRehearse,
     #[error("nobody is on the ground with a mission before it: there is nothing to launch")]
     NobodyToLaunch,
     #[error(

@@ -67,6 +67,12 @@ pub enum Command {
     Configure(Configure),
     /// Write the routes of a scenario's vehicles, with its zones and rally points, as plans of QGroundControl.
     Plan(Plan),
+    /// Fly from a present state in lockstep, once with each of several seeds, and say what comes of it: a JSON object in,
+    /// one out (docs/missions.md).
+    Rehearse {
+        /// The state of the fleet, its routes, zones and known map; standard input without it.
+        file: Option<PathBuf>,
+    },
     /// List the built-in scenarios.
     List,
     /// Check a scenario, world or mission file.

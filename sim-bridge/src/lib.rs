@@ -18,6 +18,7 @@ mod node_names;
 #[cfg(feature = "zenoh")]
 pub mod processes;
 mod program;
+pub mod rehearse;
 pub mod scenario;
 mod scene_view;
 mod sequential;

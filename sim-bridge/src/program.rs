@@ -12,7 +12,7 @@ use crate::cli::{self, Cli, Command, Exit};
 use crate::mission::write;
 use crate::scenario::{Overrides, Scenario, ScenarioError};
 use crate::summary::Summary;
-use crate::{check, fly};
+use crate::{check, fly, rehearse};
 
 /// Runs the program, with the behaviours that `add` adds to it: vehicles' and ground stations'.
 pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
@@ -55,6 +55,11 @@ fn run(cli: &Cli, known: &Behaviours) -> anyhow::Result<Exit> {
             anyhow::bail!("built without the cargo feature `zenoh`, which this needs")
         }
         Command::Plan(args) => plan(args, known, cli.json).map(|()| Exit::Done),
+        Command::Rehearse { file } => {
+            let rehearsed = rehearse::run(file.as_deref())?;
+            println!("{}", serde_json::to_string_pretty(&rehearsed)?);
+            Ok(Exit::of(rehearsed.succeeded))
+        }
         Command::List => {
             list(cli.json);
             Ok(Exit::Done)

@@ -169,3 +169,61 @@ fn a_flight_says_where_its_recording_is_and_keeps_the_former_one() {
     let kept = |name: &str| folder.path().join("run").join(name).is_file();
     assert!(kept("mission.mcap") && kept("mission-1.mcap"));
 }
+
+/// Two that fly past one another, as `rehearse` is told of them.
+const REHEARSAL: &str = r#"{"vehicles": [
+    {"node": "uav/3", "position_m": [0, 0, 3], "airborne": true, "battery": 0.9, "route_m": [[20, 0, 3]]},
+    {"node": "uav/8", "position_m": [20, 6, 3], "airborne": true, "battery": 0.9, "route_m": [[0, 6, 3]]}
+  ], "min_m": [-10, -10, -1], "max_m": [30, 20, 10], "seeds": [1, 2]}"#;
+
+fn rehearse(text: &str) -> Output {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_skein-sim"))
+        .args(["rehearse", "--json"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    std::io::Write::write_all(&mut child.stdin.take().expect("a pipe"), text.as_bytes()).expect("it reads");
+    child.wait_with_output().expect("it ends")
+}
+
+#[test]
+fn what_is_rehearsed_comes_as_one_object_and_a_wrong_field_is_named() {
+    let output = rehearse(REHEARSAL);
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert_eq!((&said["succeeded"], &said["vehicles"][1]["arrives"]), (&true.into(), &2.into()), "{said}");
+    let nearest = &said["nearest"][0];
+    assert_eq!(nearest["who"], serde_json::json!(["uav/3", "uav/8"]));
+    assert!(nearest["distance_m"].as_f64().is_some_and(|metres| (4.0..6.5).contains(&metres)), "{nearest}");
+
+    let missing = REHEARSAL.replace("[[20, 0, 3]]", "[[40, 0, 3]]");
+    let output = rehearse(&missing);
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    assert_eq!(output.status.code(), Some(1), "a goal outside of the air: {said}");
+    assert!(said["vehicles"][0]["fails"][0]["why"].is_string(), "{said}");
+
+    for (from, to, field) in [
+        ("\"battery\": 0.9", "\"battery\": 2", "`vehicles[0].battery` is 2.0"),
+        ("[[20, 0, 3]]", "[]", "`vehicles[0].route_m`"),
+        ("[20, 6, 3]", "[20, 600, 3]", "`vehicles[1].position_m`"),
+        ("\"seeds\": [1, 2]", "\"seeds\": []", "`seeds`"),
+        ("\"seeds\"", "\"sead\"", "unknown field `sead`"),
+        ("[-10, -10, -1]", "[-10, \"a\", -1]", "`min_m[1]`"),
+        ("\"min_m\"", "\"model\": \"kite\", \"min_m\"", "`model`"),
+        ("\"min_m\"", "\"world\": \"nowhere.csv\", \"min_m\"", "nowhere.csv"),
+        (
+            "\"min_m\"",
+            "\"obstacles\": [{\"form\": \"sphere\", \"radius\": 0, \"position\": [0, 0, 0]}], \"min_m\"",
+            "`obstacles[0].radius`",
+        ),
+        ("}", "", "standard input"),
+    ] {
+        let output = rehearse(&REHEARSAL.replacen(from, to, 1));
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{field}: {error}");
+        assert!(error.contains(field), "`{field}` is not in: {error}");
+    }
+    assert_refused(&["rehearse", "nowhere.json"], &["nowhere.json"]);
+}

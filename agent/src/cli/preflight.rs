@@ -209,6 +209,7 @@ mod tests {
             incarnation: 0,
             home: [0.0; 3],
             datum: [0.0; 3],
+            mission: Vec::new(),
             checks: vec![
                 check("autopilot", CheckState::Passes, "PX4, in mode hold", ""),
                 check(

@@ -206,7 +206,14 @@ mod tests {
         /// Vehicle 2 said so many seconds ago that this is its home, and this its datum.
         fn beside(mut self, home: [f64; 3], datum: [f64; 3], ago_s: u64) -> Self {
             let node = NodeName::new("uav/2").unwrap();
-            let said = Readiness { node: node.clone(), incarnation: 1, home, datum, checks: Vec::new() };
+            let said = Readiness {
+                node: node.clone(),
+                incarnation: 1,
+                home,
+                datum,
+                checks: Vec::new(),
+                mission: Vec::new(),
+            };
             self.others.insert(node, (NOW - Duration::from_secs(ago_s), said));
             self
         }

@@ -11,6 +11,7 @@ const KEYS: [keys: string[], does: string][] = [
   [['L'], 'land'],
   [['G'], 'go to: then click the ground'],
   [['P'], 'play or pause a recording'],
+  [['E'], 'draw a route for a vehicle: click its points on the ground'],
   [['Z'], 'draw a zone: click its corners on the ground'],
   [['1', '…', '9'], 'select a vehicle by its number (12: 1, then 2), with ⇧ add it'],
   [['0', 'A'], 'select all'],

@@ -19,14 +19,17 @@ import { Banner, Notices } from './notices';
 import { OrdersPanel } from './orders-panel';
 import { Person } from './person';
 import { Placing } from './placing';
-import type { ClientMessage, Command, Fleet, Point, Question, Scene, Script, ServerMessage, Zone } from './protocol';
+import type { ClientMessage, Command, Fleet, Point, Question, Scene, Script, ServerMessage, Vec3, Zone } from './protocol';
 import { addresseeWords, Selection } from './selection';
 import { Theme } from './theme';
 import { VehiclesPanel } from './vehicles-panel';
 import { What } from './vocabulary';
 import { View } from './view/view';
 import { WhyPanel } from './why-panel';
+import { RehearsalDialog } from './rehearsal-dialog';
 import { ReplayBar } from './replay-bar';
+import { RoutesPanel } from './routes-panel';
+import { Routing } from './routing';
 import { showScript } from './script-dialog';
 import { ScriptsPanel } from './scripts-panel';
 import { TypedNumber } from './typed-number';
@@ -40,6 +43,9 @@ const GRACE_MS = 1500;
 /** An order that the station has not taken by then was probably not heard. */
 const ANSWER_MS = 3000;
 
+/** A rehearsal among unanswered requests, and the time that it may take. */
+const REHEARSAL = 'rehearsal';
+const REHEARSED_MS = 150_000;
 /** How requests about zones are called. */
 const ZONE = 'zone';
 
@@ -53,7 +59,7 @@ interface Sent {
 const selection: Selection = new Selection(selectionChanged);
 const view = new View(part('view'), {
   picked: (name, more) => (more ? selection.toggle(name) : selection.pick(name)),
-  placed: (place) => (drawing.active ? drawing.add(rounded(place)) : goTo(place)),
+  placed: (place) => (routing.active ? routing.add(rounded(place), view.groundZ) : drawing.active ? drawing.add(rounded(place)) : goTo(place)),
 });
 const theme = new Theme(() => view.repaint());
 const vehicles = new VehiclesPanel(part('vehicles'), part('vehicles-note'), selection);
@@ -62,24 +68,37 @@ const why = new WhyPanel(part('why'), part('why-title'), part('why-note'), part(
 const orders = new OrdersPanel(part('answers'));
 const scripts = new ScriptsPanel(part('vehicles'), withdraw, (file) => void readScript(file));
 const zonesPanel = new ZonesPanel(part('vehicles'), erase, () => drawing.set(!drawing.active, zones.map(({ zone }) => zone.name)));
+const routesPanel = new RoutesPanel(part('vehicles'), toggleRouting, () => rehearse({}, null));
 const notices = new Notices(part('notices'));
 const connectionBanner = new Banner(part('banners'), 'alert');
 const outcomeBanner = new Banner(part('banners'), 'status');
 const help = new Help(part('help-open'));
 const placing = new Placing(part('view').parentElement!, (on) => {
-  if (on) drawing.set(false);
-  view.setPlacing(on || drawing.active);
+  if (on) [drawing, routing].forEach((other) => other.set(false));
+  view.setPlacing(on || drawing.active || routing.active);
   commands.setPlacing(on);
 });
 const drawing: Drawing = new Drawing(part('view').parentElement!, {
   changed: (on, places, radius) => {
-    if (on) placing.set(false);
-    view.setPlacing(on || placing.active);
+    if (on) [placing, routing].forEach((other) => other.set(false));
+    view.setPlacing(on || placing.active || routing.active);
     view.setDrawn(places, radius);
     zonesPanel.setDrawing(on);
   },
   drawn: (zone) => person.named(What.load, () => send({ type: 'draw', tag: newTag(), zone })),
 });
+const routing: Routing = new Routing(part('view').parentElement!, {
+  changed: (on, vehicle, points) => {
+    if (on) [placing, drawing].forEach((other) => other.set(false));
+    view.setPlacing(on || placing.active || drawing.active);
+    view.setRoute(on ? { vehicle, points } : null);
+    routesPanel.setRouting(on);
+  },
+  rehearse: (vehicle, points) => rehearse({ [vehicle]: [...points] }, () => sendRoute(vehicle, points)),
+  send: sendRoute,
+  told: (vehicle) => fleet.vehicles.find(({ name }) => name === vehicle)?.way ?? [],
+});
+const rehearsal = new RehearsalDialog();
 const replay = new ReplayBar(part('view').parentElement!, (wish) => send({ type: 'replay', tag: newTag(), ...wish }));
 const confirmation = new Confirmation();
 const commands = new Commands(part('commands'), {
@@ -130,9 +149,10 @@ listenToKeys(
     t: () => theme.toggle(),
     w: () => why.focus(),
     p: () => replay.toggle(),
+    e: toggleRouting,
     z: () => drawing.set(!drawing.active, zones.map(({ zone }) => zone.name)),
     '?': () => help.open(),
-    Escape: () => (placing.active ? placing.set(false) : drawing.active ? drawing.set(false) : selection.set([])),
+    Escape: () => (placing.active ? placing.set(false) : drawing.active ? drawing.set(false) : routing.active ? routing.set(false) : selection.set([])),
   },
   (digit, more) => {
     const number = typed.type(digit, performance.now());
@@ -179,6 +199,9 @@ function receive(message: ServerMessage): void {
     case 'replayed':
       settle(message.tag);
       break;
+    case 'rehearsed':
+      if (settle(message.tag)) rehearsal.show(message);
+      break;
     case 'replay':
       if (!replay.active) document.body.dataset.replay = '';
       replay.show(message);
@@ -198,7 +221,8 @@ function receive(message: ServerMessage): void {
       break;
     case 'error': {
       const sent = message.tag === null ? undefined : settle(message.tag);
-      notices.show(sent ? `${orderName(sent.what)} was refused: ${message.message}` : message.message);
+      if (sent?.what === REHEARSAL) rehearsal.fail(message.message);
+      else notices.show(sent ? `${orderName(sent.what)} was refused: ${message.message}` : message.message);
       break;
     }
   }
@@ -291,6 +315,24 @@ function erase(name: string): void {
   person.named(What.load, () => send({ type: 'erase', tag: newTag(), name }));
 }
 
+function toggleRouting(): void {
+  const flies = fleet.vehicles.filter(({ mission }) => mission === 'under_way').map(({ name }) => name);
+  routing.set(!routing.active, flies, flies.find((name) => selection.has(name)));
+}
+
+function sendRoute(vehicle: string, points: readonly Vec3[]): void {
+  routing.set(false);
+  person.named(What.route, () => send({ type: 'order', tag: newTag(), what: What.route, to: [vehicle], points: [...points] }));
+}
+
+/** Has the fleet flown on in simulation; `give` sends what is rehearsed. */
+function rehearse(routes: Record<string, Vec3[]>, give: (() => void) | null): void {
+  person.named(What.route, () => {
+    rehearsal.wait(give);
+    send({ type: 'rehearse', tag: newTag(), routes });
+  });
+}
+
 /** Asks the station what a script's file says. */
 async function readScript(file: File): Promise<void> {
   send({ type: 'read_script', tag: newTag(), file: file.name, text: await file.text() });
@@ -310,7 +352,7 @@ function newTag(): string {
 
 function send(request: Exclude<ClientMessage, Question>): void {
   const { tag } = request;
-  const what = request.type === 'order' ? request.what : request.type === 'hello' ? 'Your name' : request.type === 'read_script' ? What.load : request.type === 'replay' ? 'The recording' : ZONE;
+  const what = request.type === 'order' ? request.what : request.type === 'hello' ? 'Your name' : request.type === 'read_script' ? What.load : request.type === 'replay' ? 'The recording' : request.type === 'rehearse' ? REHEARSAL : ZONE;
   const point = 'point' in request ? request.point : undefined;
   if (!connection.send(request)) {
     notices.show(`${orderName(what)} was not sent: there is no connection to the station.`);
@@ -318,7 +360,7 @@ function send(request: Exclude<ClientMessage, Question>): void {
   }
   const timer = window.setTimeout(() => {
     if (settle(tag)) notices.show(`${orderName(what)}: the station has not answered.`);
-  }, ANSWER_MS);
+  }, what === REHEARSAL ? REHEARSED_MS : ANSWER_MS);
   unanswered.set(tag, { what, timer, ...(point && { point }) });
 }
 
@@ -365,6 +407,7 @@ function connectionChanged(live: boolean, retryMs: number): void {
     confirmation.close();
     placing.set(false);
     drawing.set(false);
+    routing.set(false);
     const lost = [...unanswered.keys()].map(settle);
     if (lost.length > 0) notices.show('The connection was lost before the station answered the last order.');
   }

@@ -83,6 +83,22 @@ export interface Parameter {
 
 export type Argument = number | string | Vec3 | Vec3[];
 
+export type Range = station.Range;
+export type Played = Doubtful<Omit<station.Played, 'lands_s' | 'battery'> & { lands_s: Range; battery: Range }, 'lands_s' | 'battery'>;
+
+/** The outcome of a rehearsal. */
+export interface Rehearsal {
+  type: 'rehearsed';
+  tag: string;
+  flights: number;
+  succeeded: boolean;
+  vehicles: Played[];
+  nearest: station.Nearness[];
+  clearance_m: number | null;
+  collisions: [number, number];
+  left_out: Record<string, string>;
+}
+
 export type ServerMessage =
   | Scene
   | Fleet
@@ -92,6 +108,7 @@ export type ServerMessage =
   | With<Told<'replayed'>, { tag: string }>
   | With<Told<'zones'>, { zones: Zone[] }>
   | With<Told<'mapped'>, { tag: string }>
+  | Rehearsal
   | Why
   | You
   | Offer
@@ -125,7 +142,7 @@ export type Point = [x: number, y: number, z: number | null];
 export type Question = Asked<'why'>;
 
 /** What this console says. But for questions, all of it is answered under its tag. */
-export type ClientMessage = ((Asked<'order'> | Asked<'read_script'> | Asked<'hello'> | Asked<'draw'> | Asked<'erase'> | Asked<'replay'>) & { tag: string }) | Question;
+export type ClientMessage = ((Asked<'order'> | Asked<'read_script'> | Asked<'hello'> | Asked<'draw'> | Asked<'erase'> | Asked<'replay'> | Asked<'rehearse'>) & { tag: string }) | Question;
 
 /** Reads a message of the station; `null` if it is none that this console knows. */
 export function readMessage(text: string): ServerMessage | null {
@@ -158,6 +175,8 @@ export function readMessage(text: string): ServerMessage | null {
       return { type: 'zones', zones: list(json.zones, readZone) };
     case 'mapped':
       return { type: 'mapped', tag: string(json.tag), name: string(json.name) };
+    case 'rehearsed':
+      return readRehearsal(json);
     case 'why':
       return readWhy(json);
     case 'you':
@@ -248,6 +267,7 @@ function readVehicle(json: Raw<station.VehicleView | station.StateView>): Vehicl
     waiting_for: string(json.waiting_for),
     mission: json.mission === 'complete' || json.mission === 'failed' || json.mission === 'under_way' ? json.mission : null,
     path: Array.isArray(json.path) ? json.path.map(vector).filter((point) => point !== null) : [],
+    way: Array.isArray(json.way) ? json.way.map(vector).filter((point) => point !== null) : [],
     scripts: strings(json.scripts),
     zones: strings(json.zones),
     holder: string(json.holder),
@@ -322,6 +342,39 @@ function readReplay(json: Raw<Replay>): Replay {
     speed: number(json.speed) ?? 1,
     complete: json.complete === true,
   };
+}
+
+function readRehearsal(json: Json): Rehearsal {
+  const said: Raw<station.Rehearsed> = isRecord(json.rehearsed) ? json.rehearsed : {};
+  const [obstacles, vehicles] = Array.isArray(said.collisions) ? said.collisions.map(number) : [];
+  const left = isRecord(json.left_out) ? json.left_out : {};
+  return {
+    type: 'rehearsed',
+    tag: string(json.tag),
+    flights: Array.isArray(said.seeds) ? said.seeds.length : 0,
+    succeeded: said.succeeded === true,
+    vehicles: list(said.vehicles, (played: Raw<station.Played>) => ({
+      vehicle: string(played.vehicle),
+      arrives: number(played.arrives) ?? 0,
+      lands_s: range(played.lands_s),
+      battery: range(played.battery),
+      waits: list(played.waits, (wait: Raw<station.Wait>) => ({ waits_for: string(wait.waits_for), mean_s: number(wait.mean_s) ?? 0 })),
+      fails: list(played.fails, (failure: Raw<station.Failure>) => ({ why: string(failure.why), seeds: number(failure.seeds) ?? 0 })),
+    })),
+    nearest: list(said.nearest, (near: Raw<station.Nearness>) => {
+      const [one, other] = strings(near.who);
+      const [distance_m, at_s] = [number(near.distance_m), number(near.at_s)];
+      return one === undefined || other === undefined || distance_m === null || at_s === null ? null : { who: [one, other] as [string, string], distance_m, at_s, seed: number(near.seed) ?? 0 };
+    }),
+    clearance_m: number(said.clearance_m),
+    collisions: [obstacles ?? 0, vehicles ?? 0],
+    left_out: Object.fromEntries(Object.entries(left).map(([name, why]) => [name, string(why)])),
+  };
+}
+
+function range(json: unknown): Range | null {
+  const [least, mean, most] = isRecord(json) ? [number(json.least), number(json.mean), number(json.most)] : [null, null, null];
+  return least === null || mean === null || most === null ? null : { least, mean, most };
 }
 
 /** A zone of a kind that this console does not know cannot be shown. */

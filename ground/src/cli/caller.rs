@@ -135,11 +135,21 @@ impl Caller {
     ///
     /// # Errors
     /// The station refuses, and says why.
-    pub(super) fn ask(&mut self, mut request: Value, expected: &str) -> anyhow::Result<Value> {
+    pub(super) fn ask(&mut self, request: Value, expected: &str) -> anyhow::Result<Value> {
+        self.ask_within(request, expected, PATIENCE)
+    }
+
+    /// The same of what takes the station longer to answer.
+    pub(super) fn ask_within(
+        &mut self,
+        mut request: Value,
+        expected: &str,
+        patience: Duration,
+    ) -> anyhow::Result<Value> {
         let tag = "shell";
         request["tag"] = tag.into();
         self.socket.send(Message::text(request.to_string()))?;
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + patience;
         while Instant::now() < deadline {
             let message = self.next()?;
             if message["tag"] != tag {
@@ -152,7 +162,7 @@ impl Caller {
                 return Ok(message);
             }
         }
-        bail!("the station has not answered within {} s", PATIENCE.as_secs())
+        bail!("the station has not answered within {} s", patience.as_secs())
     }
 
     /// The next message of this type.

@@ -6,6 +6,7 @@ mod explain;
 mod order;
 mod plan;
 mod recording;
+mod rehearse;
 mod replay;
 mod serve;
 mod status;
@@ -58,6 +59,9 @@ enum Command {
     /// Plan for the fleet: who reaches which target by what way, so that all arrive together. Without `--send` nobody is
     /// ordered anything.
     Plan(plan::PlanCommand),
+    /// Fly the fleet on from where it is now in simulation, several times, and say what comes of it; nobody is ordered
+    /// anything.
+    Rehearse(rehearse::RehearseCommand),
     /// Say where each vehicle of a station that runs is, what it does and for whom it waits.
     Status(caller::Call),
     /// Draw no-fly zones, fences, threats, limits of height and rally points for all vehicles, list and remove them.
@@ -102,6 +106,7 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
         Command::Zone(command) => zone::run(command, cli.json),
         Command::Order(order) => order::run(order, cli.json),
         Command::Plan(command) => plan::run(command, cli.json),
+        Command::Rehearse(command) => rehearse::run(command, cli.json),
         Command::Explain { file, at, vehicle } => explain::run(file, *at, vehicle.as_deref(), cli.json),
     };
     match outcome {

@@ -1,13 +1,14 @@
 //! Orders from the shell, to a station that runs: the console's buttons as commands.
 
 use std::io::{IsTerminal as _, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
+use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_wire::event::{OrderGiven, What};
 use skein_wire::{Route, UnfitRoute};
 
@@ -62,6 +63,9 @@ pub(super) enum OrderCommand {
         #[arg(long)]
         yes: bool,
     },
+    /// Send vehicles a script, or take one back.
+    #[command(subcommand)]
+    Script(ScriptCommand),
     /// Ask whoever holds vehicles for them.
     Ask(Addressed),
     /// Give vehicles that you hold to somebody else.
@@ -78,10 +82,79 @@ pub(super) enum OrderCommand {
     Release(Addressed),
 }
 
+/// A script is sent, or taken back.
+#[derive(Subcommand)]
+pub(super) enum ScriptCommand {
+    /// Vehicles run a script beside whatever they do, such as those of agent/scripts.
+    Send {
+        /// The script's file, TOML or JSON.
+        #[arg(value_name = "FILE")]
+        file: PathBuf,
+        #[command(flatten)]
+        to: Addressed,
+        /// The value of a parameter, such as patience_s=30, other=uav/2 or min=0,0,2. Once for each.
+        #[arg(long = "with", value_name = "NAME=VALUE")]
+        with: Vec<String>,
+        /// Another name to run under, so that one script may run twice.
+        #[arg(long = "as", value_name = "NAME")]
+        called: Option<String>,
+    },
+    /// Vehicles run a script no more.
+    Remove {
+        /// The name that it runs under, as `status --json` lists it.
+        name: String,
+        #[command(flatten)]
+        to: Addressed,
+    },
+}
+
+impl ScriptCommand {
+    fn request(&self) -> anyhow::Result<(&Call, Value)> {
+        match self {
+            Self::Send { file, to, with, called } => {
+                let text = std::fs::read_to_string(file).with_context(|| file.display().to_string())?;
+                let script = ScriptFile::parse(&file.display().to_string(), &text)?;
+                let with = with.iter().map(|given| argument(given)).collect::<anyhow::Result<_>>()?;
+                let assignment = Assignment { script, with, called: called.clone() };
+                // Its faults are told before anybody is asked.
+                assignment.bind("uav/1").with_context(|| file.display().to_string())?;
+                let (call, mut request) = to.request(What::Load);
+                request["script"] = serde_json::to_value(&assignment)?;
+                Ok((call, request))
+            }
+            Self::Remove { name, to } => {
+                let (call, mut request) = to.request(What::Unload);
+                request["name"] = json!(name);
+                Ok((call, request))
+            }
+        }
+    }
+}
+
+/// A parameter and its value: a number, a point such as `0,0,2`, points between spaces, or a word.
+fn argument(given: &str) -> anyhow::Result<(String, Argument)> {
+    let (name, value) = given
+        .split_once('=')
+        .with_context(|| format!("`--with` is {given:?}: expected NAME=VALUE, such as patience_s=30"))?;
+    let point = |text: &str| -> Option<[f64; 3]> {
+        let metres: Vec<f64> = text.split(',').map(|part| part.trim().parse().ok()).collect::<Option<_>>()?;
+        metres.try_into().ok()
+    };
+    let points: Option<Vec<[f64; 3]>> = value.split_whitespace().map(point).collect();
+    let value = match (value.parse::<i64>(), value.parse::<f64>(), points.as_deref()) {
+        (Ok(whole), ..) => Argument::Integer(whole),
+        (_, Ok(number), _) => Argument::Number(number),
+        (.., Some([point])) => Argument::Point(*point),
+        (.., Some([_, ..])) => Argument::Route(points.unwrap_or_default()),
+        _ => Argument::Text(value.to_owned()),
+    };
+    Ok((name.to_owned(), value))
+}
+
 /// An order to some vehicles.
 #[derive(Args)]
 pub(super) struct Addressed {
-    /// The vehicles, such as uav/3, or `all`.
+    /// The vehicles by number or name, such as 3 or uav/3, or `all`.
     #[arg(value_name = "VEHICLE", required = true)]
     vehicles: Vec<String>,
     #[command(flatten)]
@@ -93,7 +166,7 @@ impl Addressed {
         let to = if self.vehicles.iter().any(|vehicle| vehicle == OrderGiven::ALL) {
             json!(OrderGiven::ALL)
         } else {
-            json!(self.vehicles)
+            self.vehicles.iter().map(|vehicle| vehicle_name(vehicle)).collect()
         };
         (&self.call, json!({ "type": "order", "what": what.word(), "to": to }))
     }
@@ -107,6 +180,7 @@ pub(super) fn run(order: &OrderCommand, as_json: bool) -> anyhow::Result<ExitCod
         OrderCommand::Return(to) => to.request(What::Return),
         OrderCommand::Land(to) => to.request(What::Land),
         OrderCommand::HandBack(to) => to.request(What::HandBack),
+        OrderCommand::Script(command) => command.request()?,
         OrderCommand::Ask(to) => to.request(What::Ask),
         OrderCommand::Take(to) => to.request(What::Take),
         OrderCommand::Release(to) => to.request(What::Release),
@@ -245,6 +319,17 @@ fn confirmed(offer: &Value) -> anyhow::Result<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_parameter_is_a_number_a_point_points_or_a_word() {
+        let value = |given: &str| argument(given).unwrap().1;
+        assert_eq!(argument("goes_first=1").unwrap(), ("goes_first".to_owned(), Argument::Integer(1)));
+        assert_eq!(value("patience_s=2.5"), Argument::Number(2.5));
+        assert_eq!(value("other=uav/2"), Argument::Text("uav/2".into()));
+        assert_eq!(value("min=0,-1,2.5"), Argument::Point([0.0, -1.0, 2.5]));
+        assert_eq!(value("way=0,0,2 1,0,2"), Argument::Route(vec![[0.0, 0.0, 2.0], [1.0, 0.0, 2.0]]));
+        assert!(argument("patience").unwrap_err().to_string().contains("NAME=VALUE"));
+    }
 
     #[test]
     fn a_route_is_read_from_the_line_or_from_a_file() {

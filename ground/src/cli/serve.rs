@@ -175,6 +175,7 @@ impl Station {
             let Ok(Payload::Scene(scene)) = Payload::decode(&payload) else { continue };
             if self.scene.as_ref() != Some(&scene) {
                 self.recording.scene(now, &scene);
+                self.core.know(&scene);
                 self.console.show_scene(&self.core, Some(&scene));
                 self.scene = Some(scene);
             }

@@ -1,12 +1,14 @@
 //! One browser: it is told what is so, and brings orders.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::extract::ws::{self, WebSocket};
 use nalgebra::Vector3;
-use skein_wire::Who;
+use skein_dbp::NodeName;
 use skein_wire::event::What;
+use skein_wire::{Route, Who};
 use tokio::sync::{broadcast::error::RecvError, watch};
 use tokio::task::JoinSet;
 use tokio::time::timeout;
@@ -58,6 +60,10 @@ pub(super) async fn attend(
                         (tag, Ok(Request::Plan(who, targets))) => {
                             let surveyed = survey(&session, who, targets, mailbox).await;
                             begin_plan(tag, surveyed, &mut readings, &mut socket).await
+                        }
+                        (tag, Ok(Request::Rehearse(routes, flights))) => {
+                            let staged = stage(&session, routes, flights, mailbox).await;
+                            begin_rehearsal(tag, staged, &mut readings, &mut socket).await
                         }
                         request => {
                             answer(request, &mut socket, &mut session, &mut question, &subscription, mailbox).await
@@ -144,7 +150,7 @@ async fn look_at(text: String, readings: &mut JoinSet<Read>, socket: &mut WebSoc
 }
 
 fn too_many() -> String {
-    format!("{MOST_READINGS} scripts or plans are being looked at already; wait for an answer")
+    format!("{MOST_READINGS} scripts, plans or rehearsals are being looked at already; wait for an answer")
 }
 
 /// The fleet as the station knows it now, for whoever may send it somewhere.
@@ -180,6 +186,39 @@ async fn begin_plan(
     say(socket, &Message::Error { tag, message }).await
 }
 
+/// The fleet as the station knows it now, for whoever may send it somewhere.
+async fn stage(
+    session: &Session,
+    routes: BTreeMap<NodeName, Route>,
+    flights: usize,
+    mailbox: &Mailbox,
+) -> Result<Granted, String> {
+    let by = session.giver(What::Route)?;
+    granted(by, Wanted::Rehearse(routes, flights), mailbox).await
+}
+
+/// Has it flown by a program of its own, on a thread that has time to wait for it.
+async fn begin_rehearsal(
+    tag: Option<String>,
+    staged: Result<Granted, String>,
+    readings: &mut JoinSet<Read>,
+    socket: &mut WebSocket,
+) -> Result<(), Gone> {
+    let message = match staged {
+        Ok(Granted::Staged(_)) if readings.len() >= MOST_READINGS => too_many(),
+        Ok(Granted::Staged(staged)) => {
+            readings.spawn_blocking(move || {
+                let flown = staged.fly().map_err(|error| error.to_string());
+                (tag, flown.map(|rehearsed| Request::Rehearsed(Box::new(rehearsed), staged.left_out)))
+            });
+            return Ok(());
+        }
+        Ok(_) => "the station has misunderstood what was asked".to_owned(),
+        Err(message) => message,
+    };
+    say(socket, &Message::Error { tag, message }).await
+}
+
 /// Does what a browser asks for.
 async fn answer(
     (tag, request): Read,
@@ -195,8 +234,11 @@ async fn answer(
             Ok(())
         }
         Ok(Request::Planned(plan)) => say(socket, &Message::Plan { tag, plan: PlanView::of(&plan) }).await,
+        Ok(Request::Rehearsed(rehearsed, left_out)) => {
+            say(socket, &Message::Rehearsed { tag, rehearsed, left_out }).await
+        }
         // It was begun where it was heard.
-        Ok(Request::Plan(..)) => Ok(()),
+        Ok(Request::Plan(..) | Request::Rehearse(..)) => Ok(()),
         Ok(Request::Script(script)) => say(socket, &Message::Script { tag, script }).await,
         Ok(Request::Order(order)) => give(socket, session, tag, *order, mailbox).await,
         Ok(Request::Map(wanted)) => change_map(socket, session, tag, wanted, mailbox).await,

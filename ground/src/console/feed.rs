@@ -14,7 +14,7 @@ use skein_bp::{Event, Value};
 use skein_dbp::facts::Stalled;
 use skein_dbp::{Happened, NodeName, Peer};
 use skein_wire::event::{Advance, Declared as _, Homeward, What};
-use skein_wire::{Check, Form, MissionState, Scene, SenderStats, Solid, State, Zone};
+use skein_wire::{Check, MissionState, Scene, SenderStats, State, Zone};
 
 use super::plan_view::PlanView;
 use super::request::Granted;
@@ -24,7 +24,9 @@ use crate::core::GroundCore;
 use crate::explain::Explanation;
 use crate::giver::Giver;
 use crate::launch_offer::{Candidate, LaunchOffer, OFFER_LASTS};
+use crate::obstacle::Obstacle;
 use crate::order_log::{Answer, OrderRecord};
+use crate::rehearsal::Rehearsed;
 use crate::replay::{Moment, Replay};
 use crate::zone_log::ZoneRecord;
 
@@ -120,6 +122,13 @@ pub(super) enum Message<'a> {
         #[serde(flatten)]
         plan: PlanView<'a>,
     },
+    /// The outcome of a rehearsal, and who had no part in it, and why.
+    Rehearsed {
+        tag: Option<String>,
+        rehearsed: Box<Rehearsed>,
+        #[cfg_attr(test, ts(type = "Record<string, string>"))]
+        left_out: BTreeMap<NodeName, String>,
+    },
     /// The zone of this name is drawn, or being removed.
     Mapped {
         tag: Option<String>,
@@ -151,24 +160,6 @@ pub(super) struct Bounds {
 
 #[derive(Serialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
-pub(super) struct Obstacle {
-    #[serde(flatten)]
-    form: FormView,
-    position: [f64; 3],
-    orientation: [f64; 4],
-}
-
-#[derive(Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
-#[serde(tag = "form", rename_all = "snake_case")]
-pub(super) enum FormView {
-    Box { size: [f64; 3] },
-    Cylinder { radius: f64, height: f64 },
-    Sphere { radius: f64 },
-}
-
-#[derive(Serialize)]
-#[cfg_attr(test, derive(ts_rs::TS))]
 pub(super) struct OutcomeView {
     succeeded: bool,
     failed: BTreeMap<String, String>,
@@ -183,6 +174,8 @@ pub(super) struct VehicleView<'a> {
     notes: Vec<String>,
     /// Its checks before take-off.
     checks: Vec<CheckView<'a>>,
+    /// The points that it still has to fly, as far as it has told (ENU, metres).
+    way: Vec<[f64; 3]>,
     /// All fields of a [`StateView`], or none.
     #[cfg_attr(test, ts(skip))]
     #[serde(flatten)]
@@ -310,7 +303,7 @@ impl Feed {
     }
 
     pub(super) fn show_scene(&mut self, station: &GroundCore, scene: Option<&Scene>) {
-        let obstacles = scene.iter().flat_map(|scene| &scene.solids).map(obstacle);
+        let obstacles = scene.iter().flat_map(|scene| &scene.solids).map(Obstacle::from);
         let message = Message::Scene {
             fleet: station.node().fleet().as_str(),
             station: station.name().as_str(),
@@ -411,7 +404,7 @@ impl Feed {
             software: env!("CARGO_PKG_VERSION"),
             recording: &self.recording,
             bounds: None,
-            obstacles: replay.moment().solids.iter().map(obstacle).collect(),
+            obstacles: replay.moment().solids.iter().map(Obstacle::from).collect(),
         }
     }
 
@@ -434,6 +427,7 @@ fn recorded_view<'a>(replay: &Replay, name: &'a NodeName, state: &'a State) -> V
         link: LinkView { alive: replay.is_heard(name), age_ms: None },
         notes: Vec::new(),
         checks: Vec::new(),
+        way: Vec::new(),
         state: Some(state_view(state)),
     }
 }
@@ -451,18 +445,6 @@ fn recorded_zone<'a>(
     };
     let answers = states.iter().map(|(vehicle, (_, state))| (vehicle.as_str(), answer(state))).collect();
     ZoneView { zone, by, time_s: at.as_secs_f64(), going: false, answers }
-}
-
-fn obstacle(solid: &Solid) -> Obstacle {
-    Obstacle {
-        form: match solid.form {
-            Form::Box(size) => FormView::Box { size: size.into() },
-            Form::Cylinder { radius, height } => FormView::Cylinder { radius, height },
-            Form::Sphere { radius } => FormView::Sphere { radius },
-        },
-        position: solid.pose.translation.vector.into(),
-        orientation: solid.pose.rotation.coords.into(),
-    }
 }
 
 impl<'a> Message<'a> {
@@ -483,6 +465,7 @@ impl<'a> Message<'a> {
             Granted::Replayed => Self::Replayed { tag },
             // A plan is made of it before anybody is told.
             Granted::Surveyed(_) => Self::Error { tag, message: "the plan is not made yet".to_owned() },
+            Granted::Staged(_) => Self::Error { tag, message: "it is not rehearsed yet".to_owned() },
         }
     }
 
@@ -528,6 +511,7 @@ fn fleet(now: Duration, station: &GroundCore) -> Message<'_> {
         let checks = station.readiness(name).map_or(&[][..], |said| &said.checks);
         VehicleView {
             checks: checks.iter().map(check_view).collect(),
+            way: station.way_of(name).unwrap_or_default(),
             ..vehicle_view(
                 now,
                 name,
@@ -558,6 +542,7 @@ fn vehicle_view<'a>(
         link: LinkView { alive: peer.is_some_and(|peer| peer.alive), age_ms },
         notes: notes.collect(),
         checks: Vec::new(),
+        way: Vec::new(),
         state: state.map(state_view),
     }
 }

@@ -12,6 +12,7 @@ mod client;
 mod feed;
 mod listener;
 mod plan_view;
+mod rehearser;
 mod request;
 mod server;
 mod session;

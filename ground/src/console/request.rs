@@ -1,23 +1,26 @@
 //! The requests of browsers: that something is done, or to be told why a vehicle does what it does.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use nalgebra::Vector3;
 use serde::Deserialize;
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_dbp::NodeName;
 use skein_wire::event::{OrderGiven, What};
-use skein_wire::{Destination, Details, Order, Who, Zone, ZoneTable};
+use skein_wire::{Destination, Details, Order, Route, Who, Zone, ZoneTable};
 use tokio::sync::oneshot;
 
+use super::rehearser::Staged;
 use crate::core::GroundCore;
 use crate::giver::Giver;
 use crate::launch_offer::LaunchOffer;
 use crate::order::to_send;
 use crate::planning::{FleetPlan, FleetProblem};
 use crate::refusal::Refusal;
+use crate::rehearsal::Rehearsed;
 use crate::replay::Replay;
 
 /// A wish to the station.
@@ -30,6 +33,8 @@ pub(super) enum Wanted {
     Launch(String),
     /// The facts needed to plan for these vehicles to these targets.
     Survey(Who, Vec<Vector3<f64>>),
+    /// A rehearsal: of the fleet as it is, with these routes in place of what their vehicles have to fly, and so often.
+    Rehearse(BTreeMap<NodeName, Route>, usize),
     /// That a zone is drawn.
     Draw(Zone),
     /// That the zone of this name is removed.
@@ -55,6 +60,7 @@ pub(super) enum Granted {
     Ordered(u64),
     Offered(LaunchOffer),
     Surveyed(Box<FleetProblem>),
+    Staged(Box<Staged>),
     /// The zone of this name is drawn, or being removed.
     Mapped(String),
     /// The recording goes on as wished.
@@ -76,6 +82,14 @@ impl Wish {
             Wanted::Erase(name) => station.erase(&by, &name).map(|()| Granted::Mapped(name)),
             Wanted::Survey(who, targets) => {
                 station.survey(&who, targets).map(Box::new).map(Granted::Surveyed)
+            }
+            Wanted::Rehearse(routes, flights) => {
+                station.rehearsal(&routes, SystemTime::now()).map(|staged| {
+                    let (mut rehearsal, left_out) = staged;
+                    rehearsal.seeds = (1..=flights as u64).collect();
+                    let program = station.rehearser().to_owned();
+                    Granted::Staged(Box::new(Staged { program, rehearsal, left_out }))
+                })
             }
             Wanted::Replay(_) => Err(Refusal::NotRecorded),
         };
@@ -111,6 +125,9 @@ impl std::fmt::Display for Wish {
             Wanted::Offer(what, _) => write!(f, "{} asks what {what} would launch", self.by),
             Wanted::Launch(_) => write!(f, "{} confirms a launch", self.by),
             Wanted::Survey(who, _) => write!(f, "{} asks for a plan for {who}", self.by),
+            Wanted::Rehearse(routes, _) => {
+                write!(f, "{} rehearses, with {} new routes", self.by, routes.len())
+            }
             Wanted::Draw(zone) => write!(f, "{} draws the zone {}", self.by, zone.name()),
             Wanted::Erase(name) => write!(f, "{} removes the zone {name}", self.by),
             Wanted::Replay(_) => write!(f, "{} wants the recording to go on otherwise", self.by),
@@ -158,6 +175,10 @@ pub(super) enum Request {
     Plan(Who, Vec<Vector3<f64>>),
     /// The same, made.
     Planned(Box<FleetPlan>),
+    /// To be told what would come of it if the fleet flew on, with these routes; nobody is ordered anything.
+    Rehearse(BTreeMap<NodeName, Route>, usize),
+    /// The same, flown; and who had no part in it, and why.
+    Rehearsed(Box<Rehearsed>, BTreeMap<NodeName, String>),
 }
 
 /// A message of a browser.
@@ -200,6 +221,38 @@ pub(super) enum Message {
         to: To,
         targets: Vec<[f64; 3]>,
     },
+    /// Asks what would come of it if the fleet flew on from here, with these routes in place of what their vehicles have
+    /// to fly; nobody is ordered anything.
+    Rehearse {
+        tag: Option<String>,
+        /// Points (ENU, metres) by vehicle.
+        #[serde(default)]
+        #[cfg_attr(test, ts(type = "Record<string, [number, number, number][]>"))]
+        routes: BTreeMap<NodeName, Vec<[f64; 3]>>,
+        /// It is flown so often, with other gusts and errors each time: 1 to 10.
+        #[serde(default = "flights")]
+        #[cfg_attr(test, ts(optional, as = "Option<usize>"))]
+        flights: usize,
+    },
+}
+
+fn flights() -> usize {
+    3
+}
+
+/// It is flown no more often.
+const MOST_FLIGHTS: usize = 10;
+
+/// The rehearsal that a message asks for.
+fn rehearse(routes: BTreeMap<NodeName, Vec<[f64; 3]>>, flights: usize) -> Result<Request, String> {
+    if !(1..=MOST_FLIGHTS).contains(&flights) {
+        return Err(format!("`flights` is {flights}: expected 1 to {MOST_FLIGHTS}"));
+    }
+    let route = |(vehicle, points): (NodeName, Vec<[f64; 3]>)| match Route::new(points) {
+        Ok(route) => Ok((vehicle, route)),
+        Err(error) => Err(format!("`routes`, {vehicle}: {error}")),
+    };
+    Ok(Request::Rehearse(routes.into_iter().map(route).collect::<Result<_, _>>()?, flights))
 }
 
 /// A change in how a recording is played.
@@ -315,6 +368,7 @@ pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
             let targets = targets.into_iter().map(Vector3::from).collect();
             (tag, to.who().map(|who| Request::Plan(who, targets)))
         }
+        Ok(Message::Rehearse { tag, routes, flights }) => (tag, rehearse(routes, flights)),
         Ok(Message::Draw { tag, zone }) => {
             let zone = Zone::try_from(zone).map_err(|error| format!("`zone`: {error}"));
             (tag, zone.map(|zone| Request::Map(Wanted::Draw(zone))))

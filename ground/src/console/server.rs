@@ -3,6 +3,7 @@
 use std::net::TcpListener;
 use std::sync::Arc;
 use std::thread;
+use std::time::Duration;
 
 use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
@@ -22,6 +23,8 @@ use super::tls::Tls;
 
 /// So many browsers may watch at once.
 const MOST_BROWSERS: usize = 64;
+/// The station's loop speaks ten times a second; one that has not for so long does not go on.
+const SPEAKS_WITHIN: Duration = Duration::from_secs(2);
 /// Longest message that a browser may send, in bytes.
 const LONGEST_REQUEST: usize = 64 << 10;
 /// The page needs nothing from elsewhere, and belongs in no other page.
@@ -35,7 +38,7 @@ struct Asset {
 }
 
 /// All files of the page. Without Node at build time, the first says what to install.
-const ASSETS: [Asset; 3] = [
+const ASSETS: [Asset; 5] = [
     Asset {
         path: "/",
         content_type: "text/html; charset=utf-8",
@@ -50,6 +53,17 @@ const ASSETS: [Asset; 3] = [
         path: "/app.css",
         content_type: "text/css; charset=utf-8",
         body: include_bytes!(concat!(env!("OUT_DIR"), "/console/app.css")),
+    },
+    // The messages on `/live`, for other programs: written from the types here, which a test holds true.
+    Asset {
+        path: "/messages.ts",
+        content_type: "text/plain; charset=utf-8",
+        body: include_bytes!("../../console/src/messages.ts"),
+    },
+    Asset {
+        path: "/vocabulary.ts",
+        content_type: "text/plain; charset=utf-8",
+        body: include_bytes!("../../console/src/vocabulary.ts"),
     },
 ];
 
@@ -90,7 +104,7 @@ pub(super) fn start(
 }
 
 fn router(shared: Shared) -> Router {
-    let mut router = Router::new().route("/live", get(live));
+    let mut router = Router::new().route("/live", get(live)).route("/health", get(health));
     for asset in &ASSETS {
         let page = || async { ([(header::CONTENT_TYPE, asset.content_type)], asset.body) };
         router = router.route(asset.path, get(page));
@@ -147,6 +161,16 @@ fn is_own_origin(scheme: &str, headers: &HeaderMap) -> bool {
     let host = text(headers, header::HOST).unwrap_or_default();
     // Programs that are no browsers send none.
     text(headers, header::ORIGIN).is_none_or(|origin| origin.strip_prefix(scheme) == Some(host))
+}
+
+/// Whether the station's loop goes on: 200 and its age if it has spoken of late, else 503. It is a JSON object.
+async fn health(State(shared): State<Shared>) -> Response {
+    let age = shared.subscription.age();
+    let is_well = age.is_some_and(|age| age < SPEAKS_WITHIN);
+    let age_ms = age.map_or_else(|| "null".to_owned(), |age| age.as_millis().to_string());
+    let body = format!("{{\"ok\":{is_well},\"age_ms\":{age_ms}}}\n");
+    let status = if is_well { StatusCode::OK } else { StatusCode::SERVICE_UNAVAILABLE };
+    (status, [(header::CONTENT_TYPE, "application/json")], body).into_response()
 }
 
 async fn live(

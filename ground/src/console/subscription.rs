@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use skein_dbp::{Happened, NodeName};
 use tokio::sync::{broadcast, watch};
@@ -25,6 +26,9 @@ pub(super) type Reasons = Arc<BTreeMap<NodeName, Text>>;
 /// The number of browsers that ask about a vehicle.
 type Questions = Arc<Mutex<BTreeMap<NodeName, usize>>>;
 
+/// When the station's loop has shown something last.
+type Spoke = Arc<Mutex<Option<Instant>>>;
+
 /// The station's end.
 pub(super) struct Broadcast {
     pictures: watch::Sender<Pictures>,
@@ -32,6 +36,7 @@ pub(super) struct Broadcast {
     reasons: watch::Sender<Reasons>,
     history: Arc<Mutex<VecDeque<Happened>>>,
     questions: Questions,
+    spoke: Spoke,
 }
 
 /// A browser's end.
@@ -41,6 +46,7 @@ pub(super) struct Subscription {
     pub(super) reasons: watch::Receiver<Reasons>,
     history: Arc<Mutex<VecDeque<Happened>>>,
     questions: Questions,
+    spoke: Spoke,
 }
 
 /// A browser's question about a vehicle, for as long as it is asked.
@@ -88,18 +94,21 @@ impl Broadcast {
         let (events, events_read) = broadcast::channel(EVENTS_UNREAD);
         let (reasons, reasons_read) = watch::channel(Reasons::default());
         let (history, questions) = (Arc::new(Mutex::new(VecDeque::new())), Questions::default());
+        let spoke = Spoke::default();
         let subscription = Subscription {
             pictures: pictures_read,
             events: events_read,
             reasons: reasons_read,
             history: history.clone(),
             questions: questions.clone(),
+            spoke: spoke.clone(),
         };
-        (Self { pictures, events, reasons, history, questions }, subscription)
+        (Self { pictures, events, reasons, history, questions, spoke }, subscription)
     }
 
     /// Shows this in the place of the last of its kind.
     pub(super) fn show(&self, kind: &'static str, picture: Text) {
+        *self.spoke.lock().unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
         self.pictures.send_modify(|pictures| drop(pictures.insert(kind, picture)));
     }
 
@@ -159,6 +168,7 @@ impl Clone for Subscription {
             reasons: self.reasons.clone(),
             history: self.history.clone(),
             questions: self.questions.clone(),
+            spoke: self.spoke.clone(),
         };
         clone.pictures.mark_changed();
         clone
@@ -171,6 +181,11 @@ impl Subscription {
         let mut questions = self.questions.lock().unwrap_or_else(PoisonError::into_inner);
         *questions.entry(vehicle.clone()).or_default() += 1;
         Question { vehicle, questions: self.questions.clone() }
+    }
+
+    /// The time since the station's loop has shown something; none if it never has.
+    pub(super) fn age(&self) -> Option<Duration> {
+        self.spoke.lock().unwrap_or_else(PoisonError::into_inner).map(|spoke| spoke.elapsed())
     }
 
     /// The latest events.

@@ -214,6 +214,7 @@ fn readiness() -> Readiness {
         home: [1.0, -2.0, 0.5],
         datum: [47.397742, 8.545594, 488.0],
         checks: [CheckState::Passes, CheckState::Fails, CheckState::Waits].map(check).into(),
+        mission: vec![[10.0, 0.0, 3.0], [20.0, -4.5, 6.0]],
     }
 }
 
@@ -229,13 +230,15 @@ fn checks_survive_the_way_over_the_wire_and_those_that_do_not_pass_are_told() {
 #[test]
 fn impossible_checks_are_refused_with_the_field_at_fault() {
     type Change = fn(&mut proto::Readiness);
-    let cases: [(&str, Change); 4] = [
+    let cases: [(&str, Change); 6] = [
         ("Readiness.home", |said| said.home = Some(proto::Vec3 { x: f64::NAN, y: 0.0, z: 0.0 })),
         ("Readiness.datum", |said| {
             said.datum = Some(proto::Datum { latitude_deg: 91.0, longitude_deg: 0.0, height_m: 0.0 });
         }),
         ("Readiness.datum", |said| said.datum = None),
         ("Readiness.checks", |said| said.checks = vec![proto::Check::default(); 65]),
+        ("Readiness.mission", |said| said.mission = vec![proto::Vec3::default(); 65]),
+        ("Readiness.mission", |said| said.mission = vec![proto::Vec3 { x: f64::INFINITY, y: 0.0, z: 0.0 }]),
     ];
     for (field, change) in cases {
         let mut inner = proto::Readiness::from(&readiness());

@@ -122,6 +122,13 @@ impl Host for RealTime {
         if let Some(ports) = &mut self.ports {
             ports.receive(|index, bytes| swarm.send_mavlink(index, bytes));
         }
+        if self.scene_due.is_some_and(|due| swarm.now() >= due) {
+            let scene = swarm.simulation().scene();
+            let (view, moves) = (scene_view::view(scene), scene.moving().next().is_some());
+            swarm.ground_mut().know(&view);
+            self.console.show_scene(swarm.ground(), Some(&view));
+            self.scene_due = moves.then(|| swarm.now() + scene_view::MOVING_PERIOD);
+        }
         for wish in self.console.take_orders() {
             wish.carry_out(swarm.ground_mut());
         }
@@ -133,11 +140,6 @@ impl Host for RealTime {
             for (index, bytes) in happenings.mavlink.iter().enumerate() {
                 ports.send(index, bytes);
             }
-        }
-        if self.scene_due.is_some_and(|due| swarm.now() >= due) {
-            let scene = swarm.simulation().scene();
-            self.console.show_scene(swarm.ground(), Some(&scene_view::view(scene)));
-            self.scene_due = scene.moving().next().map(|_| swarm.now() + scene_view::MOVING_PERIOD);
         }
         if happenings.ticked {
             self.console.publish(swarm.now(), swarm.ground(), &happenings.selections);

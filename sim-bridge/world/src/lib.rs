@@ -81,7 +81,7 @@ pub use quadrotor::{MotorCommands, Quadrotor, RigidState, STEP};
 pub use scene::{Nearest, Scene};
 pub use sdf::{Account, Lacking, Reading, SdfError, Verdict};
 pub use sensors::{Gps, Imu, SensorReadings};
-pub use simulation::{Simulation, SimulationConfig, VehicleSetup, VehicleState};
+pub use simulation::{HANGS, Simulation, SimulationConfig, VehicleSetup, VehicleState};
 pub use skein_mav::Battery;
 pub use truth::Truth;
 pub use vehicle::{ControlModel, PositionIntegral, VehicleError, VehicleModel};

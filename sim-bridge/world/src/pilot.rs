@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use nalgebra::Vector3;
+
 use crate::autopilot::Autopilot;
 use crate::quadrotor::{MotorCommands, Quadrotor};
 use crate::sensors::SensorReadings;
@@ -17,6 +19,9 @@ pub trait Pilot: Send {
 
     /// The commands for the step that begins now.
     fn commands(&mut self) -> MotorCommands;
+
+    /// Holds the vehicle in the air from the start, above `home` (ENU, m); until then it hangs still.
+    fn begin_in_air(&mut self, _home: Vector3<f64>, _hangs_until: Duration) {}
 
     /// Takes in MAVLink from any station.
     fn receive(&mut self, _bytes: &[u8]) {}
@@ -46,6 +51,10 @@ impl Pilot for BuiltIn {
 
     fn commands(&mut self) -> MotorCommands {
         self.commands
+    }
+
+    fn begin_in_air(&mut self, home: Vector3<f64>, hangs_until: Duration) {
+        self.autopilot.begin_in_air(home, hangs_until);
     }
 
     fn receive(&mut self, bytes: &[u8]) {

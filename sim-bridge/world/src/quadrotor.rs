@@ -101,6 +101,18 @@ impl Quadrotor {
         touchdown
     }
 
+    /// Hangs at rest for a step, as if a hand held it, while its rotors follow these commands.
+    pub fn hang(&mut self, commands: &MotorCommands) {
+        self.spin_rotors(commands);
+        (self.state.velocity, self.state.angular_rate) = (Vector3::zeros(), Vector3::zeros());
+        self.specific_force = self.state.attitude.inverse() * Vector3::new(0.0, 0.0, GRAVITY_M_S2);
+    }
+
+    /// Sets the share of its battery's energy that is left, 0 to 1.
+    pub fn charge(&mut self, fraction: f64) {
+        self.energy_wh = fraction.clamp(0.0, 1.0) * self.model.battery.capacity_wh;
+    }
+
     pub fn model(&self) -> &VehicleModel {
         &self.model
     }

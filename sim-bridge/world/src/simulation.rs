@@ -26,6 +26,9 @@ const FIX_ERROR_STREAM: u64 = 1 << 32;
 const FLOW_STREAM: u64 = 2 << 32;
 const CAMERA_STREAM: u64 = 3 << 32;
 
+/// Vehicles that begin in the air hang still for so long: until their autopilots know where they are.
+pub const HANGS: Duration = Duration::from_millis(2500);
+
 /// All that a run depends on.
 #[derive(Debug, Clone)]
 pub struct SimulationConfig {
@@ -88,6 +91,8 @@ struct Vehicle {
     fixes: Vec<PoseFix>,
     /// Shifts the instruments in time, in steps.
     phase: u64,
+    /// It hangs in the air until then.
+    hangs_until: Duration,
     scan: Option<Scan>,
     path_length_m: f64,
     lifted_off: Option<Duration>,
@@ -217,6 +222,23 @@ impl Simulation {
         }
     }
 
+    /// Before the first step: vehicle `index` begins in the air where it is, above its `home` (ENU, m). Its autopilot is
+    /// armed and holds it; it hangs still for [`HANGS`].
+    pub fn begin_in_air(&mut self, index: usize, home: Vector3<f64>) {
+        if let Some(vehicle) = self.vehicles.get_mut(index) {
+            vehicle.hangs_until = HANGS;
+            vehicle.pilot.begin_in_air(home, HANGS);
+        }
+    }
+
+    /// Leaves this share of its battery's energy, 0 to 1, to vehicle `index`.
+    pub fn charge(&mut self, index: usize, fraction: f64) {
+        if let Some(vehicle) = self.vehicles.get_mut(index) {
+            vehicle.quadrotor.charge(fraction);
+            vehicle.readings.battery = vehicle.quadrotor.battery();
+        }
+    }
+
     /// The record of collisions, separation and clearance so far.
     pub fn truth(&self) -> Truth {
         self.referee.truth()
@@ -261,6 +283,7 @@ impl Vehicle {
             camera,
             fixes: Vec::new(),
             phase,
+            hangs_until: Duration::ZERO,
             scan: None,
             path_length_m: 0.0,
             lifted_off: None,
@@ -271,6 +294,10 @@ impl Vehicle {
     /// One step from `now` to `after`; tells whether it ended in a crash on the ground.
     fn fly(&mut self, now: Duration, after: Duration, wind: &Vector3<f64>) -> bool {
         let commands = self.pilot.commands();
+        if after <= self.hangs_until {
+            self.quadrotor.hang(&commands);
+            return false;
+        }
         let before = self.quadrotor.state().position;
         let touchdown = self.quadrotor.step(&commands, wind);
         if !self.quadrotor.on_ground() && !self.quadrotor.wrecked() {

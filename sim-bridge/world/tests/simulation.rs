@@ -5,8 +5,8 @@ use std::time::Duration;
 use nalgebra::{UnitQuaternion, Vector3};
 use skein_wire::Scan;
 use skein_world::{
-    MotorCommands, Obstacle, PositionErrors, RigidState, Scene, SensorReadings, Simulation, SimulationConfig,
-    VehicleModel, VehicleSetup, Way, WindConfig,
+    HANGS, MotorCommands, Obstacle, PositionErrors, RigidState, Scene, SensorReadings, Simulation,
+    SimulationConfig, VehicleModel, VehicleSetup, Way, WindConfig,
 };
 
 fn simulation(obstacles: Vec<Obstacle>, places: &[[f64; 3]], seed: u64) -> Simulation {
@@ -52,6 +52,22 @@ fn time_goes_in_steps_of_four_milliseconds() {
     assert_eq!(simulation.now(), Duration::ZERO);
     run(&mut simulation, 2.0);
     assert_eq!(simulation.now(), Duration::from_secs(2));
+}
+
+#[test]
+fn a_vehicle_begins_in_the_air_hangs_until_its_autopilot_knows_where_it_is_and_is_held_there() {
+    let place = [30.0, -12.0, 8.0];
+    let mut simulation = simulation(Vec::new(), &[place], 1);
+    simulation.charge(0, 0.6);
+    simulation.begin_in_air(0, Vector3::new(4.0, 0.0, 0.0));
+    run(&mut simulation, HANGS.as_secs_f64());
+    let hanging = simulation.vehicle(0).expect("it is there");
+    assert_eq!((<[f64; 3]>::from(hanging.motion.position), hanging.battery.fraction), (place, 0.6));
+    run(&mut simulation, 10.0);
+    let held = simulation.vehicle(0).expect("it is there");
+    let strayed_m = (held.motion.position - Vector3::from(place)).norm();
+    assert!(held.airborne && !held.crashed && strayed_m < 0.3, "{strayed_m} m, {held:?}");
+    assert!((0.58..0.6).contains(&held.battery.fraction), "{}", held.battery.fraction);
 }
 
 #[test]

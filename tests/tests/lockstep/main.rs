@@ -18,6 +18,7 @@ mod no_lidar;
 mod planning;
 mod positions;
 mod preflight;
+mod rehearsal;
 mod routes;
 mod scenarios;
 mod scripts;

@@ -62,6 +62,23 @@ fn a_zone_is_drawn_by_clicks_confirmed_by_all_flown_round_and_removed() {
 }
 
 #[test]
+fn a_route_is_drawn_rehearsed_sent_read_back_and_changed_in_flight() {
+    let Some(browser) = Browser::find() else { return };
+    let field = browser.scripts.join("two-lanes.toml");
+    let flight = Flight::start(&[field.to_str().unwrap()]);
+    let health = flight.get("/health");
+    assert!(health.contains("200 OK") && health.contains("{\"ok\":true,\"age_ms\":"), "{health}");
+    assert!(
+        flight.get("/messages.ts").contains("export type ClientMessage ="),
+        "what may be said is published"
+    );
+    browser.run("route.mjs", &flight);
+    let (status, summary) = flight.end();
+    assert!(status.success() && summary.succeeded, "{status}: {:?}", summary.reason);
+    assert_eq!(summary.collisions, Collisions::default());
+}
+
+#[test]
 fn without_webgl_some_are_sent_home_or_down_and_the_rest_fly_on() {
     let Some(browser) = Browser::find() else { return };
     let flight = Flight::start(&["open"]);
@@ -238,6 +255,15 @@ impl Flight {
     }
 
     /// The status of the answer to a browser that asks for `path` with these headers.
+    /// All that is answered to a request for `path`.
+    fn get(&self, path: &str) -> String {
+        let mut stream = TcpStream::connect(self.host()).unwrap();
+        write!(stream, "GET {path} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", self.host()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        answer
+    }
+
     fn status_of(&self, path: &str, host: &str, origin: Option<&str>) -> u16 {
         let mut stream = TcpStream::connect(self.host()).unwrap();
         let origin = origin.map(|origin| format!("Origin: {origin}\r\n")).unwrap_or_default();

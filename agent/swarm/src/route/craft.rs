@@ -85,6 +85,11 @@ impl Craft {
         }
     }
 
+    /// The height that vehicles take off to, metres, as far as the clearance tells: of vehicles whose cruise limits it, less.
+    pub fn takeoff_m(&self) -> f64 {
+        self.clearance_m / BEGINS_AT
+    }
+
     /// The weights of a route's cost for a vehicle with this share of its battery left.
     pub fn cost(&self, battery: f64) -> RouteCost {
         let scaled = RouteCost::scaled(self.cruise_m_s, self.climb_m_s, self.separation_m, self.clearance_m);

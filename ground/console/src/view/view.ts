@@ -17,6 +17,7 @@ import { Pacing } from './pacing';
 import { makePainter, type Painter } from './painter';
 import { type Palette, readPalette } from './palette';
 import { Pointing } from './pointing';
+import { RouteLine } from './route-line';
 import { Swarm } from './swarm';
 import { Target } from './target';
 import { Zones } from './zones';
@@ -41,6 +42,7 @@ export class View {
   private readonly swarm: Swarm;
   private readonly target: Target;
   private readonly zoneLines: Zones;
+  private readonly routeLine: RouteLine;
   private readonly labels = new Labels();
   private readonly instruments = new Instruments();
   private readonly cursor = html('p', { class: 'cursor', 'aria-hidden': 'true' });
@@ -58,6 +60,7 @@ export class View {
   private zones: readonly Zone[] = [];
   private drawn: readonly Place[] = [];
   private radius: number | null = null;
+  private route: { vehicle: string; points: readonly Vec3[] } | null = null;
   private pointed: [x: number, y: number] | null = null;
   private placing = false;
   /** How much is known of where things are; each step from nothing fits the view once. */
@@ -84,7 +87,8 @@ export class View {
     this.swarm = new Swarm(this.painter.kind, this.palette);
     this.target = new Target(this.painter.kind);
     this.zoneLines = new Zones(this.painter.kind);
-    this.scene.add(this.swarm.object, this.target.object, this.zoneLines.object);
+    this.routeLine = new RouteLine(this.painter.kind);
+    this.scene.add(this.swarm.object, this.target.object, this.zoneLines.object, this.routeLine.object);
     new Pointing(container, {
       clicked: (x, y, more) => this.click(x, y, more),
       hovered: (x, y) => this.hover(x, y),
@@ -139,6 +143,20 @@ export class View {
     this.drawn = drawn;
     this.radius = radius;
     this.showZones();
+  }
+
+  /** The points of a route that is being drawn for a vehicle; `null` if none is. */
+  setRoute(route: { vehicle: string; points: readonly Vec3[] } | null): void {
+    this.route = route;
+    this.pacing.ask();
+  }
+
+  /** What is drawn leads on from where its vehicle is; of those that are selected, what they have told is dashed. */
+  private showRoutes(): void {
+    const drawn = this.route;
+    const from = this.vehicles.find(({ name }) => name === drawn?.vehicle)?.position ?? null;
+    const told = this.vehicles.flatMap(({ name, position, way, armed }) => (position && armed && this.selected.has(name) && name !== drawn?.vehicle ? [[position, ...way]] : []));
+    this.routeLine.show(drawn?.points ?? [], from, told, this.groundZ, this.palette);
   }
 
   private showZones(): void {
@@ -231,6 +249,7 @@ export class View {
     this.swarm.show(this.vehicles, this.looks, this.selected, eye, groundZ);
     const target: Point | null = this.placing && this.pointed ? [...this.pointed, null] : this.goal;
     this.target.show(target, eye, groundZ, this.palette);
+    this.showRoutes();
     this.painter.paint(this.scene, eye.camera);
     this.labels.show(this.vehicles, this.looks, this.selected, eye, groundZ);
     this.labels.showTarget(this.placing ? null : this.goal, eye, groundZ);

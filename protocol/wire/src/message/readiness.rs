@@ -9,6 +9,7 @@ use super::field::{
 use super::record::{Addressee, Kind, Record};
 use crate::decode_error::DecodeError;
 use crate::proto;
+use crate::route::Route;
 
 /// The checks of a vehicle before take-off, and what its places are relative to.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +23,8 @@ pub struct Readiness {
     /// All checks, in the order in which people look at them; only the first [`Readiness::MAX_CHECKS`]
     /// travel.
     pub checks: Vec<Check>,
+    /// The points of the mission that it is configured with, metres ENU; only the first [`Route::MOST_POINTS`] travel.
+    pub mission: Vec<[f64; 3]>,
 }
 
 /// One check before take-off.
@@ -102,6 +105,7 @@ impl From<&Readiness> for proto::Readiness {
             home: Some(readiness.home.into()),
             datum: Some(proto::Datum { latitude_deg, longitude_deg, height_m }),
             checks: readiness.checks.iter().take(Readiness::MAX_CHECKS).map(check).collect(),
+            mission: readiness.mission.iter().take(Route::MOST_POINTS).map(|point| (*point).into()).collect(),
         }
     }
 }
@@ -111,6 +115,8 @@ impl TryFrom<proto::Readiness> for Readiness {
 
     fn try_from(readiness: proto::Readiness) -> Result<Self> {
         at_most("Readiness.checks", readiness.checks.len(), Self::MAX_CHECKS, "at most 64 checks")?;
+        let points = readiness.mission;
+        at_most("Readiness.mission", points.len(), Route::MOST_POINTS, "at most 64 points")?;
         let datum = required("Readiness.datum", readiness.datum)?;
         let within = |field, given: f64, most: f64| {
             if given.abs() <= most {
@@ -136,6 +142,10 @@ impl TryFrom<proto::Readiness> for Readiness {
                 finite("Readiness.datum", datum.height_m)?,
             ],
             checks: readiness.checks.into_iter().map(check).collect(),
+            mission: points
+                .iter()
+                .map(|point| place("Readiness.mission", point).map(Into::into))
+                .collect::<Result<_>>()?,
         })
     }
 }

@@ -126,6 +126,10 @@ pub struct Autopilot {
     rangefinder: RangefinderModel,
     /// Time of the last step: bytes that arrive between two steps are stamped with it.
     now: Duration,
+    /// The vehicle hangs in the air until then.
+    hangs_until: Option<Duration>,
+    /// Share of full thrust that carries the vehicle.
+    hover_share: f64,
 }
 
 impl Autopilot {
@@ -143,6 +147,8 @@ impl Autopilot {
             attitude_control,
             mixer: Mixer::new(model),
             now: Duration::ZERO,
+            hangs_until: None,
+            hover_share: model.hover_share(),
             endpoint: Endpoint::new(EndpointConfig {
                 system_id: config.system_id,
                 datum: config.datum,
@@ -155,6 +161,13 @@ impl Autopilot {
             rally: Vec::new(),
             rangefinder: config.vehicle.rangefinder,
         }
+    }
+
+    /// Begins in the air above `home` (ENU, m), armed: the vehicle hangs still until a moment at which the estimate has
+    /// settled, and is held where it is from then on.
+    pub fn begin_in_air(&mut self, home: Vector3<f64>, hangs_until: Duration) {
+        self.hangs_until = Some(hangs_until);
+        self.modes.begin_in_air(home);
     }
 
     /// Takes in bytes from any station, in whatever pieces they come.
@@ -180,11 +193,29 @@ impl Autopilot {
         while let Some(request) = self.endpoint.next_request() {
             self.serve(request, readings);
         }
-        let (modes, situation) = self.decide(readings);
-        let drive = modes.step(&situation);
-        let commands = self.drive(drive);
+        let commands = if self.hangs(readings) {
+            MotorCommands([self.hover_share; 4])
+        } else {
+            let (modes, situation) = self.decide(readings);
+            let drive = modes.step(&situation);
+            self.drive(drive)
+        };
         self.report(readings, &commands);
         commands
+    }
+
+    /// Whether the vehicle hangs still; once it does no more, it is to stay where it is.
+    fn hangs(&mut self, readings: &SensorReadings) -> bool {
+        match self.hangs_until {
+            Some(until) if self.now < until => true,
+            Some(_) => {
+                self.hangs_until = None;
+                let (modes, situation) = self.decide(readings);
+                modes.stay(&situation);
+                false
+            }
+            None => false,
+        }
     }
 
     /// Passes on what the instruments have measured, to who asks for it.

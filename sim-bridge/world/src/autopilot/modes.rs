@@ -162,6 +162,18 @@ impl Modes {
         std::mem::take(&mut self.items_reached)
     }
 
+    /// In the air from the start, armed.
+    pub(super) fn begin_in_air(&mut self, home: Vector3<f64>) {
+        (self.armed, self.airborne, self.home) = (true, true, Some(home));
+    }
+
+    /// Holds the vehicle where it is, unless a station has asked for something else.
+    pub(super) fn stay(&mut self, situation: &Situation<'_>) {
+        if matches!(self.task, Task::Hold { .. }) {
+            self.hold(situation);
+        }
+    }
+
     /// A set-point arrived.
     pub(super) fn on_set_point(&mut self, now: Duration, set_point: SetPoint) {
         let arrived = Stamped { stamp: now, value: set_point };

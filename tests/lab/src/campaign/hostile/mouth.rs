@@ -14,7 +14,8 @@ use skein_dbp::{
 use skein_sim::fly::{FLEET, GROUND};
 use skein_wire::event::{Declared as _, Enter, Events as _, Handover, OrderTaken, SWARM, Takeoff, What};
 use skein_wire::{
-    Check, CheckState, Fleet, Key, Link, MAX_PAYLOAD, MissionState, Payload, Readiness, Scan, Scene, State,
+    Check, CheckState, Fleet, Key, Link, MAX_PAYLOAD, MissionState, Payload, Readiness, Route, Scan, Scene,
+    State,
 };
 
 use super::story::{Habit, Rank, Say};
@@ -597,6 +598,7 @@ impl Mouth {
             home: self.place.into(),
             datum: [89.0, 179.0, 0.0],
             checks: (0..count.min(Readiness::MAX_CHECKS)).map(check).collect(),
+            mission: vec![self.place.into(); count.min(Route::MOST_POINTS)],
         };
         self.put(&Key::to_all::<Readiness>(&self.fleet, self.me.clone()), &Payload::Readiness(readiness));
     }
