@@ -151,6 +151,13 @@ impl Case {
         Self { starts: vec![1, 2], ..Self::corridor(2) }
     }
 
+    /// One stands in a crossing of three ways, and another is to come through it, where neither is in the other's way.
+    #[cfg(test)]
+    pub fn crossing() -> Self {
+        let graph = Graph::new(4, [[0, 1], [0, 2], [0, 3]], vec![true, false, false, false]);
+        Self { graph, starts: vec![3, 0], goals: vec![2, 1] }
+    }
+
     /// A random case in a random graph.
     pub fn random(places: usize, vehicles: usize, random: &mut ChaCha8Rng) -> Self {
         loop {

@@ -1,5 +1,5 @@
-//! `campaign narrow-graphs`: the decisions of right of way alone, on every connected graph of a few places and on random
-//! ones. The b-threads are those that fly; of the channels no more is known than that who hears of another hears any
+//! `campaign narrow-graphs`: the decisions of right of way alone, on every connected graph of a few places and on
+//! random ones. The b-threads are those that fly; of the channels no more is known than that who hears of another hears any
 //! earlier state of it. Nobody shares a narrow place by right; and where there is a way for all, from every state that
 //! comes about all may yet arrive.
 
@@ -214,9 +214,12 @@ mod tests {
 
     #[test]
     fn two_get_past_one_another_in_a_corridor_in_every_run_of_the_rule_that_flies() {
-        for (case, stale) in
-            [(Case::corridor(1), true), (Case::corridor(2), true), (Case::met_inside(), false)]
-        {
+        for (case, stale) in [
+            (Case::corridor(1), true),
+            (Case::corridor(2), true),
+            (Case::met_inside(), false),
+            (Case::crossing(), true),
+        ] {
             let outcome = explored(&case, stale, None);
             assert!(!outcome.is_cut && outcome.shared.is_none() && outcome.stuck.is_none(), "{outcome:?}");
         }

@@ -418,8 +418,8 @@ impl<'a, R: Rule> Model<'a, R> {
         Ok(())
     }
 
-    /// A vehicle that stands in a narrow place, or in the mouth of one, finds that it is in the way of the first of those
-    /// who want to go through there, or to come out.
+    /// A vehicle that stands in a narrow place, or in the mouth of one, finds that it is in the way of the first of
+    /// those who want to go through there, or to come out.
     fn be_in_the_way(&mut self, state: &State, vehicle: usize, moves: &mut Moves) {
         let (me, flies, graph) = (&self.names[vehicle], &state.vehicles[vehicle], self.graph());
         let (at, next_place) = (flies.at(), flies.way.get(1).copied());
