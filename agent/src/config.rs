@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use skein_bp::behaviour::{Chosen, Host};
 use skein_bp::script::Assignment;
 use skein_dbp::{Authority, Kept};
-use skein_mav::Datum;
+use skein_mav::{Datum, Signing};
 use skein_planning::airspace::Airspace;
 use skein_wire::event::Catalogue;
 
@@ -133,7 +133,7 @@ pub enum Nose {
     Along,
 }
 
-/// Whose potential makes paths near them dearer in A* (Wang 2023).
+/// The obstacles whose potential makes paths near them dearer in A* (Wang 2023).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Repellers {
@@ -158,7 +158,7 @@ pub struct Planners {
 /// See [`AgentConfig::sigma_limit_m`].
 pub const DEFAULT_SIGMA_LIMIT_M: f64 = 2.0;
 
-/// What tells where the vehicle is.
+/// The sources of the vehicle's position.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PositionSource {
@@ -231,6 +231,8 @@ pub struct AgentConfig {
     pub incarnation: u64,
     /// MAVLink system id of the autopilot.
     pub system_id: u8,
+    /// The signatures of the autopilot's link, if its frames are signed.
+    pub signing: Option<Signing>,
     /// Where the world's origin lies on the earth.
     pub datum: Datum,
     /// Where the vehicle takes off, metres ENU.
@@ -247,7 +249,7 @@ pub struct AgentConfig {
     pub takeoff_height_m: f64,
     /// Height in the world at which this vehicle returns, m; different for every vehicle.
     pub return_altitude_m: f64,
-    /// What tells where it is, the preferred one first: never empty.
+    /// Its sources of position, the preferred one first: never empty.
     pub position: Vec<PositionSource>,
     /// A position of a greater standard deviation is none to fly by, m.
     pub sigma_limit_m: f64,

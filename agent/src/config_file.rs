@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use serde::{Deserialize, Deserializer, Serialize};
 use skein_bp::behaviour::{Behaviours, Settings};
 use skein_bp::configuration;
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_dbp::{Authority, Kept};
-use skein_mav::Datum;
+use skein_mav::{Datum, Signing, SigningKey, SigningTime};
 use skein_planning::airspace::{Airspace, AirspaceTable, KeepOut};
 use skein_wire::{NodeName, standard_authority};
 use skein_zenoh::NetworkSettings;
@@ -73,6 +73,20 @@ pub struct Autopilot {
     /// Other stations that share its line.
     #[serde(default, skip_serializing)]
     stations: Vec<Address>,
+    #[serde(skip_serializing)]
+    signing: Option<SigningTable>,
+}
+
+/// Signatures of MAVLink 2 frames, with a key from a file.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SigningTable {
+    key_file: Option<PathBuf>,
+    passphrase_file: Option<PathBuf>,
+    #[serde(default)]
+    link_id: u8,
+    #[serde(default = "refuse_unsigned")]
+    refuse_unsigned: bool,
 }
 
 /// Where the lidar's scans come from.
@@ -136,6 +150,10 @@ fn position() -> Vec<PositionSource> {
 
 fn sigma_limit_m() -> f64 {
     DEFAULT_SIGMA_LIMIT_M
+}
+
+fn refuse_unsigned() -> bool {
+    true
 }
 
 fn lease_ms() -> f64 {
@@ -220,6 +238,7 @@ impl AgentFile {
                 system_id: agent.system_id,
                 cable_is_private: false,
                 stations: Vec::new(),
+                signing: None,
             },
             lidar: agent.lidar.then(|| Lidar { sensor: sensor.to_owned(), network: None }),
             datum: agent.datum.into(),
@@ -272,6 +291,7 @@ impl AgentFile {
             roster: self.roster,
             incarnation: 0,
             system_id: self.autopilot.system_id,
+            signing: self.autopilot.signing.map(|it| it.read(folder)).transpose()?,
             datum: self.datum.into(),
             home: self.mission.home,
             waypoints: self.mission.waypoints,
@@ -306,6 +326,38 @@ impl AgentFile {
             network,
             state: folder.join(self.state),
         })
+    }
+}
+
+impl SigningTable {
+    /// The part of this end, whose clock has not been read yet.
+    fn read(&self, folder: &Path) -> anyhow::Result<Signing> {
+        let content = |field: &str, file: &Path| {
+            let path = folder.join(file);
+            let content = std::fs::read(&path);
+            content.with_context(|| format!("`autopilot.signing.{field}`: `{}`", path.display()))
+        };
+        let key = match (&self.key_file, &self.passphrase_file) {
+            (Some(file), None) => SigningKey::of_file(&content("key_file", file)?).with_context(|| {
+                format!(
+                    "`autopilot.signing.key_file`: `{}` holds no key: expected 32 bytes, or 64 hexadecimal digits",
+                    folder.join(file).display()
+                )
+            })?,
+            (None, Some(file)) => {
+                let content = content("passphrase_file", file)?;
+                let passphrase = std::str::from_utf8(&content).unwrap_or_default().trim_end_matches(['\r', '\n']);
+                ensure!(
+                    !passphrase.is_empty(),
+                    "`autopilot.signing.passphrase_file`: `{}` holds no passphrase: expected one line of text in UTF-8",
+                    folder.join(file).display()
+                );
+                SigningKey::of_passphrase(passphrase)
+            }
+            _ => bail!("`autopilot.signing`: expected either `key_file` or `passphrase_file`"),
+        };
+        let Self { link_id, refuse_unsigned, .. } = *self;
+        Ok(Signing { key, link_id, refuses_unsigned: refuse_unsigned, began: SigningTime::default() })
     }
 }
 
@@ -411,6 +463,38 @@ mod tests {
         assert_eq!(full.agent, config.agent);
         assert_eq!(full.network.listen, config.network.listen);
         assert!(full.network.security.is_some());
+    }
+
+    #[test]
+    fn a_key_comes_from_one_file_which_is_named_if_it_holds_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |file: &str, content: &[u8]| std::fs::write(folder.path().join(file), content).unwrap();
+        write("hex", "0f".repeat(32).as_bytes());
+        write("words", b"swarm of geese\n");
+        write("empty", b"\n");
+        let read = |table: &str| {
+            let text = EXAMPLE.replacen("[autopilot]", &format!("[autopilot]\nsigning = {{ {table} }}"), 1);
+            Config::parse(&text, folder.path(), &Behaviours::default())
+                .map(|config| config.agent.signing.unwrap())
+        };
+        let of_digits = read("key_file = 'hex', link_id = 7").unwrap();
+        assert_eq!((of_digits.key, of_digits.link_id), (SigningKey::new([0x0f; 32]), 7));
+        assert!(of_digits.refuses_unsigned);
+        let of_words = read("passphrase_file = 'words', refuse_unsigned = false").unwrap();
+        assert_eq!(of_words.key, SigningKey::of_passphrase("swarm of geese"));
+        assert!(!of_words.refuses_unsigned);
+        for (table, fault) in [
+            ("link_id = 1", "expected either `key_file` or `passphrase_file`"),
+            ("key_file = 'hex', passphrase_file = 'words'", "expected either"),
+            ("key_file = 'words'", "64 hexadecimal digits"),
+            ("key_file = 'nowhere'", "nowhere"),
+            ("passphrase_file = 'empty'", "expected one line"),
+            ("key_file = 'hex', link_id = 256", "expected u8"),
+            ("key_file = 'hex', secret = 1", "secret"),
+        ] {
+            let error = format!("{:#}", read(table).unwrap_err());
+            assert!(error.contains(fault), "{table}: {error}");
+        }
     }
 
     #[test]

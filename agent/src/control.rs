@@ -46,7 +46,7 @@ use crate::{
 /// The checks before take-off are told this often, for those who have come since.
 const READINESS_PERIOD: Duration = Duration::from_secs(1);
 
-/// What set-points were made from: the keep-alive rule, observed.
+/// The inputs of set-points: the keep-alive rule, observed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SetPointRecord {
     /// Set-points of the pipeline.
@@ -119,6 +119,7 @@ impl Control {
                 component_id: 191,
                 datum: config.datum,
                 wants_measured: positioning.wants_measured(),
+                signing: config.signing,
             }),
             station: Station::of(config.system_id),
             texts: Vec::new(),
@@ -404,7 +405,8 @@ impl Control {
         self.guidance.look_ahead(now, &motion, map, around)
     }
 
-    /// The time that the vehicle has to go at cruise speed until it arrives together with others, s; none if it does not.
+    /// The time that the vehicle has to go at cruise speed until it arrives together with others, s; none if it does
+    /// not.
     fn to_go_s(&self) -> Option<f64> {
         let (motion, course) = (self.flown_motion()?, &self.guidance.course);
         let is_there = |waypoint: &Waypoint| course.has_arrived && waypoint.lands;
@@ -437,7 +439,7 @@ impl Control {
         })
     }
 
-    /// What this vehicle tells the others of its body, ten times a second.
+    /// This vehicle's word to the others about its body, ten times a second.
     pub fn state(&mut self, now: Duration) -> Option<State> {
         let Estimate { motion, attitude, .. } = self.estimate;
         let Motion { position, velocity, .. } = motion?.value;
@@ -636,7 +638,7 @@ impl Control {
         Some((at, set_point, self.motion()?))
     }
 
-    /// How many of the neighbours have names that come before this vehicle's.
+    /// The number of neighbours whose names come before this vehicle's.
     fn rank(&self, neighbours: &[Neighbour]) -> u32 {
         let before = neighbours.iter().filter(|neighbour| neighbour.node < self.name);
         u32::try_from(before.count()).unwrap_or(u32::MAX)
@@ -710,7 +712,7 @@ impl Control {
         self.motion().map_or(0.0, |motion| motion.position_sigma_m())
     }
 
-    /// What set-points were made from so far.
+    /// The inputs of set-points so far.
     #[must_use]
     pub fn set_points(&self) -> SetPointRecord {
         SetPointRecord { hard_brakes: self.guidance.steering.hard_brakes.count, ..self.set_points }

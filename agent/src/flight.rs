@@ -437,7 +437,8 @@ impl Flight {
     }
 }
 
-/// Who has changed the flight mode just now, if not this agent: the autopilot, as far as it tells of a failsafe.
+/// The one that has changed the flight mode just now, if not this agent: the autopilot, as far as it tells of a
+/// failsafe.
 fn changed_by(now: Duration, telemetry: &Telemetry) -> String {
     match telemetry.failsafe_text(now, FAILSAFE_TOLD_WITHIN) {
         Some(text) => format!("autopilot: {text}"),

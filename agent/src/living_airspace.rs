@@ -144,7 +144,7 @@ impl Drawn {
     }
 }
 
-/// What a zone closes.
+/// The region that a zone closes.
 pub fn closed_by(zone: &Zone) -> Airspace {
     let [floor_m, ceiling_m] = zone.heights_m();
     let area = match zone.outline() {

@@ -216,7 +216,7 @@ impl Mission {
         self.node.take_states()
     }
 
-    /// What vehicles have said of their checks before take-off since the last call.
+    /// The vehicles' checks before take-off, as told since the last call.
     pub fn take_readiness(&mut self) -> Vec<Readiness> {
         self.node.take_readiness()
     }
@@ -242,7 +242,7 @@ impl Mission {
         self.node.put_state(&state, link);
     }
 
-    /// How far the task has come; `complaint` is control's, why the vehicle is not ready.
+    /// The progress of the task; `complaint` is control's, why the vehicle is not ready.
     pub fn words(&self, complaint: Option<String>) -> Words {
         let holder = self.node.node().program().state_of::<bthreads::Holder>(bthreads::Holder::NAME);
         let name = |name: Option<&str>| name.unwrap_or_default().to_owned();
@@ -598,7 +598,8 @@ impl Mission {
         Ok(is_member && !node.starts_with("uav/") && NodeName::new(node).is_ok_and(may_request))
     }
 
-    /// The b-threads that keep this vehicle from moving on or taking off; `complaint` is control's, why it is not ready.
+    /// The b-threads that keep this vehicle from moving on or taking off; `complaint` is control's, why it is not
+    /// ready.
     pub fn waiting_for(&self, complaint: Option<String>) -> String {
         if let Some(fault) = &self.fault {
             return fault.clone();

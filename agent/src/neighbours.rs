@@ -34,7 +34,7 @@ const CLIMB_S: f64 = 4.0;
 const MOST_UNSEEN_S: f64 = 4.0;
 /// After so long a silence, s, its failsafe has landed it, or its mission is over.
 const SURELY_DOWN_S: f64 = 45.0;
-/// Who falls silent farther away than this share of a short radio's range has flown out of it.
+/// One that falls silent farther away than this share of a short radio's range has flown out of it.
 const EDGE_OF_RANGE: f64 = 0.75;
 
 /// The last state heard of each other vehicle.
@@ -129,8 +129,8 @@ impl Neighbour {
         separation::distance_kept_m(0.0, &track, &envelope.filter())
     }
 
-    /// Whether it may fly where a vehicle of this envelope would climb from `place`, now or before that is up, as far as
-    /// can be known: one that is silent may have come closer meanwhile.
+    /// Whether it may fly where a vehicle of this envelope would climb from `place`, now or before that is up, as far
+    /// as can be known: one that is silent may have come closer meanwhile.
     pub fn may_be_over(&self, place: &Vector3<f64>, envelope: &Envelope) -> bool {
         let unseen_s = match self.track.age_s {
             age_s if !(PERIOD_S..=SURELY_DOWN_S).contains(&age_s) => 0.0,
@@ -147,8 +147,8 @@ impl Neighbour {
 }
 
 impl Neighbours {
-    /// Nobody has been heard of yet by `me` in this incarnation. In a fleet of so many `members` no more are remembered,
-    /// nor, where nobody is known to be one, than [`Bound::Strangers`].
+    /// Nobody has been heard of yet by `me` in this incarnation. In a fleet of so many `members` no more are
+    /// remembered, nor, where nobody is known to be one, than [`Bound::Strangers`].
     pub fn new(me: NodeName, incarnation: u64, members: usize) -> Self {
         let most = members.max(Bound::Strangers.most());
         Self {

@@ -5,7 +5,7 @@ use crate::mind::{BThreads, Mind};
 use crate::pipeline::layers::Layers;
 use crate::positioning::{self, Positioning};
 
-/// What an agent is made of, beside its configuration. Experiments replace a part to see what it is good for.
+/// The parts of an agent, beside its configuration. Experiments replace a part to see what it is good for.
 #[derive(Debug)]
 pub struct Parts {
     pub mind: Box<dyn Mind>,

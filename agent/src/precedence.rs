@@ -1,4 +1,4 @@
-//! Who goes first when b-threads of one vehicle disagree. Written once, here.
+//! The order of precedence when b-threads of one vehicle disagree. Written once, here.
 //!
 //! The order is pilot, collision, battery emergency, fence, battery low, link, mission: a fence that outranks an
 //! empty battery has crashed vehicles.

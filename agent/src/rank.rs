@@ -1,4 +1,4 @@
-//! Who goes first of two vehicles where there is room for one.
+//! The order of two vehicles where there is room for one.
 
 use skein_wire::event::Right;
 

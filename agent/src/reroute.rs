@@ -39,7 +39,7 @@ pub fn objection(
         .or_else(|| ends_beside(points.last()?, config.envelope.separation_m, ends))
 }
 
-/// Who stays, or means to, nearer to where the route ends than the vehicle keeps.
+/// Those who stay, or mean to, nearer to where the route ends than the vehicle keeps.
 fn ends_beside(
     (number, last): (usize, &[f64; 3]),
     kept_m: f64,

@@ -14,7 +14,7 @@ const BATTERY_EMERGENCY: f64 = 0.08;
 const EMERGENCY_DISTANCE_M: f64 = 1.0;
 /// Distance at which it is clear again, m.
 const CLEAR_DISTANCE_M: f64 = 1.2;
-/// How far outside the fence is a breach and not an estimate's noise, m.
+/// A vehicle so far outside the fence breaches it: less is an estimate's noise, m.
 const FENCE_TOLERANCE_M: f64 = 0.3;
 
 /// A position that was too uncertain is one to fly by again below this share of the limit.

@@ -40,6 +40,7 @@ fn config() -> AgentConfig {
         takeoff_height_m: 2.0,
         return_altitude_m: RETURN_ALTITUDE_M,
         position: Default::default(),
+        signing: None,
         sigma_limit_m: 2.0,
         lidar: true,
         fence: Fence { min: [-20.0, -20.0, 0.0], max: [20.0, 20.0, 10.0] },

@@ -48,6 +48,7 @@ fn config() -> AgentConfig {
         takeoff_height_m: 2.0,
         return_altitude_m: 4.0,
         position: Default::default(),
+        signing: None,
         sigma_limit_m: 2.0,
         lidar: true,
         fence: Fence { min: [-60.0, -60.0, -1.0], max: [60.0, 60.0, 20.0] },

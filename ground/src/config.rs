@@ -4,10 +4,9 @@ use std::time::Duration;
 
 use skein_bp::behaviour::{Chosen, Host};
 use skein_dbp::{Authority, Kept, NodeName};
-use skein_wire::{Fleet, KeptZone, standard_authority};
+use skein_wire::{Fleet, KeptZone, Order, standard_authority};
 
 use crate::giver::Giver;
-use crate::order::Order;
 use crate::planning::Theatre;
 
 /// The configuration of a ground station.
@@ -32,7 +31,7 @@ pub struct GroundConfig {
     pub muster: bool,
     /// The behaviours that are switched on; those for other nodes count for nothing.
     pub behaviours: Chosen,
-    /// What the station plans with for the fleet; without it, it makes no plans.
+    /// The station's means to plan for the fleet; without it, it makes no plans.
     pub theatre: Option<Theatre>,
     /// Lease of the station's bids.
     pub lease: Duration,

@@ -9,7 +9,8 @@ use skein_bp::{Event, EventSet, Program, ProgramConfig};
 use skein_dbp::{Board, Happened, Node, NodeConfig, NodeError, NodeName};
 use skein_wire::event::{Declared as _, Drawn, Erased, Heard, Held, Situation, What};
 use skein_wire::{
-    KeptZone, Link, MissionState, NodeLink, Readiness, Route, Saver, State, Store, Zone, joint_roster,
+    KeptZone, Link, MissionState, NodeLink, Order, Readiness, Route, Saver, State, Store, Who, Zone,
+    joint_roster,
 };
 
 use crate::bthreads::{self, GOING_LASTS, LiftZone, MissionOutcome, Watch, ZoneBlock};
@@ -17,7 +18,7 @@ use crate::config::GroundConfig;
 use crate::explain::{Evidence, Explanation, explain};
 use crate::giver::Giver;
 use crate::launch_offer::{Candidate, LaunchOffer, LaunchOffers};
-use crate::order::{Order, Who};
+use crate::order::events;
 use crate::order_log::{Answer, OrderLog, OrderRecord};
 use crate::planning::{CalledOff, FleetProblem, Flyer, Orphaned, Other, StandIns, Theatre, plan};
 use crate::refusal::Refusal;
@@ -37,12 +38,12 @@ pub struct GroundCore {
     roster: BTreeMap<NodeName, State>,
     readiness: BTreeMap<NodeName, Readiness>,
     order_log: OrderLog,
-    /// Who holds each vehicle, as it has told; without those that nobody holds.
+    /// The holder of each vehicle, as it has told; without those that nobody holds.
     holders: BTreeMap<NodeName, String>,
-    /// Who gives the orders that were known in advance. They hold no vehicle for longer than an order takes: whoever is
-    /// there must not ask a plan.
+    /// The givers of the orders that were known in advance. They hold no vehicle for longer than an order takes:
+    /// whoever is there must not ask a plan.
     planners: BTreeSet<Giver>,
-    /// Who is there to give orders now.
+    /// The people and programs that are there to give orders now.
     present: BTreeSet<Giver>,
     keep_due: Duration,
     offers: LaunchOffers,
@@ -217,7 +218,8 @@ impl GroundCore {
         self.give(by, order)
     }
 
-    /// The first of a launch's two messages: what `what`, a launch, would launch. `token` is random, and nobody's guess.
+    /// The first of a launch's two messages: what `what`, a launch, would launch. `token` is random, and nobody's
+    /// guess.
     ///
     /// # Errors
     /// [`Refusal`]: somebody else holds a vehicle, or nobody is there to be launched.
@@ -242,14 +244,11 @@ impl GroundCore {
         if !offer.is_about(&self.candidates()) {
             return Err(Refusal::OfferOutdated);
         }
-        let launch = match offer.what {
-            What::LaunchTogether => Order::LaunchTogether,
-            _ => Order::Launch,
-        };
-        self.give(by, &launch)
+        self.give(by, &Order::new(offer.what, Who::All))
     }
 
-    /// Who is there to give orders, of whom vehicles are told: whoever holds one and is not there is not kept holding it.
+    /// The people and programs that are there to give orders, of whom vehicles are told: whoever holds one and is not
+    /// there is not kept holding it.
     pub fn attend(&mut self, present: BTreeSet<Giver>) {
         self.present = present;
     }
@@ -318,12 +317,12 @@ impl GroundCore {
         let place = |vehicle: &NodeName| self.roster.get(vehicle).map(|state| state.position);
         let placed: Vec<_> = vehicles.iter().map(|vehicle| (vehicle.clone(), place(vehicle))).collect();
         let everybody = vehicles.len() == self.vehicles.len() && *order.who() == Who::All;
-        for event in order.events(&self.name, by, everybody, &placed) {
+        for event in events(order, &self.name, by, everybody, &placed) {
             self.node.node_mut().enqueue(event);
         }
         if order.what().is_launch() {
             // Who launches a vehicle holds it, and no event of the launch says so to the vehicle.
-            self.say(by, &Order::Keep(Who::All), vehicles);
+            self.say(by, &Order::new(What::Keep, Who::All), vehicles);
         }
     }
 
@@ -370,7 +369,7 @@ impl GroundCore {
             if let Some(planner) = self.planners.iter().find(|by| by.as_str() == holder).cloned() {
                 self.say(
                     &planner,
-                    &Order::Release(Who::only(vehicle.clone())),
+                    &Order::new(What::Release, Who::only(vehicle.clone())),
                     std::slice::from_ref(vehicle),
                 );
             }
@@ -392,7 +391,7 @@ impl GroundCore {
         for by in self.present.clone() {
             let held = self.vehicles.iter().filter(|vehicle| self.holder(vehicle) == Some(by.as_str()));
             let held: Vec<_> = held.cloned().collect();
-            self.say(&by, &Order::Keep(Who::These(held.clone())), &held);
+            self.say(&by, &Order::new(What::Keep, Who::These(held.clone())), &held);
         }
     }
 
@@ -447,7 +446,7 @@ impl GroundCore {
                 let left = Route::new(left.into_iter().map(Into::into).collect());
                 if let (Ok(by), Ok(left)) = (Giver::new(&by), left) {
                     // Whoever holds it otherwise by now keeps it from that.
-                    let _ = self.give(&by, &Order::Route(Who::only(vehicle), left));
+                    let _ = self.give(&by, &Order::route(vehicle, left));
                 }
             }
             if let Some(orphaned) = self.stand_ins.note(self.now, happened) {
@@ -487,7 +486,7 @@ impl GroundCore {
         let Ok(plan) = plan(&problem) else { return };
         for journey in plan.journeys {
             let Ok(route) = journey.sent() else { continue };
-            if self.give(&by, &Order::Route(Who::only(journey.node.clone()), route)).is_ok() {
+            if self.give(&by, &Order::route(journey.node.clone(), route)).is_ok() {
                 let places = journey.targets.iter().map(|number| problem.targets[*number]).collect();
                 self.stand_ins.stands_in(journey.node, of.clone(), places);
             }

@@ -8,10 +8,10 @@ use skein_wire::event::{
     Declared as _, Declined, Handover, Heeded, OrderTaken, Overruled, Rerouted, ScriptNews, ScriptState,
     Takeoff, What,
 };
+use skein_wire::{Order, Who};
 
 use crate::bthreads::{GOING_LASTS, Hold, LAUNCH_LASTS};
 use crate::giver::Giver;
-use crate::order::{Order, Who};
 use crate::refusal::held_by;
 
 /// The number of orders that are remembered.
@@ -113,10 +113,10 @@ impl OrderLog {
         }
         self.look_at_holds(now, node);
         for record in &mut self.records {
-            let lasts = match &record.order {
-                Order::LaunchTogether => Some(LAUNCH_LASTS),
-                Order::Route(..) => Some(GOING_LASTS),
-                order if order.what().sets_going() || order.script().is_some() => Some(GOING_LASTS),
+            let lasts = match record.order.what() {
+                What::LaunchTogether => Some(LAUNCH_LASTS),
+                What::Route => Some(GOING_LASTS),
+                what if what.sets_going() || what.is_about_script() => Some(GOING_LASTS),
                 _ => None,
             };
             let late = lasts.is_some_and(|lasts| now > record.at + lasts);
@@ -159,7 +159,7 @@ impl OrderLog {
             let newest = self.records.iter_mut().rev().find(|record| {
                 !record.order.what().is_beside_flight() && record.answers.contains_key(vehicle)
             });
-            let Some(record) = newest.filter(|record| matches!(record.order, Order::Hold(_))) else {
+            let Some(record) = newest.filter(|record| record.order.what() == What::Hold) else {
                 continue;
             };
             let after = now.saturating_sub(record.at);
@@ -186,14 +186,13 @@ impl OrderLog {
 /// takes the place of no order, and only who calls all down calls it off. Scripts are beside all that, and a route takes
 /// the place of a route.
 fn supersedes(new: &Order, old: &Order) -> bool {
-    match (new, old) {
-        (new, _) if new.what().is_launch() => false,
-        _ if new.script().is_some() || old.script().is_some() => false,
-        (Order::Route(..), old) => matches!(old, Order::Route(..)),
-        (_, Order::Route(..)) => false,
-        (Order::Abort | Order::Land(Who::All) | Order::Return(Who::All), _) => true,
-        (_, old) if old.what().is_launch() => false,
-        _ => true,
+    let calls_all_off = new.what().calls_launch_off() && *new.who() == Who::All;
+    match (new.what(), old.what()) {
+        (new, _) if new.is_launch() => false,
+        (new, old) if new.is_about_script() || old.is_about_script() => false,
+        (What::Route, old) => old == What::Route,
+        (_, What::Route) => false,
+        (_, old) => calls_all_off || !old.is_launch(),
     }
 }
 
@@ -206,7 +205,7 @@ fn answer_in(record: &OrderRecord, happened: &Happened, after: Duration) -> Opti
     if order.what().is_launch() && event.kind() == Takeoff::NAME {
         return acknowledged();
     }
-    if let (Order::Route(_, route), Some(taken)) = (order, Rerouted::read(event)) {
+    if let (Some(route), Some(taken)) = (order.way(), Rerouted::read(event)) {
         // The vehicle reads back what it has taken on.
         return if *taken.by == *by && *taken.way == *route.to_string() { acknowledged() } else { None };
     }
@@ -224,10 +223,11 @@ fn answer_in(record: &OrderRecord, happened: &Happened, after: Duration) -> Opti
         return if declined.what == order.what() { refused(&declined.why) } else { None };
     }
     let news = ScriptNews::read(event).filter(|news| order.script() == Some(&*news.name))?;
-    match (order, news.state) {
+    match (order.what(), news.state) {
         (_, ScriptState::Refused) => refused(&news.why),
-        (Order::Load(..), ScriptState::Accepted)
-        | (Order::Unload(..), ScriptState::Withdrawn | ScriptState::Ended) => acknowledged(),
+        (What::Load, ScriptState::Accepted) | (What::Unload, ScriptState::Withdrawn | ScriptState::Ended) => {
+            acknowledged()
+        }
         _ => None,
     }
 }

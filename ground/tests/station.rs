@@ -6,12 +6,12 @@ use std::time::Duration;
 use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, Program, ProgramConfig};
 use skein_dbp::{Happened, Node, NodeConfig, NodeName};
-use skein_ground::{Answer, Giver, GroundConfig, GroundCore, OFFER_LASTS, Order, Refusal, Who};
+use skein_ground::{Answer, Giver, GroundConfig, GroundCore, OFFER_LASTS, Refusal};
 use skein_wire::event::{
     Advance, Airborne, Complete, Declared as _, Failed, Handover, Landed, OrderGiven, OrderTaken, Takeoff,
     What, of,
 };
-use skein_wire::{Fleet, MemoryLink, Network, NetworkConfig, NodeLink, State};
+use skein_wire::{Fleet, MemoryLink, Network, NetworkConfig, NodeLink, Order, State, Who};
 
 const TICK: Duration = Duration::from_millis(20);
 const LEGS: i64 = 50;
@@ -234,8 +234,8 @@ fn vehicles_are_launched_one_after_another_and_the_mission_ends() {
 fn a_hold_is_confirmed_and_stops_every_vehicle_until_it_is_lifted() {
     for seed in 0..5 {
         let orders = vec![
-            (Duration::from_secs(3), Order::Hold(Who::All)),
-            (Duration::from_secs(8), Order::Resume(Who::All)),
+            (Duration::from_secs(3), Order::new(What::Hold, Who::All)),
+            (Duration::from_secs(8), Order::new(What::Resume, Who::All)),
         ];
         let mut fleet = Fleet3::new(orders, LOSSY, seed);
         fleet.run(Duration::from_secs(60));
@@ -259,9 +259,9 @@ fn a_hold_is_confirmed_and_stops_every_vehicle_until_it_is_lifted() {
 #[test]
 fn one_vehicle_can_be_held_and_let_go_out_of_all() {
     let orders = vec![
-        (Duration::from_millis(3000), Order::Hold(Who::All)),
-        (Duration::from_millis(5000), Order::Resume(Who::only(name("uav/1")))),
-        (Duration::from_millis(9000), Order::Resume(Who::All)),
+        (Duration::from_millis(3000), Order::new(What::Hold, Who::All)),
+        (Duration::from_millis(5000), Order::new(What::Resume, Who::only(name("uav/1")))),
+        (Duration::from_millis(9000), Order::new(What::Resume, Who::All)),
     ];
     let mut fleet = Fleet3::new(orders, NetworkConfig::default(), 1);
     fleet.run(Duration::from_secs(60));
@@ -280,9 +280,9 @@ fn one_vehicle_can_be_held_and_let_go_out_of_all() {
 #[test]
 fn an_order_to_land_reaches_the_vehicles_it_is_for_even_on_hold() {
     let orders = vec![
-        (Duration::from_millis(2500), Order::Hold(Who::All)),
-        (Duration::from_millis(4000), Order::Land(Who::only(name("uav/2")))),
-        (Duration::from_millis(6000), Order::Resume(Who::All)),
+        (Duration::from_millis(2500), Order::new(What::Hold, Who::All)),
+        (Duration::from_millis(4000), Order::new(What::Land, Who::only(name("uav/2")))),
+        (Duration::from_millis(6000), Order::new(What::Resume, Who::All)),
     ];
     let mut fleet = Fleet3::new(orders, LOSSY, 3);
     fleet.run(Duration::from_secs(60));
@@ -295,8 +295,11 @@ fn an_order_to_land_reaches_the_vehicles_it_is_for_even_on_hold() {
 
 #[test]
 fn everyone_can_be_called_home() {
-    let mut fleet =
-        Fleet3::new(vec![(Duration::from_secs(2), Order::Return(Who::All))], NetworkConfig::default(), 1);
+    let mut fleet = Fleet3::new(
+        vec![(Duration::from_secs(2), Order::new(What::Return, Who::All))],
+        NetworkConfig::default(),
+        1,
+    );
     fleet.run(Duration::from_secs(3));
     for vehicle in ["uav/1", "uav/2", "uav/3"] {
         let what: Vec<_> = fleet
@@ -325,7 +328,7 @@ fn a_vehicle_that_never_answers_keeps_no_other_on_the_ground() {
 fn an_order_names_who_gave_it_from_the_console_to_the_vehicle() {
     let mut fleet = Fleet3::new(vec![], NetworkConfig::default(), 1);
     fleet.run(Duration::from_secs(1));
-    let id = fleet.station.order(&giver("Anna"), &Order::Land(Who::only(name("uav/1")))).unwrap();
+    let id = fleet.station.order(&giver("Anna"), &Order::new(What::Land, Who::only(name("uav/1")))).unwrap();
     fleet.run(Duration::from_secs(1));
     let events = fleet.happened.iter().map(|happened| &happened.event);
     let by: Vec<_> = events
@@ -342,7 +345,7 @@ fn another_holder_is_named_with_the_remedy_and_keeps_nobody_from_stopping_the_ve
     fleet.is_held("uav/1", "Anna");
     fleet.run(Duration::from_millis(500));
     let one = || Who::only(name("uav/1"));
-    let refusal = fleet.station.order(&giver("Ben"), &Order::Resume(one())).unwrap_err();
+    let refusal = fleet.station.order(&giver("Ben"), &Order::new(What::Resume, one())).unwrap_err();
     assert_eq!(refusal, Refusal::Held { vehicle: name("uav/1"), holder: "Anna".into() });
     let words = refusal.to_string();
     assert!(
@@ -350,23 +353,29 @@ fn another_holder_is_named_with_the_remedy_and_keeps_nobody_from_stopping_the_ve
         "{words}"
     );
 
-    let all = fleet.station.order(&giver("Ben"), &Order::Resume(Who::All)).unwrap();
+    let all = fleet.station.order(&giver("Ben"), &Order::new(What::Resume, Who::All)).unwrap();
     assert_eq!(*fleet.answer(all, "uav/1"), Answer::Refused(words));
     fleet.run(Duration::from_millis(200));
     assert!(fleet.saw("uav/1/order").is_empty() && !fleet.saw("uav/2/order").is_empty());
 
-    for stop in [Order::Hold(one()), Order::Return(one()), Order::Land(one()), Order::Abort] {
+    for stop in [
+        Order::new(What::Hold, one()),
+        Order::new(What::Return, one()),
+        Order::new(What::Land, one()),
+        Order::new(What::Abort, Who::All),
+    ] {
         fleet.station.order(&giver("Ben"), &stop).unwrap();
     }
-    fleet.station.order(&giver("Anna"), &Order::Resume(one())).unwrap();
-    let not_his = fleet.station.order(&giver("Ben"), &Order::Give(one(), giver("Ben"))).unwrap_err();
+    fleet.station.order(&giver("Anna"), &Order::new(What::Resume, one())).unwrap();
+    let not_his = fleet.station.order(&giver("Ben"), &Order::give(one(), "Ben")).unwrap_err();
     assert!(matches!(not_his, Refusal::NotHolder { .. }), "{not_his}");
 }
 
 #[test]
 fn of_two_stations_the_one_that_comes_second_learns_it_from_the_vehicle() {
     let mut fleet = Fleet3::waiting();
-    let order = fleet.station.order(&giver("Ben"), &Order::Resume(Who::only(name("uav/1")))).unwrap();
+    let order =
+        fleet.station.order(&giver("Ben"), &Order::new(What::Resume, Who::only(name("uav/1")))).unwrap();
     // Another station's order has come first, and this one does not know it yet.
     fleet.is_held("uav/1", "Anna");
     fleet.run(Duration::from_secs(1));
@@ -401,7 +410,7 @@ fn a_holder_who_is_there_is_kept_holding_and_one_who_is_gone_is_not() {
 fn a_launch_is_two_messages() {
     let mut fleet = Fleet3::waiting();
     let (anna, ben) = (giver("Anna"), giver("Ben"));
-    assert_eq!(fleet.station.order(&anna, &Order::Launch), Err(Refusal::LaunchUnasked));
+    assert_eq!(fleet.station.order(&anna, &Order::new(What::Launch, Who::All)), Err(Refusal::LaunchUnasked));
     let offer = fleet.station.offer_launch(&anna, What::Launch, "t1".into()).unwrap();
     let vehicles: Vec<_> = offer.candidates.iter().map(|one| one.vehicle.as_str()).collect();
     assert_eq!((offer.token.as_str(), &vehicles[..]), ("t1", &["uav/1", "uav/2", "uav/3"][..]));
@@ -446,7 +455,7 @@ fn an_offered_launch_lapses_gives_way_to_a_later_one_and_is_about_those_it_named
 
 #[test]
 fn orders_that_were_known_in_advance_hold_no_vehicle() {
-    let resume = Order::Resume(Who::only(name("uav/2")));
+    let resume = Order::new(What::Resume, Who::only(name("uav/2")));
     let mut fleet = Fleet3::new(vec![(Duration::from_secs(2), resume)], NetworkConfig::default(), 1);
     fleet.run(Duration::from_secs(2));
     fleet.holders.insert(name("uav/2"), "Anna".into());

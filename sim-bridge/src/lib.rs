@@ -14,6 +14,7 @@ pub mod fly;
 mod mavlink_ports;
 pub mod mission;
 mod model_folders;
+mod node_names;
 #[cfg(feature = "zenoh")]
 pub mod processes;
 mod program;

@@ -124,12 +124,12 @@ fn half_of_all_pairs_of_ways_through_the_forest_cross_and_half_of_all_ways_cross
 
 #[test]
 fn the_forest_holds_the_swarm_once_in_mid_flight_for_three_seconds() {
-    use skein_sim::scenario::Who;
     use skein_wire::event::What;
+    use skein_wire::{Order, Who};
     let orders = built_in("forest", None, 1).orders;
-    let said: Vec<_> = orders.iter().map(|o| (o.order, o.who)).collect();
-    assert_eq!(said, [(What::Hold, Who::All), (What::Resume, Who::All)]);
-    assert_eq!(orders[1].at_s - orders[0].at_s, 3.0);
+    let [(held_at_s, hold), (resumed_at_s, resume)] = &orders[..] else { panic!("{orders:?}") };
+    assert_eq!([hold, resume], [&Order::new(What::Hold, Who::All), &Order::new(What::Resume, Who::All)]);
+    assert_eq!(resumed_at_s - held_at_s, 3.0);
 }
 
 #[test]

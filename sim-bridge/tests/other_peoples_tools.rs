@@ -76,6 +76,11 @@ fn an_operators_script_lists_watches_holds_and_orders() {
 }
 
 #[test]
+fn pdfium_and_opencv_read_printed_markers_and_a_photograph_tells_where_it_was_taken() {
+    run_script("test_markers.py", "cv2.aruco, pypdfium2");
+}
+
+#[test]
 fn pypi_mcap_reads_a_mission() {
     let Some(python) = python_with("mcap_protobuf") else { return };
     let folder = tempfile::tempdir().expect("a folder");

@@ -8,8 +8,10 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_agent::bthreads::LinkLossPolicy;
 use skein_agent::{GlobalPlanner, LocalPlanner};
-use skein_sim::scenario::{Order, Overrides, Scenario, ScenarioError, Who};
+use skein_sim::fly::vehicle_name;
+use skein_sim::scenario::{Overrides, Scenario, ScenarioError};
 use skein_wire::event::What;
+use skein_wire::{Destination, Order, Route, Who};
 use skein_world::{Obstacle, PositionErrors, PositionFaultKind, Scene};
 
 const YARD: &str = r#"
@@ -88,10 +90,8 @@ fn a_scenario_file_sets_vehicles_obstacles_orders_and_conditions() -> Result<(),
     assert_eq!((yard.planners.global, yard.planners.local), (GlobalPlanner::DstarLite, LocalPlanner::Vfh));
     assert_eq!((yard.network.latency_ms, yard.network.loss), (20.0, 0.1));
     assert_eq!((yard.wind.mean, yard.wind.gust_sigma_m_s), (Vector3::new(2.0, 0.0, 0.0), 0.5));
-    let orders = [
-        Order { at_s: 4.0, order: What::Hold, who: Who::All },
-        Order { at_s: 9.0, order: What::Land, who: Who::Vehicle(2) },
-    ];
+    let orders =
+        [(4.0, Order::new(What::Hold, Who::All)), (9.0, Order::new(What::Land, Who::only(vehicle_name(1))))];
     assert_eq!(yard.orders, orders);
     let [first, second] = &yard.vehicles[..] else { panic!("two vehicles") };
     assert_eq!(first.start, Vector3::new(-5.0, 0.0, 0.0));
@@ -114,6 +114,34 @@ fn fewer_vehicles_than_described_may_fly_but_not_more() {
     let three =
         Scenario::from_toml(&one, "yard.toml", Some(3), 1).expect_err("two are described").to_string();
     assert_eq!(three, "scenario `yard` describes 2 vehicles, 3 were asked for");
+}
+
+#[test]
+fn a_scenario_s_operator_may_say_all_that_one_at_the_console_may() {
+    let said = |order: &str| {
+        let text = YARD.replace("order = \"land\"\nvehicle = 2\n", order);
+        Scenario::from_toml(&text, "yard.toml", None, 1).map(|yard| yard.orders[1].1.clone())
+    };
+    let (all, second) = (Who::All, || vehicle_name(1));
+    let place = Destination { x: 1.0, y: -2.0, z: None };
+    let way = Route::new(vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]).unwrap();
+    for (order, expected) in [
+        ("order = \"goto\"\npoint = [1, -2]\n", Order::go_to(all, place)),
+        ("order = \"route\"\nvehicle = 2\npoints = [[1, 2, 3], [4, 5, 6]]\n", Order::route(second(), way)),
+        ("order = \"give\"\nvehicle = 2\nname = \"Ben\"\n", Order::give(Who::only(second()), "Ben")),
+    ] {
+        assert_eq!(said(order).unwrap(), expected, "{order}");
+    }
+    for (order, words) in [
+        ("order = \"goto\"\n", "`goto` needs a `point`"),
+        ("order = \"goto\"\npoint = [1]\n", "expected [east, north]"),
+        ("order = \"route\"\npoints = [[1, 2, 3], [4, 5, 6]]\n", "a route is for one vehicle"),
+        ("order = \"abort\"\nvehicle = 2\n", "is for all"),
+        ("order = \"load\"\n", "[[script]]"),
+    ] {
+        let error = said(order).unwrap_err().to_string();
+        assert!(error.contains("order[0]") && error.contains(words), "{order}: {error}");
+    }
 }
 
 #[test]

@@ -148,7 +148,7 @@ impl Airspace {
         self.mountains.iter().map(|mountain| mountain.most_in_m(&lower, &upper)).sum::<f64>() + ground_m
     }
 
-    /// How much of the straight way between two points lies in threat and no-fly zones, metres; where zones
+    /// The length of the straight way between two points in threat and no-fly zones, metres; where zones
     /// overlap, it counts for each. Areas to stay inside of count for nothing here.
     pub fn intrusion_m(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
         let threats: f64 = self.threats.iter().map(|zone| zone.share_inside(from, to)).sum();

@@ -2,4 +2,6 @@
 
 #![allow(clippy::expect_used, clippy::unwrap_used)] // A test fails by panicking.
 
+mod calibration;
 mod ekf;
+mod sheets;

@@ -30,7 +30,7 @@ pub struct Words {
     pub scripts: Vec<String>,
     /// The names of the zones that are drawn for it.
     pub zones: Vec<String>,
-    /// Who commands the vehicle, and who asks to; empty for nobody.
+    /// The person who commands the vehicle, and the one who asks to; empty for nobody.
     pub holder: String,
     pub asked_by: String,
     /// The vehicle's right to go first where there is room for one.

@@ -41,7 +41,7 @@ impl Holder {
         self.holder.as_deref()
     }
 
-    /// Who asks the holder for it.
+    /// The person who asks the holder for it.
     pub fn asked_by(&self) -> Option<&str> {
         self.asked_by.as_deref()
     }

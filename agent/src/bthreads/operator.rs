@@ -24,7 +24,7 @@ impl Operator {
         Self { me, pending: Vec::new(), holding: false, is_over: false }
     }
 
-    /// What the vehicle does by itself then, if it does.
+    /// The vehicle's own action then, if there is one.
     fn own(&self, what: What, by: &str) -> Option<Event> {
         let why: Text = format!("ordered by {by}").into();
         Some(match what {

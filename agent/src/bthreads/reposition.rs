@@ -12,7 +12,7 @@ use crate::{me::Me, precedence};
 
 /// The leg number of an operator's point.
 pub const OPERATOR_LEG: i64 = -2;
-/// How long the vehicle's other b-threads may keep it from setting out before the order is declined.
+/// The vehicle's other b-threads may keep it from setting out for so long before the order is declined.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Answers `order {what: "goto", x, y, z}` with a `goto` of its own, or says why not.

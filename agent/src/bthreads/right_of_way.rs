@@ -5,18 +5,18 @@
 //! the stretch (*block, await confirmation, act*). Those who go the same way are not kept out. As the way unfolds the
 //! stretch grows, and is claimed anew; what lies behind is let go. Nothing but this block keeps the others out.
 //!
-//! Two that claim at once block each other; the one with the higher number then gives way. Who waits withdraws its claim
-//! now and then, and all that it has entered but where it is, so that whoever is further in gets on with its own.
+//! Two that claim at once block each other; the one with the higher number then gives way. Who waits withdraws its
+//! claim now and then, and all that it has entered but where it is, so that whoever is further in gets on with its own.
 //!
 //! Vehicles may meet inside, where neither could know of the other. Who stands in the way of one that goes before it
 //! makes way: see [`Right`]. If it cannot, it is cornered, and goes first.
 //!
 //! A vehicle that is lost confirms nothing, and must not close every passage for ever. It is done without while most of
 //! the fleet is in reach, unless it had a claim to this very stretch when it was lost: to claim another since, it would
-//! have needed the confirmation of those who have lost it. So on a cut network one side at most goes on, and whoever was
-//! inside is waited for: after half a minute a way around where it was lost is looked for, and at last the vehicle lands
-//! and says for whom it waited. Whoever has just heard another again first lets claims cross, for as long as it takes to
-//! repeat them.
+//! have needed the confirmation of those who have lost it. So on a cut network one side at most goes on, and whoever
+//! was inside is waited for: after half a minute a way around where it was lost is looked for, and at last the vehicle
+//! lands and says for whom it waited. Whoever has just heard another again first lets claims cross, for as long as it
+//! takes to repeat them.
 //!
 //! Where radio is known to be short, silence is distance: whoever is not heard is so far away that it cannot be at a
 //! place within half the range before that is let go, and is done without.
@@ -38,10 +38,10 @@ use crate::{me::Me, precedence, rank::goes_before, stretch::Stretch};
 pub const NAME: &str = "right_of_way";
 /// A vehicle that gave way claims again when it hears that another has left a passage, or after this long.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Who waits for others claims no longer than this at a time, outside and inside.
+/// One that waits for others claims no longer than this at a time, outside and inside.
 const INSISTS_FOR: Duration = Duration::from_secs(3);
 const INSISTS_INSIDE_FOR: Duration = Duration::from_secs(10);
-/// Who waits so long for one that was lost in the stretch ahead looks for another way.
+/// One that waits so long for another that was lost in the stretch ahead looks for another way.
 const LOST_PATIENCE: Duration = Duration::from_secs(30);
 /// So often it looks before it lands.
 const LOOKS: u8 = 4;
@@ -255,7 +255,7 @@ impl RightOfWay {
         }
     }
 
-    /// What becomes of it where nobody is made way for: what lies ahead is claimed unless it is entered already; where
+    /// Its next state where nobody is made way for: what lies ahead is claimed unless it is entered already; where
     /// two sides have just met, a little later.
     fn go_on(&mut self, now: Duration) -> Phase {
         if self.ahead.is_part_of(&self.held) {
@@ -330,7 +330,7 @@ impl RightOfWay {
         }
     }
 
-    /// What happened to it as a whole: what is ahead, whether it is made way for, whether it is out.
+    /// Its change as a whole: what is ahead, whether it is made way for, whether it is out.
     fn hear(&mut self, event: &Event, now: Duration) -> Option<Phase> {
         if let Some(phase) = self.hear_other(event, now) {
             return Some(phase);
@@ -368,7 +368,7 @@ impl RightOfWay {
         }
     }
 
-    /// What becomes of its claim by what happens to that.
+    /// Its next phase by what happens to its claim.
     fn go_through(&mut self, event: &Event, now: Duration) -> Phase {
         let confirmed = Confirmed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
         let lapsed = BlockLapsed::read(event).is_some_and(|fact| &*fact.bthread == NAME);

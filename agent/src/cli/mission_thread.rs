@@ -10,6 +10,7 @@ use skein_wire::event::{Advance, Declared as _, Homeward};
 use skein_zenoh::{Bell, Complaints, ZenohLink};
 
 use super::exchange::Exchange;
+use super::signing_clock::SigningClock;
 use crate::apart::MissionSide;
 use crate::mission::{Trial, Tried};
 
@@ -22,6 +23,8 @@ pub struct MissionThread {
     pub link: ZenohLink,
     pub exchange: Arc<Exchange>,
     pub incarnation: Number,
+    /// If the autopilot's link is signed.
+    pub signing: Option<SigningClock>,
     pub complaints: Complaints,
     pub trials: Trials,
     pub began: Instant,
@@ -69,6 +72,10 @@ impl MissionThread {
         self.go_on_with_trials();
         self.incarnation.go_on(now);
         self.side.note_disk("incarnation", self.incarnation.trouble());
+        if let Some(signing) = &mut self.signing {
+            signing.go_on(now);
+            self.side.note_disk("signing time", signing.trouble());
+        }
         let orders = self.side.go_on(now, self.exchange.take_news(), &mut self.link);
         self.exchange.put_orders(orders);
         if let Some(line) = self.complaints.check(now, self.side.node(), &self.link) {

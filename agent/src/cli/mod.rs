@@ -4,10 +4,12 @@ mod control_thread;
 mod exchange;
 mod lidar_scans;
 mod log;
+mod markers;
 mod mission_thread;
 mod preflight;
 mod run;
 mod shadow_log;
+mod signing_clock;
 mod verify;
 mod watchdog;
 
@@ -25,7 +27,7 @@ use crate::config_file::Config;
     name = "skein-agent",
     version,
     max_term_width = 80,
-    after_help = "Exit codes: 0 done, 1 `verify` found a violation, or\n`preflight` a check that does not pass, 2 wrong usage or input."
+    after_help = "Exit codes: 0 done, 1 `verify` found a violation, `preflight` a check\nthat does not pass, or `markers look` no marker, 2 wrong usage or input."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -49,6 +51,9 @@ enum Command {
     },
     /// Tell every check before take-off, with its value and what to do. Arms nothing; for a vehicle on the ground.
     Preflight(preflight::Preflight),
+    /// Print sheets of markers to fly by, or find the markers in a photograph.
+    #[command(subcommand)]
+    Markers(markers::Markers),
     /// Model-check a vehicle's b-threads against an abstract world, or programs on a small network.
     Verify(verify::Verify),
 }
@@ -69,6 +74,7 @@ pub fn main(add: impl FnOnce(&mut Behaviours)) -> ExitCode {
         Command::Preflight(preflight) => {
             preflight.run(&known).map(|ready| if ready { ExitCode::SUCCESS } else { ExitCode::FAILURE })
         }
+        Command::Markers(markers) => markers.run(),
         Command::Verify(verify) => verify.run(&known),
     };
     match done {

@@ -1,7 +1,7 @@
 //! `preflight`: every check before take-off. It arms nothing, and sends no set-point.
 
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use clap::Args;
 use serde_json::json;
@@ -11,6 +11,7 @@ use skein_zenoh::{ZenohConfig, ZenohLink, ZenohSession};
 
 use super::lidar_scans::LidarScans;
 use super::log::Log;
+use super::signing_clock::SigningClock;
 use crate::autopilot_link::{Address, AutopilotLink};
 use crate::config_file::Config;
 use crate::control::Control;
@@ -59,11 +60,12 @@ struct Vehicle {
     speaks_first: bool,
     scans: Option<LidarScans>,
     others: Option<ZenohLink>,
+    signing: Option<SigningClock>,
     began: Instant,
 }
 
 impl Vehicle {
-    fn open(config: Config) -> anyhow::Result<Self> {
+    fn open(mut config: Config) -> anyhow::Result<Self> {
         let fleet = Fleet::new(&config.agent.fleet)?;
         let known = config.known();
         let network =
@@ -80,6 +82,10 @@ impl Vehicle {
             }
             Err(error) => tracing::warn!("neither lidar nor other vehicles are heard: {error:#}"),
         }
+        let signing = config.agent.signing.as_mut();
+        let signing = signing
+            .map(|it| SigningClock::start(it, &config.state, &config.name, SystemTime::now(), || {}))
+            .transpose()?;
         let Parts { positioning, layers, .. } = Parts::of(&config.agent);
         Ok(Self {
             control: Control::new(config.agent.into(), config.name, positioning, layers)?,
@@ -87,6 +93,7 @@ impl Vehicle {
             autopilot: AutopilotLink::new(config.autopilot),
             scans,
             others,
+            signing,
             began: Instant::now(),
         })
     }
@@ -106,6 +113,9 @@ impl Vehicle {
 
     fn look(&mut self) {
         let (now, control) = (self.began.elapsed(), &mut self.control);
+        if let Some(signing) = &mut self.signing {
+            signing.go_on(now);
+        }
         self.autopilot.receive(|bytes| control.receive_mavlink(now, bytes));
         let scans = self.scans.as_mut();
         scans.into_iter().flat_map(|scans| std::iter::from_fn(|| scans.poll(now))).for_each(|scan| {

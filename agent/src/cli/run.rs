@@ -19,6 +19,7 @@ use super::exchange::Exchange;
 use super::lidar_scans::LidarScans;
 use super::log::Log;
 use super::mission_thread::{MissionThread, Trials};
+use super::signing_clock::SigningClock;
 use super::watchdog::{LOOK_MS, Seen, Watchdog};
 use crate::autopilot_link::AutopilotLink;
 use crate::cli::shadow_log::ShadowLog;
@@ -100,6 +101,11 @@ fn open(mut config: Config, is_shadow: bool) -> anyhow::Result<(ControlThread, M
         Ok(scripts) => (scripts, None),
         Err(lost) => (Vec::new(), Some(lost.to_string())),
     };
+    let signing = config.agent.signing.as_mut();
+    let signing = signing
+        .map(|it| SigningClock::start(it, &config.state, &config.name, SystemTime::now(), wake.clone()))
+        .transpose()
+        .context("the disk's thread")?;
     let script_store = Background::new(script_store, wake).context("the disk's thread")?;
     let log = {
         let shadow = is_shadow.then(|| ShadowLog::create(&config.state, &config.name)).transpose()?;
@@ -150,6 +156,7 @@ fn open(mut config: Config, is_shadow: bool) -> anyhow::Result<(ControlThread, M
         link,
         exchange,
         incarnation: memory.incarnation,
+        signing,
         complaints: Complaints::default(),
         trials,
         began,

@@ -157,8 +157,8 @@ mod tests {
         Envelope { cruise_m_s: 4.0, airspeed_m_s: 9.0, tilt_rad: 0.2, ..Envelope::DEFAULT };
     const TICK: Duration = Duration::from_millis(20);
 
-    /// What is felt of a wind by a vehicle whose drag per mass is `linear` and `quadratic` in its airspeed, and whose
-    /// velocity follows `course` over 60 s.
+    /// The acceleration that a wind gives a vehicle whose drag per mass is `linear` and `quadratic` in its airspeed,
+    /// and whose velocity follows `course` over 60 s.
     fn felt(wind: Vector2<f64>, [linear, quadratic]: [f64; 2], course: fn(f64) -> Vector2<f64>) -> Airflow {
         let mut airflow = Airflow::default();
         for tick in 0..3000 {

@@ -169,8 +169,8 @@ impl Energy {
         Some(way.and(standing(TURN_S, wind, &self.config.envelope)))
     }
 
-    /// Why the mission does not begin, of a vehicle on the ground whose battery does not hold it in still air, as far as
-    /// can be told: from the drain of the last flight, or from the endurance that is configured.
+    /// Why the mission does not begin, of a vehicle on the ground whose battery does not hold it in still air, as far
+    /// as can be told: from the drain of the last flight, or from the endurance that is configured.
     #[must_use]
     pub fn reason_to_stay(&self) -> Option<&str> {
         self.thought_over.as_ref()?.1.as_deref()
@@ -213,8 +213,8 @@ impl Cost {
     }
 }
 
-/// What it takes to fly from place to place, and to come down by `landing_m` in the end; `None` if the wind lets nobody
-/// through.
+/// The energy that it takes to fly from place to place, and to come down by `landing_m` in the end; `None` if the wind
+/// lets nobody through.
 fn cost(
     places: impl Iterator<Item = Vector3<f64>>,
     landing_m: f64,
@@ -232,7 +232,7 @@ fn cost(
     Some(total)
 }
 
-/// What it takes to stay at a place, or to climb or sink there, for so long.
+/// The energy that it takes to stay at a place, or to climb or sink there, for so long.
 fn standing(seconds: f64, wind: &Wind, envelope: &Envelope) -> Cost {
     Cost { seconds, effort_s: seconds * envelope.effort_at(wind.mean.norm()) }
 }
@@ -268,8 +268,8 @@ mod tests {
         Energy::new(Arc::new(AgentConfig { home: [0.0; 3], waypoints, envelope, ..example }))
     }
 
-    /// Flies for so many seconds from home east at 4 m/s, leaning for wind, with a charge that falls by `per_s`; returns
-    /// the first reason to return, with the second in which there is one.
+    /// Flies for so many seconds from home east at 4 m/s, leaning for wind, with a charge that falls by `per_s`;
+    /// returns the first reason to return, with the second in which there is one.
     fn flies_out(
         energy: &mut Energy,
         lean_rad: f64,

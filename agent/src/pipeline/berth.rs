@@ -9,9 +9,9 @@ use skein_planning::separation::FilterConfig;
 use super::course::Course;
 use crate::{config::Envelope, neighbours::Neighbour, report::Report};
 
-/// Who stands for so long stays, if it has nowhere to go.
+/// A vehicle that stands for so long stays, if it has nowhere to go.
 const STAYS_AFTER: Duration = Duration::from_secs(2);
-/// Who stands for so long stays, though it has somewhere to go.
+/// A vehicle that stands for so long stays, though it has somewhere to go.
 const HELD_AFTER: Duration = Duration::from_secs(10);
 /// From so much further away than both would keep, the place is seen to, m.
 const LOOKS_M: f64 = 1.0;
@@ -19,7 +19,7 @@ const LOOKS_M: f64 = 1.0;
 /// Watches the place where the vehicle is to land.
 #[derive(Debug, Default)]
 pub struct Berth {
-    /// Who stands there, and since when.
+    /// The vehicle that stands there, and since when.
     standing: Option<(NodeName, Duration)>,
     /// Whether the one that has the place was said to be on its way elsewhere.
     leaves: bool,
@@ -63,8 +63,8 @@ impl Berth {
     }
 }
 
-/// Who stands so near to `place` that a vehicle at `position`, which is not far from it, may not come there;
-/// not one that is further from it than that vehicle itself.
+/// The vehicles that stand so near to `place` that a vehicle at `position`, which is not far from it, may not come
+/// there; not one that is further from it than that vehicle itself.
 fn standing_at<'a>(
     place: &Vector3<f64>,
     position: &Vector3<f64>,

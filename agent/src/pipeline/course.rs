@@ -23,7 +23,7 @@ const LEAST_FLOWN_M: f64 = 2.0;
 pub struct Course {
     pub waypoint: Option<Waypoint>,
     pub has_arrived: bool,
-    /// Who stays where the waypoint is, nearer than this vehicle may come.
+    /// The vehicle that stays where the waypoint is, nearer than this one may come.
     pub taken_by: Option<NodeName>,
     pub following: Option<Following>,
 }
@@ -41,7 +41,7 @@ pub struct Following {
     pub station_m: f64,
     /// It runs into something, and is not flown any more.
     pub is_blocked: bool,
-    /// How far along it was searched for, if that is not as far as the waypoint, m; what follows is a guess.
+    /// The length for which it was searched, if that does not reach the waypoint, m; what follows is a guess.
     searched_m: Option<f64>,
 }
 

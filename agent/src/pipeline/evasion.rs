@@ -101,7 +101,7 @@ mod tests {
         Duration::from_millis(milliseconds)
     }
 
-    /// What is decided after braking did not help.
+    /// The decision after braking did not help.
     fn after_braking(by: &Outcome, rank: u32, room: fn() -> Room) -> Option<Way> {
         let mut evasion = Evasion::default();
         assert_eq!(evasion.decide(ms(0), by, rank, room), None, "it brakes first");

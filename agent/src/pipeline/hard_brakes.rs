@@ -1,4 +1,4 @@
-//! How often the safety filter had to brake hard: for what was seen too late to stop gently.
+//! Hard brakes of the safety filter: for what was seen too late to stop gently.
 
 use std::time::Duration;
 

@@ -21,7 +21,7 @@ pub struct Layers {
     pub fence: Fence,
     /// Finds a path through the map.
     pub finder: Box<dyn PathFinder>,
-    /// What makes paths near it dearer.
+    /// The things that make paths near them dearer.
     pub potential: PotentialConfig,
     /// Turns a path into a velocity.
     pub follower: Box<dyn PathFollower>,

@@ -19,7 +19,7 @@ const NEAR_M: f64 = 0.2;
 /// ... within this distance, m.
 const AHEAD_M: f64 = 3.5;
 
-/// How long the vehicle has waited, and where.
+/// The vehicle's wait so far, and where it waits.
 #[derive(Clone, Debug)]
 pub struct Patience {
     /// Centre-to-centre distance that is kept, m.

@@ -32,7 +32,7 @@ const MINIMUM_M: f64 = 0.7;
 /// Something that moves is taken to go straight on for so long at most, s.
 const FORESEEN_S: f64 = 3.0;
 
-/// What lies beyond the goal of a search.
+/// The rest of the way beyond the goal of a search.
 #[derive(Clone, Copy, Debug)]
 enum Beyond {
     /// Nothing: it is the waypoint.
@@ -43,7 +43,7 @@ enum Beyond {
     Closed,
 }
 
-/// What a path is planned around beside the map.
+/// The obstacles of a plan beside the map.
 #[derive(Clone, Copy, Debug)]
 pub struct InTheWay<'a> {
     /// The vehicle is stuck: neighbours that stand, and what moves, are gone around.
@@ -51,7 +51,7 @@ pub struct InTheWay<'a> {
     /// The local minimum that the last path led into, m ENU.
     pub minimum: Option<Vector3<f64>>,
     pub neighbours: &'a [Neighbour],
-    /// What moves and tells nobody.
+    /// Moving things that tell nobody.
     pub movers: &'a [separation::Neighbour],
 }
 
@@ -71,14 +71,15 @@ pub struct Planning {
     beyond: Beyond,
     /// Whether it is to take the place of a path that is flown meanwhile.
     extends: bool,
-    /// Who has fallen silent, for whoever asks why there is no path.
+    /// The vehicles that have fallen silent, for whoever asks why there is no path.
     silent: String,
     /// The effort left to the search for a path in this tick.
     allowance: usize,
 }
 
 impl Planning {
-    /// Plans for a vehicle of this envelope inside this fence by this planner, with paths dearer where something repels.
+    /// Plans for a vehicle of this envelope inside this fence by this planner, with paths dearer where something
+    /// repels.
     pub fn new(
         envelope: Envelope,
         fence: Fence,
@@ -312,7 +313,7 @@ fn beside(centre: Vector3<f64>, radius_m: f64, ends: [Vector3<f64>; 2]) -> Optio
     (radius_m > 0.0).then_some(Disc { centre, radius_m })
 }
 
-/// What lies beyond the goal of a search for the way to a waypoint.
+/// The rest of the way beyond the goal of a search for the way to a waypoint.
 fn beyond(goal: &Vector3<f64>, waypoint: &Vector3<f64>, map: &ClearanceMap) -> Beyond {
     if (waypoint - goal).xy().norm() < SAME_PLACE_M {
         Beyond::Nothing

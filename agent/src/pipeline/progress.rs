@@ -35,8 +35,8 @@ const COVERED_M: f64 = 1.5;
 /// A place of a narrow stretch lies behind once the vehicle is this far from it, m: who has made way for others, who
 /// keep further from it, is in none.
 const PASSAGE_BEHIND_M: f64 = 1.5;
-/// The vehicle is in a narrow stretch if there is no more room where it is, and a place of it is so near, m, and until none
-/// is as near as that. Where it is, is told where it stands, slower than so, m/s, so far from where it was.
+/// The vehicle is in a narrow stretch if there is no more room where it is, and a place of it is so near, m, and until
+/// none is as near as that. Where it is, is told where it stands, slower than so, m/s, so far from where it was.
 const HERE_M: f64 = 1.0;
 const GONE_M: f64 = 1.3;
 const STANDS_M_S: f64 = 0.3;
@@ -55,11 +55,11 @@ const QUEUES_FOR: Duration = Duration::from_secs(60);
 /// A local minimum is so far ahead of a vehicle that is held up by it, m.
 const MINIMUM_AHEAD_M: f64 = 1.0;
 
-/// What the vehicle feels on its way.
+/// The vehicle's own measurements on its way.
 #[derive(Clone, Copy, Debug)]
 pub struct Felt<'a> {
     pub forces: Forces,
-    /// What moves and tells nobody.
+    /// Moving things that tell nobody.
     pub movers: &'a [separation::Neighbour],
 }
 
@@ -73,7 +73,7 @@ pub enum Leave {
     ToMakeWay,
 }
 
-/// What is around the vehicle.
+/// The surroundings of the vehicle.
 #[derive(Clone, Copy, Debug)]
 pub struct Around<'a> {
     pub map: &'a ClearanceMap,

@@ -118,7 +118,7 @@ impl Steering {
         self.follower.rest();
     }
 
-    /// What moves and tells nobody where it is, as of the last set-point.
+    /// Moving things that tell nobody where they are, as of the last set-point.
     pub fn movers(&self) -> &[separation::Neighbour] {
         &self.movers
     }
@@ -245,7 +245,7 @@ impl Steering {
         Wish { velocity: step.velocity, height_m: step.carrot.z }
     }
 
-    /// How far the way ahead is free, m: as far as the map tells, and as far as the newest scan saw.
+    /// The free length of the way ahead, m: as far as the map tells, and as far as the newest scan saw.
     fn free_ahead_m(
         &self,
         position: &Vector3<f64>,
@@ -277,8 +277,8 @@ impl Steering {
     }
 }
 
-/// Where to hover instead of at `place`, if that is closed: the nearest place that is open, to its side, above or below,
-/// and to which the way is free.
+/// Where to hover instead of at `place`, if that is closed: the nearest place that is open, to its side, above or
+/// below, and to which the way is free.
 fn open_place(place: &Vector3<f64>, from: &Vector3<f64>, map: &ClearanceMap) -> Vector3<f64> {
     let Some(keep_out) = map.keep_out() else { return *place };
     let is_mapped = |there: &Vector3<f64>| map.voxels().index_of(there).is_some();

@@ -12,7 +12,7 @@ pub struct Surroundings<'a> {
     pub map: &'a ClearanceMap,
     /// Whether the vehicle has a lidar: then it flies no faster than it sees the way free.
     pub sees: bool,
-    /// How far the newest scan saw, further than the map reaches.
+    /// The sight of the newest scan, further than the map reaches.
     pub rays: &'a FreeRays,
     /// Obstacle points of the newest scan, metres ENU: more exact than the map.
     pub obstacles: &'a [Vector3<f64>],
@@ -20,6 +20,6 @@ pub struct Surroundings<'a> {
     pub neighbours: &'a [separation::Neighbour],
     /// Those of them that go before this vehicle where there is room for one, once it has entered there.
     pub first: &'a [separation::Neighbour],
-    /// How many of them, and of those on the ground, have names that come before this vehicle's.
+    /// The number of them, and of those on the ground, whose names come before this vehicle's.
     pub rank: u32,
 }

@@ -56,7 +56,7 @@ pub struct Descent<'a> {
     pub ground_seen: &'a GroundSeen,
 }
 
-/// How far a vehicle lands from others.
+/// The distance from others at which a vehicle lands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Apart {
     /// As far as it keeps from them in flight.
@@ -78,8 +78,8 @@ impl Descent<'_> {
         (!is_there).then_some(place)
     }
 
-    /// Places to go down, in the order in which they are tried. Above a cover first those where the ground was seen; and
-    /// then from higher up, as what is next below leaves no way aside.
+    /// Places to go down, in the order in which they are tried. Above a cover first those where the ground was seen;
+    /// and then from higher up, as what is next below leaves no way aside.
     fn places(&self) -> impl Iterator<Item = Vector3<f64>> {
         let is_covered = self.ground_seen.is_covered();
         let seen = if is_covered { self.ground_seen.places(&self.stop) } else { Vec::new() };

@@ -38,7 +38,7 @@ pub struct WayOfOthers {
     /// Since when the vehicle stands, and where.
     stands: Option<(Duration, Vector3<f64>)>,
     hindered: Option<Hindered>,
-    /// Who has been made way for long enough, and since when.
+    /// Those who have been made way for long enough, and since when.
     done_with: Option<(NodeName, Duration)>,
 }
 

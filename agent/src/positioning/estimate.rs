@@ -12,7 +12,7 @@ pub const NOMINAL_SIGMA_M: f64 = 0.05;
 /// Standard deviations by which what hangs on an absolute position is widened.
 const SIGMAS: f64 = 2.0;
 
-/// What to add to a margin for a position of this standard deviation: how far it may be off, beyond what every margin
+/// The addition to a margin for a position of this standard deviation: its possible error, beyond what every margin
 /// allows for, m.
 pub fn excess_m(sigma_m: f64) -> f64 {
     SIGMAS * (sigma_m - NOMINAL_SIGMA_M).max(0.0)
@@ -78,7 +78,7 @@ pub struct Estimate {
     pub frame: Vector3<f64>,
     /// The reason not to fly by it now, if there is one.
     pub doubt: Option<Doubt>,
-    /// What still widens its covariance, if something does.
+    /// The cause that still widens its covariance, if there is one.
     pub shock: Option<Doubt>,
 }
 

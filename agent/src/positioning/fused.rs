@@ -36,12 +36,12 @@ const FELT_WITHIN: Duration = Duration::from_millis(300);
 /// The autopilot's estimate corrects the filter this often.
 const SATELLITES_EVERY: Duration = Duration::from_millis(200);
 const SATELLITES_M_S: f64 = 0.1;
-/// A vehicle that stands does not move: standard deviations of its velocity, m/s, and of its turning, rad/s, and how often
-/// that is said.
+/// A vehicle that stands does not move: standard deviations of its velocity, m/s, and of its turning, rad/s, and how
+/// often that is said.
 const REST_M_S: f64 = 0.02;
 const REST_RAD_S: f64 = 0.01;
 const REST_EVERY: Duration = Duration::from_millis(100);
-/// How well a vehicle is put in its place before take-off, m, and what its autopilot knows of its attitude, rad.
+/// The accuracy of a vehicle's place before take-off, m, and of its autopilot's attitude, rad.
 const PLACED_M: f64 = 0.05;
 const TILT_RAD: f64 = 0.02;
 const HEADING_RAD: f64 = 0.05;
@@ -205,7 +205,7 @@ impl Fused {
         }
     }
 
-    /// What the autopilot tells of itself: its position by satellites, that the vehicle stands, and its heading, which is
+    /// The autopilot's own word: its position by satellites, that the vehicle stands, and its heading, which is
     /// its compass's as long as it does not fly by what it is told.
     fn hear(&mut self, now: Duration, told: &Estimate, telemetry: &Telemetry) {
         if telemetry.landed == Landed::OnGround && !telemetry.armed && now >= self.rest_at + REST_EVERY {
@@ -227,7 +227,8 @@ impl Fused {
         }
     }
 
-    /// Where the vehicle is believed to be when a scan was taken; none on the ground, from where there is little to see.
+    /// Where the vehicle is believed to be when a scan was taken; none on the ground, from where there is little to
+    /// see.
     fn prediction(&self, stamp: Duration) -> Option<Prediction> {
         let state = self.ekf.as_ref()?.state();
         let lead_s = stamp.as_secs_f64() - state.stamp.as_secs_f64();

@@ -20,7 +20,7 @@ pub use self::source::{Positioning, Sensed, SourceNews};
 
 use crate::config::{AgentConfig, PositionSource};
 
-/// What tells a vehicle of this configuration where it is.
+/// The source of position of a vehicle of this configuration.
 #[must_use]
 pub fn source(config: &AgentConfig) -> Box<dyn Positioning> {
     match config.position[..] {

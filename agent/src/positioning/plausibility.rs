@@ -217,7 +217,7 @@ impl Plausibility {
         }
     }
 
-    /// What the estimate has gone through last, as long as it is not forgotten.
+    /// The estimate's last trouble, as long as it is not forgotten.
     pub fn shock(&self) -> Option<Doubt> {
         self.shock.map(|(_, doubt)| doubt)
     }

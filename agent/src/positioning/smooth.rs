@@ -13,7 +13,7 @@ const JUMP_M: f64 = 1.5;
 /// The correction that is still to be made.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Smooth {
-    /// What is told less what is believed, ENU, m.
+    /// The told position less the believed one, ENU, m.
     offset: Vector3<f64>,
     at: Duration,
 }

@@ -9,7 +9,7 @@ mod pad;
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use skein_mav::{Datum, Landed, Severity, Stamped, Telemetry, Text};
+use skein_mav::{Datum, Landed, Refused, Severity, Stamped, Telemetry, Text};
 use skein_planning::airspace::KeepOut;
 use skein_wire::{Check, CheckState};
 
@@ -184,6 +184,15 @@ impl Situation<'_> {
         let (name, advice) =
             ("autopilot", "connect it, and check `autopilot.link` and `autopilot.system_id`");
         match self.telemetry.last_heartbeat {
+            _ if !self.telemetry.connected && self.telemetry.refused.total() > 0 => {
+                let Refused { unsigned, wrong, old } = self.telemetry.refused;
+                let found = format!(
+                    "frames refused: {unsigned} unsigned, {wrong} with another key, {old} signed too long ago"
+                );
+                let advice = "give it the key of `autopilot.signing`, set this computer's clock, or accept what is \
+                              unsigned by `refuse_unsigned = false`";
+                fails(name, found, advice)
+            }
             None => waits(name, "no autopilot heard", advice),
             Some(_) if !self.telemetry.connected => fails(name, "silent", advice),
             Some(_) => {
@@ -443,10 +452,14 @@ mod tests {
     #[test]
     fn each_check_that_does_not_pass_is_named_with_what_was_found() {
         type Change = fn(&mut Told);
-        let cases: [(Change, &str); 17] = [
+        let cases: [(Change, &str); 18] = [
             (|_| {}, ""),
             (|told| told.telemetry.last_heartbeat = None, "autopilot: no autopilot heard"),
             (|told| told.telemetry.connected = false, "autopilot: silent"),
+            (
+                |told| (told.telemetry.connected, told.telemetry.refused.unsigned) = (false, 7),
+                "autopilot: frames refused: 7 unsigned, 0 with another key",
+            ),
             (|told| told.estimate.motion = None, "position: no position yet"),
             (|told| told.estimate.attitude = None, "position: position or attitude is old"),
             (|told| told.look = None, "lidar: no scan"),

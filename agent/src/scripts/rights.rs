@@ -1,4 +1,4 @@
-//! What a script may ask for and forbid, and whether it knows what it speaks of.
+//! The rights of a script to ask and to forbid, and whether it knows what it speaks of.
 
 use skein_bp::script::Script;
 use skein_bp::{Bid, Event, EventSet};
@@ -9,7 +9,7 @@ use crate::bthreads::HOME_LEG;
 use crate::me::Me;
 use crate::scripts::vocabulary::Vocabulary;
 
-/// What scripts may do on a vehicle.
+/// The rights of scripts on a vehicle.
 #[derive(Clone, Debug)]
 pub struct ScriptRights {
     me: Me,
@@ -18,7 +18,7 @@ pub struct ScriptRights {
 }
 
 impl ScriptRights {
-    /// What every script may do: order its own vehicle about at its gateway, hold it, limit its motion, and have
+    /// The rights of every script: order its own vehicle about at its gateway, hold it, limit its motion, and have
     /// events of its own. It
     /// cannot keep a vehicle from the way home, from landing, or from anything else that is for its safety.
     pub fn usual(me: &Me, roster: &[String], events: &Catalogue) -> Self {

@@ -32,7 +32,7 @@ skein_bp::words! {
         Name = "name",
         /// A position that is doubted and trusted again, with a low battery and orders.
         Position = "position",
-        /// What is told to scripts only, around an undisturbed flight.
+        /// Events told to scripts only, around an undisturbed flight.
         Scripts = "scripts",
         /// Two people who order, ask for, take and give the vehicle.
         Holder = "holder",
@@ -53,7 +53,7 @@ pub(super) struct World<'a> {
 }
 
 impl Scene {
-    /// What may happen in it, besides an undisturbed flight.
+    /// Events that may happen in it, besides an undisturbed flight.
     pub fn about(self) -> &'static str {
         match self {
             Self::Launch => "checks, refused commands, the ground's launch and hold, joint launch and abort",

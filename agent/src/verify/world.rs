@@ -268,7 +268,7 @@ pub(super) fn people(me: &Me) -> Part {
     Part::of_one(place)
 }
 
-/// What the ground station's bids for this vehicle are; they change with these events.
+/// The ground station's bids for this vehicle; they change with these events.
 pub(super) fn ground_bids(me: &Me, config: &AgentConfig) -> [(String, Part); 3] {
     let arrives = |what: &str| Event::new(format!("ground's bids/{what}"));
     let set = |what: &str| EventSet::from(arrives(what));

@@ -7,7 +7,7 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event};
 use skein_dbp::NodeName;
 use skein_dbp::facts::Unknown;
-use skein_wire::event::{Declared as _, Events as _, Handover, Load, OrderGiven, OrderTaken, Unload, What};
+use skein_wire::event::{Declared as _, Events as _, OrderGiven, What};
 
 use super::GOING_LASTS;
 use crate::order::{ordered, ordered_for};
@@ -60,16 +60,6 @@ impl BesideDelivery {
     pub fn name_for_handovers(vehicle: &NodeName) -> String {
         format!("handovers for {vehicle}")
     }
-
-    fn to_bring(&self, ordered: &Event) -> Option<Event> {
-        let OrderGiven { what, by, to, name, script, way, .. } = OrderGiven::read(ordered)?;
-        Some(match what {
-            What::Load => Load { name, script: script?, by: Some(by) }.at(&self.vehicle),
-            What::Route => OrderTaken { way, ..OrderTaken::plain(what, &by) }.at(&self.vehicle),
-            What::Unload => Unload { name: name?, by: Some(by) }.at(&self.vehicle),
-            what => Handover { what, by, to }.at(&self.vehicle),
-        })
-    }
 }
 
 impl BThread for BesideDelivery {
@@ -82,7 +72,7 @@ impl BThread for BesideDelivery {
     }
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
-        match self.to_bring(event) {
+        match OrderGiven::read(event).and_then(|given| given.brought_to(&self.vehicle)) {
             Some(script) => self.queue.push_back((script, cx.now() + GOING_LASTS)),
             // It is taken in, or has waited too long, or nobody knows.
             None => drop(self.queue.pop_front()),

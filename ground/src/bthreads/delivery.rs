@@ -6,7 +6,7 @@ use serde::Serialize;
 use skein_bp::{BThread, Bid, Context, Event, EventSet};
 use skein_dbp::NodeName;
 use skein_dbp::facts::Unknown;
-use skein_wire::event::{Declared as _, Events as _, OrderGiven, OrderTaken, Overruled};
+use skein_wire::event::{Declared as _, Events as _, OrderGiven, Overruled};
 
 use crate::order::ordered_for;
 
@@ -37,13 +37,6 @@ impl Delivery {
         format!("orders for {vehicle}")
     }
 
-    /// What is to be brought, if the order is not carried out by the station itself.
-    fn to_bring(&self, given: &OrderGiven) -> Option<Event> {
-        let &OrderGiven { what, x, y, z, ref by, .. } = given;
-        let order = OrderTaken { x, y, z, ..OrderTaken::plain(what, by) };
-        what.reaches_vehicle().then(|| order.at(&self.vehicle))
-    }
-
     /// Somebody else holds the vehicle, which heeds no other.
     fn overruled(&self) -> EventSet {
         Overruled::any_at(&self.ground).and(Overruled::vehicle(&self.vehicle))
@@ -71,8 +64,8 @@ impl BThread for Delivery {
             // A launch is about others too, and a script stands beside: neither says anything against what is on its
             // way.
             if !given.what.is_beside_flight() {
-                self.order = self.to_bring(&given);
                 self.until = given.what.sets_going().then(|| cx.now() + GOING_LASTS);
+                self.order = given.brought_to(&self.vehicle);
             }
         } else if self.order.as_ref() == Some(event) || self.until.is_some() {
             // It is taken, or has waited too long, or another holds the vehicle, or its vehicle begins a life of which its operator knows nothing.

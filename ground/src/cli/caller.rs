@@ -103,7 +103,7 @@ impl Call {
     }
 }
 
-/// What the console says to whom it turns away.
+/// The console's word to those whom it turns away.
 fn refusal<R: tungstenite::handshake::HandshakeRole>(error: tungstenite::HandshakeError<R>) -> String {
     match error {
         tungstenite::HandshakeError::Failure(tungstenite::Error::Http(answer)) => {

@@ -68,7 +68,7 @@ pub(super) enum OrderCommand {
     Give {
         #[command(flatten)]
         to: Addressed,
-        /// Who shall hold them.
+        /// The person who shall hold them.
         #[arg(long, value_name = "NAME")]
         to_whom: String,
     },

@@ -15,11 +15,11 @@ use super::caller::{Call, Caller};
 /// Whoever has not answered by then is missing.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(10);
 
-/// What is done with zones.
+/// An action on zones.
 #[derive(Subcommand)]
 pub(super) enum ZoneCommand {
-    /// Draw a zone for all vehicles, or draw the one of its name anew. Vehicles keep it on disk, whatever becomes of the
-    /// station, until it is removed.
+    /// Draw a zone for all vehicles, or draw the one of its name anew. Vehicles keep it on disk, whatever becomes of
+    /// the station, until it is removed.
     Add(Box<Add>),
     /// List what is drawn, and which vehicles have regard for it.
     List(Call),

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use axum::extract::ws::{self, WebSocket};
 use nalgebra::Vector3;
+use skein_wire::Who;
 use skein_wire::event::What;
 use tokio::sync::{broadcast::error::RecvError, watch};
 use tokio::task::JoinSet;
@@ -17,7 +18,6 @@ use super::session::Session;
 use super::subscription::{Pictures, Question, Reasons, Subscription, Text};
 use super::token;
 use crate::giver::Giver;
-use crate::order::Who;
 use crate::planning::plan;
 
 /// A browser that takes nothing for this long is let go.
@@ -249,7 +249,7 @@ async fn change_map(
     }
 }
 
-/// What the station makes of a request. Rights are looked at before anything else is.
+/// The station's answer to a request. Rights are looked at before anything else is.
 async fn wish(session: &Session, order: OrderMessage, mailbox: &Mailbox) -> Result<Granted, String> {
     let by = session.giver(order.what)?;
     granted(by, order.wanted(token::random)?, mailbox).await

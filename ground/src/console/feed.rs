@@ -1,5 +1,5 @@
-//! The messages to browsers: `scene`, `fleet` and `orders` as they are now, `events` as they happen, `why` a vehicle does
-//! what it does, to whoever asks about it, and answers to requests.
+//! The messages to browsers: `scene`, `fleet` and `orders` as they are now, `events` as they happen, `why` a vehicle
+//! does what it does, to whoever asks about it, and answers to requests.
 //!
 //! The console's own types are made of these: see `tests.rs`.
 
@@ -74,7 +74,7 @@ pub(super) enum Message<'a> {
         /// Whether all that was told before is void.
         anew: bool,
     },
-    /// How a recording is played, which is shown in the place of a live swarm.
+    /// The state of a recording that is played, which is shown in the place of a live swarm.
     Replay {
         at_s: f64,
         from_s: f64,
@@ -84,7 +84,7 @@ pub(super) enum Message<'a> {
         /// Whether it was brought to its end, and not cut short.
         complete: bool,
     },
-    /// What is drawn on the map.
+    /// The zones that are drawn on the map.
     Zones {
         zones: Vec<ZoneView<'a>>,
     },
@@ -93,7 +93,7 @@ pub(super) enum Message<'a> {
         #[serde(flatten)]
         explanation: Explanation,
     },
-    /// Who the station takes this browser for, and what it may do.
+    /// The name by which the station knows this browser, and its rights.
     You {
         tag: Option<String>,
         name: Option<&'a str>,
@@ -101,7 +101,7 @@ pub(super) enum Message<'a> {
         /// Whether a certificate says so; otherwise whoever sits there does.
         certified: bool,
     },
-    /// What a launch would launch: return the token in time, and it is ordered.
+    /// The vehicles that a launch would launch: return the token in time, and it is ordered.
     Offer {
         tag: Option<String>,
         token: &'a str,
@@ -223,9 +223,9 @@ pub(super) struct StateView<'a> {
     scripts: &'a [String],
     /// The names of the zones that it has regard for.
     zones: &'a [String],
-    /// Whose orders it takes; empty while nobody holds it.
+    /// The person or program whose orders it takes; empty while nobody holds it.
     holder: &'a str,
-    /// Who asks the holder for it; empty if nobody does.
+    /// The person or program that asks the holder for it; empty if nobody does.
     asked_by: &'a str,
 }
 
@@ -562,7 +562,7 @@ fn vehicle_view<'a>(
     }
 }
 
-/// What of a vehicle's messages this station has passed over, in words.
+/// The messages of a vehicle that this station has passed over, in words.
 fn passed_over(stats: &SenderStats) -> Option<String> {
     let counts = [
         (stats.dropped, "more than may wait"),
@@ -641,7 +641,7 @@ fn order_view(record: &OrderRecord) -> OrderView<'_> {
     }
 }
 
-/// Who blocks what is stalled; in other events `by` is somebody else.
+/// The one that blocks what is stalled; in other events `by` is somebody else.
 fn stalled_by(event: &Event) -> Option<&str> {
     event.text("by").filter(|_| event.kind() == Stalled::NAME)
 }

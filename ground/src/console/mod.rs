@@ -1,12 +1,12 @@
 //! The console: the swarm in a browser, live, and the operator's orders back from it.
 //!
 //! A [`Console`] serves a page on a thread of its own. The station's loop tells it what is so with
-//! [`publish`](Console::publish) and asks it for orders with [`take_orders`](Console::take_orders); neither ever waits. A
-//! browser that does not read gets the newest when it does; it holds up nobody.
+//! [`publish`](Console::publish) and asks it for orders with [`take_orders`](Console::take_orders); neither ever waits.
+//! A browser that does not read gets the newest when it does; it holds up nobody.
 //!
 //! On the loopback interface only this computer can open it, and anybody on it may be anybody. Beyond it, TLS only: a
-//! browser shows a certificate of the fleet's authority, which has a [`Role`]. Only pages that it serves itself may speak
-//! to it.
+//! browser shows a certificate of the fleet's authority, which has a [`Role`]. Only pages that it serves itself may
+//! speak to it.
 
 mod client;
 mod feed;
@@ -123,7 +123,7 @@ impl Console {
         self.feed.show_replay(replay);
     }
 
-    /// What operators have wished for since the last call: see [`Wish::carry_out`].
+    /// The wishes of operators since the last call: see [`Wish::carry_out`].
     pub fn take_orders(&self) -> impl Iterator<Item = Wish> + '_ {
         self.orders.try_iter()
     }

@@ -18,7 +18,7 @@ pub(super) struct PlanView<'a> {
     /// When all arrive, seconds after they have set out.
     arrival_s: f64,
     cost_m: f64,
-    /// Who would come too near to whom: a plan with any is not to be sent.
+    /// The pairs that would come too near: a plan with any is not to be sent.
     encounters: &'a [Encounter],
 }
 

@@ -9,18 +9,18 @@ use serde::Deserialize;
 use skein_bp::script::{Assignment, ScriptFile};
 use skein_dbp::NodeName;
 use skein_wire::event::{OrderGiven, What};
-use skein_wire::{Route, Zone, ZoneTable};
+use skein_wire::{Destination, Details, Order, Who, Zone, ZoneTable};
 use tokio::sync::oneshot;
 
 use crate::core::GroundCore;
 use crate::giver::Giver;
 use crate::launch_offer::LaunchOffer;
-use crate::order::{Destination, Order, SentScript, Who};
+use crate::order::to_send;
 use crate::planning::{FleetPlan, FleetProblem};
 use crate::refusal::Refusal;
 use crate::replay::Replay;
 
-/// What somebody wants of the station.
+/// A wish to the station.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Wanted {
     Order(Order),
@@ -28,7 +28,7 @@ pub(super) enum Wanted {
     Offer(What, String),
     /// The launch that was offered under this token.
     Launch(String),
-    /// What is to be known to plan for these vehicles to these targets.
+    /// The facts needed to plan for these vehicles to these targets.
     Survey(Who, Vec<Vector3<f64>>),
     /// That a zone is drawn.
     Draw(Zone),
@@ -38,17 +38,17 @@ pub(super) enum Wanted {
     Replay(ReplayMessage),
 }
 
-/// What somebody wants, on its way to the station.
+/// A wish on its way to the station.
 pub struct Wish {
     by: Giver,
     wanted: Wanted,
     answer: oneshot::Sender<Given>,
 }
 
-/// What the station has made of a wish, or why nothing.
+/// The station's answer to a wish, or why there is none.
 pub(super) type Given = Result<Granted, Refusal>;
 
-/// What the station has made of a wish.
+/// The station's answer to a wish.
 #[derive(Debug)]
 pub(super) enum Granted {
     /// The number under which it has given an order.
@@ -202,7 +202,7 @@ pub(super) enum Message {
     },
 }
 
-/// How a recording is to go on.
+/// A change in how a recording is played.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 pub(super) struct ReplayMessage {
@@ -217,7 +217,7 @@ pub(super) struct ReplayMessage {
     #[serde(default)]
     #[cfg_attr(test, ts(optional))]
     at_s: Option<f64>,
-    /// How many times as fast it is to play.
+    /// The factor by which it is to play faster.
     #[serde(default)]
     #[cfg_attr(test, ts(optional))]
     speed: Option<f64>,
@@ -333,7 +333,7 @@ pub(super) fn read(text: &str) -> (Option<String>, Result<Request, String>) {
 /// Reads a browser's message, and does nothing with it.
 ///
 /// # Errors
-/// What is wrong with it, for people.
+/// The fault in it, for people.
 pub fn check_message(text: &str) -> Result<(), String> {
     match read(text).1? {
         Request::Order(message) => message.wanted(|| Ok(String::new())).map(drop),
@@ -343,7 +343,7 @@ pub fn check_message(text: &str) -> Result<(), String> {
 }
 
 impl OrderMessage {
-    /// What is wanted; a launch without its token is to be offered under `token`.
+    /// The wish; a launch without its token is to be offered under `token`.
     pub(super) fn wanted(mut self, token: impl FnOnce() -> Result<String, String>) -> Result<Wanted, String> {
         let returned = self.token.take();
         let order = order(self)?;
@@ -359,42 +359,12 @@ impl OrderMessage {
 fn order(
     OrderMessage { what, to, point, points, stops, script, name, .. }: OrderMessage,
 ) -> Result<Order, String> {
-    let who = to.who()?;
-    Ok(match what {
-        What::Launch if who != Who::All => {
-            return Err("a launch is for all: vehicles take off in turn".into());
-        }
-        what if what.is_for_all() && who != Who::All => {
-            return Err("what is decided together is for all".into());
-        }
-        What::Load => {
-            let script = script.ok_or("`load` needs a `script`: {script, with}")?;
-            Order::Load(who, SentScript::new(&script).map_err(|error| error.to_string())?)
-        }
-        What::Unload => Order::Unload(who, name.ok_or("`unload` needs the `name` of a script")?),
-        What::Give => {
-            let to = name.ok_or("`give` needs the `name` of a person or program")?;
-            Order::Give(who, Giver::new(&to).map_err(|error| error.to_string())?)
-        }
-        What::GoTo => {
-            let (x, y, z) = point.ok_or("`goto` needs a `point`: [x, y, z or null], metres")?;
-            let finite = x.is_finite() && y.is_finite() && z.is_none_or(f64::is_finite);
-            if !finite {
-                return Err("`point` must be finite numbers".into());
-            }
-            Order::GoTo(who, Destination { x, y, z })
-        }
-        What::Route => {
-            // Two on one way would meet at its end.
-            if !matches!(&who, Who::These(vehicles) if vehicles.len() == 1) {
-                return Err("a route is for one vehicle: name it in `to`".into());
-            }
-            let points = points.ok_or("`route` needs `points`: [[x, y, z], ...], metres")?;
-            let route = Route::new(points).map_err(|error| error.to_string())?;
-            Order::Route(who, if let Some(stops) = stops { route.with_targets(&stops) } else { route })
-        }
-        what => Order::plain(what, who).ok_or("this order needs more than its word")?,
-    })
+    let script = script.map(|script| to_send(&script)).transpose().map_err(|error| error.to_string())?;
+    let point = point.map(|(x, y, z)| Destination { x, y, z });
+    if let (What::Give, Some(name)) = (what, &name) {
+        Giver::new(name).map_err(|error| error.to_string())?;
+    }
+    Order::read(what, to.who()?, Details { point, points, stops, script, name })
 }
 
 #[cfg(test)]
@@ -412,12 +382,12 @@ mod tests {
     fn orders_are_read_for_one_for_some_and_for_all() {
         let hold = r#"{"type":"order","tag":"7","what":"hold","to":"all"}"#;
         assert_eq!(read(hold).0.as_deref(), Some("7"));
-        assert_eq!(wanted(hold), Ok(Wanted::Order(Order::Hold(Who::All))));
+        assert_eq!(wanted(hold), Ok(Wanted::Order(Order::new(What::Hold, Who::All))));
         let goto = wanted(r#"{"type":"order","what":"goto","to":["uav/3"],"point":[1,-2.5,null]}"#);
         let who = || Who::only(NodeName::new("uav/3").unwrap());
-        assert_eq!(goto, Ok(Wanted::Order(Order::GoTo(who(), Destination { x: 1.0, y: -2.5, z: None }))));
+        assert_eq!(goto, Ok(Wanted::Order(Order::go_to(who(), Destination { x: 1.0, y: -2.5, z: None }))));
         let give = wanted(r#"{"type":"order","what":"give","to":["uav/3"],"name":"Ben"}"#);
-        assert_eq!(give, Ok(Wanted::Order(Order::Give(who(), Giver::new("Ben").unwrap()))));
+        assert_eq!(give, Ok(Wanted::Order(Order::give(who(), "Ben"))));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Who sits at a browser, and what they may do.
+//! The person at a browser, and their rights.
 
 use std::net::SocketAddr;
 
@@ -8,7 +8,7 @@ use skein_wire::event::What;
 use super::subscription::{Attendance, Present};
 use crate::giver::Giver;
 
-/// What a person or program may do at the console.
+/// The rights of a person or program at the console.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(ts_rs::TS))]
 #[serde(rename_all = "snake_case")]
@@ -50,7 +50,7 @@ pub(super) struct Caller {
     pub(super) identity: Identity,
 }
 
-/// Who is known to be at the other end.
+/// The known name at the other end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Identity {
     /// On the loopback interface anybody may be anybody.
@@ -61,7 +61,7 @@ pub(super) enum Identity {
     Stranger(String),
 }
 
-/// Who speaks over one connection.
+/// The speaker of one connection.
 pub(super) struct Session {
     caller: Caller,
     name: Option<Giver>,
@@ -118,8 +118,8 @@ impl Session {
         Ok(())
     }
 
-    /// Who orders this, if they may. Whoever has not said their name may still order what is for safety, and is called by
-    /// their address.
+    /// The giver of this order, if they may give it. Whoever has not said their name may still order what is for
+    /// safety, and is called by their address.
     pub(super) fn giver(&self, what: What) -> Result<Giver, String> {
         let role = self.role();
         if !role.may(what) {
@@ -141,7 +141,7 @@ impl Session {
 }
 
 impl Session {
-    /// Who draws on the map, and removes from it, if they may.
+    /// The one who draws on the map, and removes from it, if they may.
     pub(super) fn drawer(&self) -> Result<Giver, String> {
         let role = self.role();
         if role != Role::Operator {

@@ -41,7 +41,7 @@ pub enum ConsoleSecurityError {
     Unfit(String),
 }
 
-/// What is behind a connection that is made: TLS, and who may do what.
+/// The settings of a connection: TLS, and who may do what.
 #[derive(Clone)]
 pub(super) struct Tls {
     pub(super) server: Arc<ServerConfig>,
@@ -78,7 +78,7 @@ impl ConsoleSecurity {
         Ok(Tls { server: Arc::new(server), roles: Arc::new(self.names()?) })
     }
 
-    /// Who is meant by each common name: what stands before its serial number.
+    /// The name that each common name stands for: what stands before its serial number.
     fn names(&self) -> Result<BTreeMap<String, (Giver, Role)>, ConsoleSecurityError> {
         let named = |(common_name, role): (&String, &Role)| {
             let name = common_name.split(';').next().unwrap_or_default().replace('/', " ");
@@ -90,7 +90,7 @@ impl ConsoleSecurity {
 }
 
 impl Tls {
-    /// Who has made this connection.
+    /// The one who has made this connection.
     pub(super) fn identity(&self, connection: &ServerConnection) -> Identity {
         let common_name = connection.peer_certificates().and_then(|chain| common_name(chain.first()?));
         let common_name = common_name.unwrap_or_default();

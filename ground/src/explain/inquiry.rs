@@ -194,7 +194,7 @@ impl<'a> Inquiry<'a> {
         known.held_by(&blocker.node).map(|by| format!("{by} has ordered it"))
     }
 
-    /// What would let `party` go on, or its lease here lapse?
+    /// The events that would let `party` go on, or its lease here lapse?
     fn go_on(&mut self, party: &Party, lease: Option<BoardLease>) {
         if let Some(at) = self.path.iter().position(|earlier| earlier == party) {
             return self.report_cycle(at);

@@ -40,7 +40,7 @@ pub(crate) enum Note {
     Event(Happened),
     /// Where vehicles were, ENU, metres.
     Places(Vec<(NodeName, Vector3<f64>)>),
-    /// What stands in the world.
+    /// The obstacles of the world.
     Solids(Vec<Solid>),
     /// The way ahead of a vehicle, ENU, metres.
     Path(NodeName, Vec<Vector3<f64>>),
@@ -107,7 +107,7 @@ impl Recorded {
         self.notes.iter().any(|(_, note)| matches!(note, Note::Board(_)))
     }
 
-    /// What it holds, in order, each with its time.
+    /// Its content, in order, each with its time.
     pub(crate) fn notes(&self) -> &[(Duration, Note)] {
         &self.notes
     }
@@ -155,7 +155,7 @@ fn places(transforms: &FrameTransforms) -> Vec<(NodeName, Vector3<f64>)> {
     transforms.transforms.iter().filter_map(place).collect()
 }
 
-/// What stands in the world, or the way of a vehicle.
+/// An obstacle of the world, or the way of a vehicle.
 fn drawn(topic: &str, update: SceneUpdate) -> Option<Note> {
     let entity = update.entities.first()?;
     if topic == "/scene" {

@@ -46,8 +46,8 @@ bounds! {
         "What a home honours of a record's blocks, joined with what it keeps of a former life.";
     AskedDepth = "asked_depth", 12, "levels of sets inside one another in a block of a record",
         "What a home honours of it has up to four more.";
-    SetSteps = "set_steps", 1 << 14, "pairs of sets looked at to compare two",
-        "To compare two sets takes the product of both; who is not done by then answers no, which is the safe answer.";
+    SetSteps = "set_steps", 16, "pairs of sets looked at for each set inside two that are compared",
+        "To compare two sets can take a power of both; who is not done by then answers no, which is the safe answer.";
     SetWalk = "set_walk", 1, "visits of each set inside another in one walk",
         "A walk that visits the sets of an intersection twice takes twice as long for each level.";
     NameBytes = "name_bytes", 256, "bytes of a name of an event, a b-thread or a field, or of a pattern",

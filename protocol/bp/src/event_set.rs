@@ -215,7 +215,8 @@ impl EventSet {
     /// Whether every event of this set is surely in `other`. Errs towards no, also where it is too much to compare
     /// ([`Bound::SetSteps`]).
     pub fn is_within(&self, other: &EventSet) -> bool {
-        self == other || Comparison { steps: Bound::SetSteps.most() }.is_within(self, other)
+        let steps = || Bound::SetSteps.most().saturating_mul(self.extent().nodes + other.extent().nodes);
+        self == other || Comparison { steps: steps() }.is_within(self, other)
     }
 
     /// The set without those alternatives that surely hold nothing of `other`, judged by names alone.

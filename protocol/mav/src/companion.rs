@@ -26,6 +26,7 @@ use crate::measured::Measured;
 use crate::mission::MissionItem;
 use crate::parameter::{MAX_NAME_LEN, ParameterValue};
 use crate::set_point::SetPoint;
+use crate::signing::Signing;
 use crate::telemetry::{Stamped, Telemetry};
 use commands::{Commands, Purpose};
 use missions::{Missions, Wanted};
@@ -55,12 +56,14 @@ pub struct CompanionConfig {
     pub datum: Datum,
     /// Whether the autopilot is asked for what its instruments measure: see [`Companion::take_measured`].
     pub wants_measured: bool,
+    /// The link's signatures, if its frames are signed.
+    pub signing: Option<Signing>,
 }
 
 impl CompanionConfig {
     /// The companion computer of the vehicle `system_id`.
     pub fn new(system_id: u8, datum: Datum) -> Self {
-        Self { system_id, component_id: ONBOARD_COMPUTER, datum, wants_measured: false }
+        Self { system_id, component_id: ONBOARD_COMPUTER, datum, wants_measured: false, signing: None }
     }
 }
 
@@ -104,18 +107,22 @@ pub struct Companion {
     datum: Datum,
     measured: Vec<Stamped<Measured>>,
     next_origin: Duration,
+    signing: Option<Signing>,
 }
 
 impl Companion {
     /// A companion that has heard nothing yet.
     pub fn new(config: CompanionConfig) -> Self {
+        let CompanionConfig { system_id, component_id, .. } = config;
+        let (mut reader, mut writer) =
+            (FrameReader::default(), FrameWriter::new(Address { system_id, component_id }));
+        if let Some(signing) = &config.signing {
+            (reader, writer) = (FrameReader::signed(signing), writer.signed(signing));
+        }
         Self {
             autopilot: Address::autopilot(config.system_id),
-            reader: FrameReader::default(),
-            writer: FrameWriter::new(Address {
-                system_id: config.system_id,
-                component_id: config.component_id,
-            }),
+            reader,
+            writer,
             reports: Reports::new(config.datum),
             commands: Commands::default(),
             subscriptions: Subscriptions::new(config.wants_measured),
@@ -129,6 +136,7 @@ impl Companion {
             datum: config.datum,
             measured: Vec::new(),
             next_origin: Duration::ZERO,
+            signing: config.signing,
         }
     }
 
@@ -140,6 +148,7 @@ impl Companion {
     /// Takes in bytes from the autopilot, in whatever pieces they came. Garbage is skipped, and counted in
     /// [`Companion::bad_bytes`]; messages of other systems and components are ignored.
     pub fn receive(&mut self, now: Duration, bytes: &[u8]) {
+        self.set_signing_time(now);
         self.reader.push(bytes);
         while let Some(frame) = self.reader.next_frame() {
             if frame.sender == self.autopilot {
@@ -149,17 +158,29 @@ impl Companion {
         }
     }
 
-    /// Writes in MAVLink 2, unless the autopilot knows 1 only.
+    /// Tells both directions the time. The autopilot's may be ahead of it, as satellites tell it the time: it refuses
+    /// what is older than it has heard.
+    fn set_signing_time(&mut self, now: Duration) {
+        if let Some(signing) = &self.signing {
+            self.reader.not_before(signing.began.after(now));
+            self.writer.not_before(self.reader.newest_signing_time());
+            self.reports.telemetry.refused = self.reader.refused();
+        }
+    }
+
+    /// Writes in MAVLink 2, unless the autopilot knows 1 only, which has no signatures.
     fn answer_in(&mut self, now: Duration, heard: MavlinkVersion) {
         let since = (heard == MavlinkVersion::V1).then(|| self.mavlink_1_since.unwrap_or(now));
         self.mavlink_1_since = since;
         let knows_1_only = since.is_some_and(|since| now.saturating_sub(since) >= ONLY_MAVLINK_1);
         self.reports.telemetry.knows_mavlink_1_only = knows_1_only;
-        self.writer.speak(if knows_1_only { MavlinkVersion::V1 } else { MavlinkVersion::V2 });
+        let answers_in_1 = knows_1_only && self.signing.is_none();
+        self.writer.speak(if answers_in_1 { MavlinkVersion::V1 } else { MavlinkVersion::V2 });
     }
 
     /// Does what is due: heartbeat, repetitions, requests, time-outs.
     pub fn tick(&mut self, now: Duration) {
+        self.set_signing_time(now);
         if now >= self.next_heartbeat {
             self.next_heartbeat = now + HEARTBEAT_INTERVAL;
             self.writer.write(&HEARTBEAT_DATA {

@@ -7,6 +7,7 @@ use mavlink::error::ParserError;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc, consts};
 
 use crate::ekf_status;
+use crate::signing::{Refused, Signer, Signing, SigningTime, Verifier};
 
 /// A sender or receiver: a MAVLink system and one component of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -50,7 +51,7 @@ pub struct Frame {
 /// Turns bytes into frames. Bytes that belong to no intact frame are skipped and counted, one at a time, so
 /// that a marker inside garbage is never lost.
 ///
-/// Signed frames are read and their signature is not checked.
+/// Without a key, signed frames are read and their signature is not checked.
 ///
 /// ```
 /// use mavlink::dialects::common::HEARTBEAT_DATA;
@@ -74,6 +75,7 @@ pub struct FrameReader {
     unknown_messages: u64,
     /// The first of them, until they are taken.
     unread: VecDeque<Unread>,
+    verifier: Option<Verifier>,
 }
 
 /// Messages kept whose content is not known; more are dropped.
@@ -105,10 +107,34 @@ struct Layout {
     sequence: u8,
     message_id: u32,
     payload: std::ops::Range<usize>,
+    /// Where the signature begins, or the frame ends.
+    signature_start: usize,
     frame_len: usize,
 }
 
 impl FrameReader {
+    /// A reader that refuses frames by their signature, and counts them.
+    pub fn signed(signing: &Signing) -> Self {
+        Self { verifier: Some(Verifier::new(signing)), ..Self::default() }
+    }
+
+    /// Tells the time by which senders that are heard first are judged.
+    pub fn not_before(&mut self, time: SigningTime) {
+        if let Some(verifier) = &mut self.verifier {
+            verifier.not_before(time);
+        }
+    }
+
+    /// The newest timestamp that was told, or heard with a right signature.
+    pub fn newest_signing_time(&self) -> SigningTime {
+        self.verifier.as_ref().map_or(SigningTime::default(), Verifier::newest)
+    }
+
+    /// Intact frames refused so far.
+    pub fn refused(&self) -> Refused {
+        self.verifier.as_ref().map_or(Refused::default(), Verifier::refused)
+    }
+
     /// Takes in bytes as they came.
     pub fn push(&mut self, bytes: &[u8]) {
         self.buffer.drain(..self.start);
@@ -125,6 +151,15 @@ impl FrameReader {
                 Candidate::Incomplete => return None,
                 Candidate::Garbage => self.skip(1),
                 Candidate::Intact(layout) => {
+                    let (frame, signature) = bytes
+                        .get(..layout.frame_len)
+                        .and_then(|frame| frame.split_at_checked(layout.signature_start))
+                        .unwrap_or_default();
+                    let verifier = self.verifier.as_mut();
+                    if verifier.is_some_and(|it| !it.admits(layout.sender, frame, signature)) {
+                        self.start += layout.frame_len;
+                        continue;
+                    }
                     let payload = bytes.get(layout.payload).unwrap_or_default();
                     let parsed = parse(layout.version, layout.message_id, payload);
                     if parsed.is_none() && self.unread.len() < MAX_UNREAD {
@@ -217,6 +252,7 @@ fn examine(bytes: &[u8]) -> Candidate {
         sequence,
         message_id,
         payload: payload_start..checksum_start,
+        signature_start: checksum_start + consts::CHECKSUM_SIZE,
         frame_len,
     })
 }
@@ -270,12 +306,26 @@ pub struct FrameWriter {
     version: MavlinkVersion,
     sequence: u8,
     buffer: Vec<u8>,
+    signer: Option<Signer>,
 }
 
 impl FrameWriter {
     /// A writer for MAVLink 2 frames from `sender`.
     pub fn new(sender: Address) -> Self {
-        Self { sender, version: MavlinkVersion::V2, sequence: 0, buffer: Vec::new() }
+        Self { sender, version: MavlinkVersion::V2, sequence: 0, buffer: Vec::new(), signer: None }
+    }
+
+    /// The same writer, whose MAVLink 2 frames are signed.
+    #[must_use]
+    pub fn signed(self, signing: &Signing) -> Self {
+        Self { signer: Some(Signer::new(signing)), ..self }
+    }
+
+    /// Signs with this timestamp at least from now on.
+    pub fn not_before(&mut self, time: SigningTime) {
+        if let Some(signer) = &mut self.signer {
+            signer.not_before(time);
+        }
     }
 
     pub fn sender(&self) -> Address {
@@ -304,7 +354,7 @@ impl FrameWriter {
             (MavlinkVersion::V2, ..) => self.buffer.extend_from_slice(&[
                 mavlink::MAV_STX_V2,
                 len,
-                0,
+                if self.signer.is_some() { consts::v2::IFLAG_SIGNED } else { 0 },
                 0,
                 sequence,
                 system_id,
@@ -329,6 +379,10 @@ impl FrameWriter {
         let covered = self.buffer.get(frame_start + 1..).unwrap_or_default();
         let crc = calculate_crc(covered, extra_crc);
         self.buffer.extend_from_slice(&crc.to_le_bytes());
+        if let (MavlinkVersion::V2, Some(signer)) = (self.version, &mut self.signer) {
+            let signature = signer.sign(self.buffer.get(frame_start..).unwrap_or_default());
+            self.buffer.extend_from_slice(&signature);
+        }
         self.sequence = self.sequence.wrapping_add(1);
     }
 

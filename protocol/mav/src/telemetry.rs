@@ -8,6 +8,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::geodesy::Geodetic;
 use crate::mode::FlightMode;
+use crate::signing::Refused;
 
 /// An autopilot whose heartbeat (1 Hz) stays away this long is lost.
 pub const HEARTBEAT_TIMEOUT: Duration = Duration::from_secs(3);
@@ -149,6 +150,8 @@ pub struct Telemetry {
     pub failsafe: bool,
     /// Whether it writes MAVLink 1 although it is written to in 2: it is then answered in 1.
     pub knows_mavlink_1_only: bool,
+    /// Frames on its link that were refused by their signature.
+    pub refused: Refused,
     /// Whether every sensor the autopilot uses is healthy.
     pub sensors_ok: bool,
     /// Whether the autopilot's own checks would let it arm now.

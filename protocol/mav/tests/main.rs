@@ -11,5 +11,6 @@ mod habits;
 mod lossy_link;
 mod positions;
 mod protocols;
+mod signing;
 mod simulator;
 mod stations;

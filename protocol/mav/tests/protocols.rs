@@ -49,6 +49,7 @@ fn companion_told(batteries: &[(u8, i8)]) -> Companion {
         component_id: 191,
         datum: datum(),
         wants_measured: false,
+        signing: None,
     });
     for (second, (id, battery_remaining)) in (0..).zip(batteries) {
         autopilot.write(&BATTERY_STATUS_DATA {

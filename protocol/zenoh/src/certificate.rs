@@ -71,7 +71,7 @@ pub enum Fault {
 ///
 /// # Errors
 /// The file that is at fault, what is wrong with it, and what to do.
-pub(crate) fn check(
+pub fn check(
     security: &Security,
     node: &NodeName,
     roster: &Roster,

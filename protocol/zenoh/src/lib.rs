@@ -41,7 +41,7 @@ mod session;
 #[cfg(feature = "authority")]
 pub use authority::{Authority, AuthorityError, Holder, Issued};
 pub use bell::Bell;
-pub use certificate::{CertificateError, Fault};
+pub use certificate::{CertificateError, Fault, check as check_certificate};
 pub use complaints::Complaints;
 pub use config::{Mode, NetworkSettings, ZenohConfig};
 pub use error::ZenohError;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use skein_agent::{Outcome, SetPointRecord};
 use skein_world::Simulation;
 
-use super::setup::vehicle_name;
+use crate::node_names::vehicle_name;
 use crate::scenario::Scenario;
 use crate::summary::{self, Collisions, EventCounts, PlanTimes, Spread, Summary, Traffic, VehicleSummary};
 

@@ -4,9 +4,9 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use super::call_off::{self, CalledOff, MissionClock};
-use super::setup::vehicle_name;
 use super::{account, live};
 use crate::cli::{self, Setup};
+use crate::node_names::vehicle_name;
 use crate::processes::{Processes, Programs};
 use crate::scenario::Scenario;
 use crate::summary::Summary;

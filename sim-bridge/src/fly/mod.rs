@@ -23,18 +23,17 @@ use skein_bp::behaviour::Behaviours;
 use skein_ground::explain::Recorded;
 use skein_ground::recorder::keep_former;
 use skein_ground::replay::Digest;
-use skein_ground::{Order, Who};
-use skein_wire::{Fleet, Network, NetworkConfig};
+use skein_wire::event::What;
+use skein_wire::{Fleet, Network, NetworkConfig, Order, Who};
 
 use self::call_off::{CalledOff, MissionClock, interruptions};
 pub use self::{
     recording::Recording,
-    setup::{
-        FLEET, GROUND, agent_configs, agent_parts, ground_config, node_name, simulation_config, vehicle_name,
-    },
+    setup::{FLEET, agent_configs, agent_parts, ground_config, simulation_config},
     swarm::{Happenings, Links, Swarm},
     trial::{Flown, Trial},
 };
+pub use crate::node_names::{GROUND, node_name, vehicle_name};
 use crate::{
     autopilots::{Autopilots, Companions, make::Make},
     cli::{self, Clock},
@@ -299,7 +298,7 @@ impl<'a> Flight<'a> {
         {
             self.called_off = Some(CalledOff { why: why.to_owned(), at: now });
             // All are vehicles that there are.
-            let _ = self.swarm.order(&Order::Land(Who::All));
+            let _ = self.swarm.order(&Order::new(What::Land, Who::All));
         }
     }
 

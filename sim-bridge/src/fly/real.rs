@@ -14,14 +14,12 @@ use skein_wire::{Fleet, Key, Link};
 use skein_world::STEP;
 use skein_zenoh::{Mode, NetworkSettings, ZenohConfig, ZenohSession};
 
-use super::{
-    Agents, Flight, Happenings, Host, Links, Recording, Swarm,
-    setup::{FLEET, GROUND, vehicle_name},
-};
+use super::{Agents, Flight, Happenings, Host, Links, Recording, Swarm, setup::FLEET};
 use crate::{
     autopilots::make::Make,
     cli, configure,
     mavlink_ports::MavlinkPorts,
+    node_names::{GROUND, vehicle_name},
     scenario::Scenario,
     scene_view,
     summary::{Summary, Traffic},

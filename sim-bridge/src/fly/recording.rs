@@ -7,10 +7,8 @@ use skein_ground::GroundCore;
 use skein_ground::recorder::{Level, Recorder, RecorderError};
 use skein_wire::event::{Advance, Declared as _};
 
-use super::{
-    setup::vehicle_name,
-    swarm::{Happenings, Swarm},
-};
+use super::swarm::{Happenings, Swarm};
+use crate::node_names::vehicle_name;
 use crate::scenario::Scenario;
 use crate::scene_view;
 

@@ -1,19 +1,19 @@
 //! From a scenario to the configurations of its world, agents and ground station.
 
-use std::sync::LazyLock;
 use std::time::Duration;
 
 use skein_agent::{AgentConfig, DEFAULT_SIGMA_LIMIT_M, Envelope, Fence, Mind, Parts, PositionSource};
 use skein_bp::{Program, script::Assignment};
 use skein_dbp::{Kept, NodeName};
 use skein_ground::planning::Theatre;
-use skein_ground::{Giver, GroundConfig, Order, Who};
+use skein_ground::{Giver, GroundConfig};
 use skein_swarm::route::Craft;
 use skein_wire::{Fleet, standard_authority};
 use skein_world::{SimulationConfig, VehicleSetup};
 
 use crate::cli;
-use crate::scenario::{self, Scenario, VehiclePlan};
+use crate::node_names::{GROUND, vehicle_name};
+use crate::scenario::{Scenario, VehiclePlan};
 use crate::sequential::Sequential;
 
 /// The fleet's name on one host.
@@ -23,23 +23,8 @@ const RETURN_ALTITUDE_M: f64 = 3.0;
 /// Vehicles return at so many heights, this far apart, m.
 const RETURN_LEVELS: (usize, f64) = (4, 1.0);
 
-/// The ground station's node name.
-pub static GROUND: LazyLock<NodeName> = LazyLock::new(|| node_name("ground", "main"));
-
 /// The node name that an operator's script may use. Nobody misses it while it is not there.
 const SCRIPT: &str = "script/operator";
-
-/// The node name of vehicle `index`: `uav/{index + 1}`.
-#[must_use]
-pub fn vehicle_name(index: usize) -> NodeName {
-    node_name("uav", &(index + 1).to_string())
-}
-
-/// A name made of two words that are known to be plain.
-#[allow(clippy::expect_used)]
-pub fn node_name(kind: &str, id: &str) -> NodeName {
-    NodeName::new(&format!("{kind}/{id}")).expect("both chunks are plain words")
-}
 
 /// The world of a scenario.
 #[must_use]
@@ -92,6 +77,7 @@ pub fn agent_configs(scenario: &Scenario) -> Vec<AgentConfig> {
             return_altitude_m: (RETURN_ALTITUDE_M + spacing_m * (index % levels) as f64)
                 .min(bounds.max.z - 1.0),
             position: sources(scenario, plan),
+            signing: None,
             sigma_limit_m: DEFAULT_SIGMA_LIMIT_M,
             lidar: plan.model.lidar.is_some(),
             fence,
@@ -168,20 +154,15 @@ fn lease(scenario: &Scenario) -> Duration {
 /// The ground station of a scenario, with its operator's orders.
 #[must_use]
 pub fn ground_config(scenario: &Scenario, fleet: Fleet, controller: cli::Controller) -> GroundConfig {
-    let orders = scenario.orders.iter().filter_map(|said| {
-        let who = match said.who {
-            scenario::Who::All => Who::All,
-            scenario::Who::Vehicle(number) => Who::only(vehicle_name(number.saturating_sub(1))),
-        };
-        let by = Giver::new("scenario").ok()?;
-        Some((Duration::from_secs_f64(said.at_s), by, Order::plain(said.order, who)?))
+    let orders = scenario.orders.iter().filter_map(|(at_s, order)| {
+        Some((Duration::from_secs_f64(*at_s), Giver::new("scenario").ok()?, order.clone()))
     });
     let vehicles = (0..scenario.vehicles.len()).map(vehicle_name).collect();
     GroundConfig {
         orders: orders.collect(),
         loaded: controller == cli::Controller::Bp,
         launch_on_order: scenario.launch_on_order
-            || scenario.orders.iter().any(|said| said.order.is_launch()),
+            || scenario.orders.iter().any(|(_, order)| order.what().is_launch()),
         muster: scenario.musters(),
         behaviours: scenario.behaviours.clone(),
         operators: NodeName::new(SCRIPT).into_iter().collect(),

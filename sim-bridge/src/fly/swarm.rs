@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use skein_agent::{AgentConfig, AgentCore, AgentError, Outcome, Parts};
 use skein_dbp::{Happened, NodeName};
-use skein_ground::{Giver, GroundConfig, GroundCore, Order, Refusal};
-use skein_wire::{Link, MemoryStore, Scan};
+use skein_ground::{Giver, GroundConfig, GroundCore, Refusal};
+use skein_wire::{Link, MemoryStore, Order, Scan};
 use skein_world::{Simulation, Truth};
 
 use super::{account::Account, plan_times::PlanTimes, trace_hash::TraceHash};

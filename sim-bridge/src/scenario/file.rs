@@ -15,6 +15,7 @@ use skein_bp::configuration::{self, Malformed};
 use skein_bp::script::{Argument, Assignment, ScriptFile};
 use skein_planning::airspace::{Airspace, AirspaceTable};
 use skein_wire::event::What;
+use skein_wire::{Destination, Details, Order, Who};
 use skein_world::{
     Aabb, Drift, MarkerFloor, Obstacle, PositionErrors, Scene, Shape, VehicleModel, WindConfig,
 };
@@ -33,11 +34,12 @@ use super::targets::Targets;
 use super::walker::Walker;
 use super::window::Window;
 use super::{
-    DEFAULT_TIME_LIMIT_S, Network, Order, Overrides, ReadWorld, SEPARATION_HULLS, Scenario, ScenarioError,
-    VehiclePlan, VehicleScript, Who, check_count, read, read_world, stated_datum,
+    DEFAULT_TIME_LIMIT_S, Network, Overrides, ReadWorld, SEPARATION_HULLS, Scenario, ScenarioError,
+    VehiclePlan, VehicleScript, check_count, read, read_world, stated_datum,
 };
 use crate::autopilots::make::Make;
 use crate::mission;
+use crate::node_names::vehicle_name;
 
 const DEFAULT_VEHICLES: usize = 4;
 const DEFAULT_MODEL: &str = "x500";
@@ -186,6 +188,12 @@ struct OrderTable {
     at_s: f64,
     order: What,
     vehicle: Option<usize>,
+    /// Where to, for `goto`: east, north, and up if it is not to keep its height.
+    point: Option<Vec<f64>>,
+    /// The points of a `route`.
+    points: Option<Vec<[f64; 3]>>,
+    /// The script that `unload` names, or the person that `give` names.
+    name: Option<String>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -671,28 +679,36 @@ impl ScenarioFile {
         Ok(Obstacle { reflectivity: table.reflectivity, way, ..Obstacle::new(name, shape, pose) })
     }
 
-    fn orders(&self, vehicles: usize) -> Result<Vec<Order>, ScenarioError> {
+    fn orders(&self, vehicles: usize) -> Result<Vec<(f64, Order)>, ScenarioError> {
         let order = |(i, table): (usize, &OrderTable)| {
-            if table.order.is_for_all() && table.vehicle.is_some() {
-                let message = "expected none: what is decided together is for the whole swarm";
-                return Err(self.contradiction(format!("order[{i}].vehicle"), message));
-            }
-            if table.order.needs_more() {
-                let message = "expected an order that needs no more than whom it is for";
-                return Err(self.contradiction(format!("order[{i}].order"), message));
+            let wrong =
+                |field: &str, message: &str| self.contradiction(format!("order[{i}]{field}"), message);
+            if table.order == What::Load {
+                return Err(wrong(".order", "a scenario's scripts are its [[script]] tables"));
             }
             let who = match table.vehicle {
                 None => Who::All,
-                Some(number) if (1..=vehicles).contains(&number) => Who::Vehicle(number),
+                Some(number) if (1..=vehicles).contains(&number) => Who::only(vehicle_name(number - 1)),
                 Some(number) => {
                     let message = format!("there is no vehicle {number}: expected 1 to {vehicles}");
-                    return Err(self.contradiction(format!("order[{i}].vehicle"), message));
+                    return Err(wrong(".vehicle", &message));
                 }
             };
-            Ok(Order { at_s: table.at_s, order: table.order, who })
+            let point = match table.point.as_deref() {
+                None => None,
+                Some([x, y]) => Some(Destination { x: *x, y: *y, z: None }),
+                Some([x, y, z]) => Some(Destination { x: *x, y: *y, z: Some(*z) }),
+                Some(_) => {
+                    return Err(wrong(".point", "expected [east, north] or [east, north, up], metres"));
+                }
+            };
+            let (points, name) = (table.points.clone(), table.name.clone());
+            let details = Details { point, points, name, ..Details::default() };
+            let order = Order::read(table.order, who, details).map_err(|message| wrong("", &message))?;
+            Ok((table.at_s, order))
         };
         let mut orders = self.table.order.iter().enumerate().map(order).collect::<Result<Vec<_>, _>>()?;
-        orders.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+        orders.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         Ok(orders)
     }
 

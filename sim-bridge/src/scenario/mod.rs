@@ -38,6 +38,7 @@ use skein_bp::script::Assignment;
 use skein_mav::Datum;
 use skein_planning::airspace::{Airspace, KeepOut};
 use skein_planning::separation::{FilterConfig, Neighbour, distance_kept_m};
+use skein_wire::Order;
 use skein_wire::event::What;
 use skein_world::{Aabb, PositionErrors, Scene, VehicleModel, WindConfig};
 
@@ -126,8 +127,8 @@ pub struct Scenario {
     pub time_limit_s: f64,
     /// Air that moves.
     pub wind: WindConfig,
-    /// The operator's orders, by time.
-    pub orders: Vec<Order>,
+    /// The operator's orders, each at so many simulated seconds, by time.
+    pub orders: Vec<(f64, Order)>,
     /// Scripts that run on vehicles from the start.
     pub scripts: Vec<VehicleScript>,
     /// The behaviours that are switched on, each on the nodes that it is for.
@@ -196,29 +197,12 @@ impl Default for Network {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Order {
-    /// Simulated seconds since the start.
-    pub at_s: f64,
-    pub order: What,
-    pub who: Who,
-}
-
 #[derive(Debug, Clone, PartialEq)]
 pub struct VehicleScript {
     /// The vehicle's number, from 1.
     pub vehicle: usize,
     /// The script, with values for its parameters.
     pub assignment: Assignment,
-}
-
-/// Whom an order is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Who {
-    /// The whole swarm.
-    All,
-    /// The vehicle of that number, from 1.
-    Vehicle(usize),
 }
 
 /// The options of a command line that go over a scenario.
@@ -560,7 +544,8 @@ impl Scenario {
     /// Checks that where vehicles stand, before and after the flight, they are as far apart as they keep in
     /// it.
     fn check_ends(&self) -> Result<(), ScenarioError> {
-        let together = self.musters() || self.orders.iter().any(|given| given.order == What::LaunchTogether);
+        let together =
+            self.musters() || self.orders.iter().any(|(_, order)| order.what() == What::LaunchTogether);
         let starts_m = |a: &VehiclePlan, b: &VehiclePlan| match together {
             // All are in the air above their starts at once.
             true => self.kept_m(a, b),

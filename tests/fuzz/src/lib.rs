@@ -6,6 +6,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // A target fails by panicking.
 
+mod cameras;
+mod certificates;
 mod configuration;
 mod event_sets;
 mod kept;
@@ -25,6 +27,8 @@ pub use target::{Allowed, Reached, Target};
 
 /// All targets.
 pub const TARGETS: &[Target] = &[
+    cameras::TARGET,
+    certificates::TARGET,
     configuration::TARGET,
     event_sets::TARGET,
     kept::TARGET,

@@ -4,7 +4,10 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_mav::simulator::{Px4Link, ardupilot::Servos};
-use skein_mav::{Address, Command, Companion, CompanionConfig, Datum, FrameReader, SetPoint, Station};
+use skein_mav::{
+    Address, Command, Companion, CompanionConfig, Datum, FrameReader, SetPoint, Signing, SigningKey,
+    SigningTime, Station,
+};
 use skein_world::{
     PositionErrors, Scene, Simulation, SimulationConfig, VehicleModel, VehicleSetup, WindConfig,
 };
@@ -24,6 +27,7 @@ fn read(input: &[u8]) -> Reached {
     let frames = frames(&[input]);
     let (front, back) = input.split_at(input.len() / 2);
     assert_eq!(frames, self::frames(&[front, back]), "the pieces in which bytes come change what is read");
+    refuse_without_key(input);
     hear_as_companion(input);
     hear_as_autopilot(input);
     Station::of(1).hear(input);
@@ -53,6 +57,19 @@ fn frames(pieces: &[&[u8]]) -> Vec<(Address, u8, String)> {
         }
     }
     frames
+}
+
+/// A signed link hears nothing of who has not its key.
+fn refuse_without_key(input: &[u8]) {
+    let key = SigningKey::of_passphrase("nobody else has it");
+    let mut reader = FrameReader::signed(&Signing {
+        key,
+        link_id: 0,
+        refuses_unsigned: true,
+        began: SigningTime::default(),
+    });
+    reader.push(input);
+    assert_eq!(reader.next_frame(), None);
 }
 
 fn hear_as_companion(input: &[u8]) {

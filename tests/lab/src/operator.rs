@@ -13,6 +13,7 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// A connection to a console.
 pub struct Operator {
     socket: WebSocket<MaybeTlsStream<TcpStream>>,
+    console: SocketAddr,
 }
 
 impl Operator {
@@ -28,7 +29,7 @@ impl Operator {
                     if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
                         stream.set_nodelay(true)?;
                     }
-                    return Self { socket }.introduced();
+                    return Self { socket, console }.introduced();
                 }
                 Err(error) if Instant::now() > deadline => {
                     return Err(error).context("the console does not answer");
@@ -43,6 +44,11 @@ impl Operator {
         let hello = json!({ "type": "hello", "name": env!("CARGO_PKG_NAME") });
         self.socket.send(Message::text(hello.to_string()))?;
         Ok(self)
+    }
+
+    /// The console's address.
+    pub fn console(&self) -> SocketAddr {
+        self.console
     }
 
     /// Waits until all of so many vehicles have their motors armed.
@@ -95,6 +101,25 @@ impl Operator {
             }
         }
         anyhow::bail!("`{what}` was not acknowledged by all: {newest}")
+    }
+
+    /// Sends a script to everybody; returns why it was refused, or `None` if it was taken.
+    ///
+    /// # Errors
+    /// There is no answer within two minutes.
+    pub fn load(&mut self, script: &Value) -> anyhow::Result<Option<String>> {
+        let began = Instant::now();
+        let order = json!({ "type": "order", "tag": "load", "what": "load", "to": "all", "script": script });
+        self.socket.send(Message::text(order.to_string()))?;
+        while began.elapsed() < PATIENCE {
+            let message = self.next()?;
+            match message["type"].as_str() {
+                Some("ordered") => return Ok(None),
+                Some("error") => return Ok(message["message"].as_str().map(str::to_owned)),
+                _ => {}
+            }
+        }
+        anyhow::bail!("a script was not answered")
     }
 
     /// Draws a zone; returns how long it took until every vehicle kept it, on its disk.

@@ -6,9 +6,9 @@ use std::time::Duration;
 use skein_agent::Outcome;
 use skein_bp::Event;
 use skein_dbp::{NodeName, facts::PeerLost};
-use skein_ground::{Order, Who};
 use skein_tests::Lockstep;
-use skein_wire::event::{Declared as _, Enter, GiveWay, Landed, Leave, Passage, Takeoff};
+use skein_wire::event::{Declared as _, Enter, GiveWay, Landed, Leave, Passage, Takeoff, What};
+use skein_wire::{Order, Who};
 
 fn seconds(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds)
@@ -116,13 +116,13 @@ fn a_hold_stops_everyone_and_a_resume_lets_them_arrive() {
     let mut lockstep = Lockstep::new("open", None, 1);
     lockstep.run_until(seconds(14.0));
     assert!(fastest_m_s(&lockstep) > 1.0, "they fly");
-    lockstep.swarm.order(&Order::Hold(Who::All)).unwrap();
+    lockstep.swarm.order(&Order::new(What::Hold, Who::All)).unwrap();
     lockstep.run_until(seconds(18.0));
     for _ in 0..500 {
         lockstep.step();
         assert!(fastest_m_s(&lockstep) < 0.6, "held, at {:?}", lockstep.swarm.now());
     }
-    lockstep.swarm.order(&Order::Resume(Who::All)).unwrap();
+    lockstep.swarm.order(&Order::new(What::Resume, Who::All)).unwrap();
     lockstep.run_until(seconds(120.0));
     assert!(lockstep.swarm.outcomes().all(|outcome| outcome == Some(&skein_agent::Outcome::Complete)));
 }
@@ -131,7 +131,7 @@ fn a_hold_stops_everyone_and_a_resume_lets_them_arrive() {
 fn a_hold_lapses_with_the_ground_station_that_wanted_it() {
     let mut lockstep = Lockstep::new("open", None, 1);
     lockstep.run_until(seconds(14.0));
-    lockstep.swarm.order(&Order::Hold(Who::All)).unwrap();
+    lockstep.swarm.order(&Order::new(What::Hold, Who::All)).unwrap();
     lockstep.run_until(seconds(18.0));
     lockstep.network.leave(&lockstep.nodes[4]);
     lockstep.run_until(seconds(120.0));
@@ -142,7 +142,7 @@ fn a_hold_lapses_with_the_ground_station_that_wanted_it() {
 fn an_order_to_land_brings_everyone_down_at_once() {
     let mut lockstep = Lockstep::new("forest", None, 2);
     lockstep.run_until(seconds(20.0));
-    lockstep.swarm.order(&Order::Land(Who::All)).unwrap();
+    lockstep.swarm.order(&Order::new(What::Land, Who::All)).unwrap();
     lockstep.run_until(seconds(35.0));
     assert!(lockstep.swarm.is_grounded());
     assert_eq!(lockstep.swarm.truth().collisions_vehicle, 0);
@@ -152,7 +152,7 @@ fn an_order_to_land_brings_everyone_down_at_once() {
 fn an_order_to_return_brings_a_vehicle_home() {
     let mut lockstep = Lockstep::new("open", None, 2);
     lockstep.run_until(seconds(8.0));
-    lockstep.swarm.order(&Order::Return(Who::only(lockstep.nodes[0].clone()))).unwrap();
+    lockstep.swarm.order(&Order::new(What::Return, Who::only(lockstep.nodes[0].clone()))).unwrap();
     lockstep.run_until(seconds(120.0));
     assert!(lockstep.swarm.is_grounded());
     let place = lockstep.swarm.simulation().vehicle(0).unwrap().motion.position;

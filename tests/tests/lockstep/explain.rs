@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 use skein_ground::explain::{Explanation, Recorded, explain};
-use skein_ground::{Order, Who};
 use skein_sim::fly::Recording;
 use skein_tests::Lockstep;
+use skein_wire::event::What;
+use skein_wire::{Order, Who};
 
 fn seconds(seconds: u64) -> Duration {
     Duration::from_secs(seconds)
@@ -31,12 +32,12 @@ fn a_hold_is_the_reason_live_and_in_the_recording_until_it_is_over() {
     let mut lockstep = Lockstep::new("open", None, 1);
     let mut recording = Recording::create(&path, &lockstep.scenario).unwrap();
     fly(&mut lockstep, &mut recording, seconds(9));
-    lockstep.swarm.order(&Order::Hold(Who::All)).unwrap();
+    lockstep.swarm.order(&Order::new(What::Hold, Who::All)).unwrap();
     fly(&mut lockstep, &mut recording, seconds(21));
     let vehicles = &lockstep.nodes[..4];
     let live: Vec<Explanation> =
         vehicles.iter().map(|vehicle| lockstep.swarm.ground().explain(vehicle).unwrap()).collect();
-    lockstep.swarm.order(&Order::Resume(Who::All)).unwrap();
+    lockstep.swarm.order(&Order::new(What::Resume, Who::All)).unwrap();
     fly(&mut lockstep, &mut recording, seconds(25));
     recording.finish().unwrap();
 

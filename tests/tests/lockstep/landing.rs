@@ -4,10 +4,11 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_agent::Outcome;
-use skein_ground::{Destination, Order, Who};
 use skein_mav::messages::{COMMAND_LONG_DATA, MavCmd};
 use skein_mav::{Address, FrameWriter};
 use skein_tests::Lockstep;
+use skein_wire::event::What;
+use skein_wire::{Destination, Order, Who};
 
 /// Two vehicles 6 m apart: the first lands after 10 m, the second flies 40 m. And more of the scenario.
 fn two(more: &str) -> Lockstep {
@@ -37,7 +38,8 @@ fn step_until(lockstep: &mut Lockstep, what: &str, is_so: impl Fn(&Lockstep) -> 
 /// Has the second vehicle hover above a place, and then land there. Returns where it is then.
 fn land_above(lockstep: &mut Lockstep, [x, y]: [f64; 2]) -> Vector3<f64> {
     let second = || Who::only(lockstep.nodes[1].clone());
-    let (go, land) = (Order::GoTo(second(), Destination { x, y, z: Some(3.0) }), Order::Land(second()));
+    let (go, land) =
+        (Order::go_to(second(), Destination { x, y, z: Some(3.0) }), Order::new(What::Land, second()));
     lockstep.swarm.order(&go).unwrap();
     let above = Vector3::new(x, y, 3.0);
     step_until(lockstep, "it does not go there", |lockstep| {
@@ -67,10 +69,10 @@ fn first_is_at_the_goal_of_the_second() -> Lockstep {
     step_until(&mut lockstep, "the second does not fly", |lockstep| place(lockstep, 1).z > 2.5);
     let first = Who::only(lockstep.nodes[0].clone());
     let there = Destination { x: 40.0, y: 6.5, z: Some(3.0) };
-    lockstep.swarm.order(&Order::Hold(Who::only(lockstep.nodes[1].clone()))).unwrap();
-    lockstep.swarm.order(&Order::GoTo(first, there)).unwrap();
+    lockstep.swarm.order(&Order::new(What::Hold, Who::only(lockstep.nodes[1].clone()))).unwrap();
+    lockstep.swarm.order(&Order::go_to(first, there)).unwrap();
     step_until(&mut lockstep, "the first does not go there", |lockstep| place(lockstep, 0).x > 39.5);
-    lockstep.swarm.order(&Order::Resume(Who::only(lockstep.nodes[1].clone()))).unwrap();
+    lockstep.swarm.order(&Order::new(What::Resume, Who::only(lockstep.nodes[1].clone()))).unwrap();
     lockstep
 }
 
@@ -100,7 +102,7 @@ fn who_comes_to_a_goal_where_another_hovers_waits_for_it_by_name_and_then_lands_
 fn who_waits_for_a_goal_lands_there_once_it_is_free() {
     let mut lockstep = first_is_at_the_goal_of_the_second();
     step_until(&mut lockstep, "it does not wait", |lockstep| task(lockstep, 1).contains("uav/1 is there"));
-    lockstep.swarm.order(&Order::Resume(Who::only(lockstep.nodes[0].clone()))).unwrap();
+    lockstep.swarm.order(&Order::new(What::Resume, Who::only(lockstep.nodes[0].clone()))).unwrap();
     step_until(&mut lockstep, "it does not arrive", |lockstep| {
         lockstep.swarm.outcomes().nth(1).unwrap() == Some(&Outcome::Complete)
     });
@@ -111,7 +113,7 @@ fn who_waits_for_a_goal_lands_there_once_it_is_free() {
 #[test]
 fn who_comes_to_a_goal_where_another_has_landed_lands_beside_it() {
     let mut lockstep = first_is_at_the_goal_of_the_second();
-    lockstep.swarm.order(&Order::Land(Who::only(lockstep.nodes[0].clone()))).unwrap();
+    lockstep.swarm.order(&Order::new(What::Land, Who::only(lockstep.nodes[0].clone()))).unwrap();
     step_until(&mut lockstep, "it does not land", |lockstep| !is_airborne(lockstep, 1));
     let apart_m = (place(&lockstep, 1) - place(&lockstep, 0)).xy().norm();
     assert!((1.4..4.0).contains(&apart_m), "{apart_m} m");
@@ -126,7 +128,7 @@ fn told_to_land_at_full_speed_it_does_not_come_to_a_stop_above_one_that_has_land
         step_until(&mut lockstep, "the first does not land", |lockstep| !is_airborne(lockstep, 0));
         let (first, second) = (place(&lockstep, 0), Who::only(lockstep.nodes[1].clone()));
         // From where it hovers 12 m further on, back over the one that stands.
-        let go = |x| Order::GoTo(second.clone(), Destination { x, y: first.y, z: Some(3.0) });
+        let go = |x| Order::go_to(second.clone(), Destination { x, y: first.y, z: Some(3.0) });
         lockstep.swarm.order(&go(first.x + 12.0)).unwrap();
         step_until(&mut lockstep, "it does not go there", |lockstep| {
             (place(lockstep, 1) - first).xy().norm() > 11.5 && place(lockstep, 1).x > first.x
@@ -135,7 +137,7 @@ fn told_to_land_at_full_speed_it_does_not_come_to_a_stop_above_one_that_has_land
         step_until(&mut lockstep, "it does not come back", |lockstep| {
             place(lockstep, 1).x < first.x + before_m
         });
-        lockstep.swarm.order(&Order::Land(second)).unwrap();
+        lockstep.swarm.order(&Order::new(What::Land, second)).unwrap();
         step_until(&mut lockstep, "it does not land", |lockstep| !is_airborne(lockstep, 1));
         let apart_m = (first - place(&lockstep, 1)).xy().norm();
         assert_eq!(lockstep.swarm.truth().collisions_vehicle, 0, "told {before_m} m before");
@@ -184,7 +186,7 @@ fn a_pilot_who_takes_over_on_the_way_to_where_it_would_land_has_it() {
     let first = place(&lockstep, 0);
     let second = || Who::only(lockstep.nodes[1].clone());
     let above = Destination { x: first.x, y: first.y, z: Some(3.0) };
-    let (go, land) = (Order::GoTo(second(), above), Order::Land(second()));
+    let (go, land) = (Order::go_to(second(), above), Order::new(What::Land, second()));
     lockstep.swarm.order(&go).unwrap();
     let off_m = |lockstep: &Lockstep| (place(lockstep, 1) - first).xy().norm();
     step_until(&mut lockstep, "it does not go there", |lockstep| off_m(lockstep) < 0.1);
@@ -215,7 +217,7 @@ fn comes_home_under_a_deck([low_m, high_m]: [f64; 2], out_m: f64) -> Vector3<f64
         high_m - low_m
     ));
     step_until(&mut lockstep, "it does not fly", |lockstep| place(lockstep, 0).x > 18.0);
-    lockstep.swarm.order(&Order::Return(Who::All)).unwrap();
+    lockstep.swarm.order(&Order::new(What::Return, Who::All)).unwrap();
     step_until(&mut lockstep, "it does not land", |lockstep| !is_airborne(lockstep, 0));
     assert_eq!(lockstep.swarm.truth().collisions_obstacle, 0, "it meets the deck");
     place(&lockstep, 0)

@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_agent::Outcome;
+use skein_ground::Answer;
 use skein_ground::planning::{FleetPlan, plan};
-use skein_ground::{Answer, Order, Who};
 use skein_tests::Lockstep;
-use skein_wire::Route;
+use skein_wire::{Order, Route, Who};
 
 /// Five that fly east, to arrive together; a threat stands on their way to the targets, and a hill.
 const FIELD: &str = "time_limit_s = 180.0\narrive_together = true\n\
@@ -33,7 +33,7 @@ fn sent() -> (Lockstep, FleetPlan) {
     let targets = TARGETS.map(Vector3::from).to_vec();
     let planned = plan(&lockstep.swarm.ground().survey(&Who::All, targets).unwrap()).unwrap();
     for journey in &planned.journeys {
-        let route = Order::Route(Who::only(journey.node.clone()), journey.sent().unwrap());
+        let route = Order::route(journey.node.clone(), journey.sent().unwrap());
         lockstep.swarm.order(&route).unwrap();
     }
     (lockstep, planned)
@@ -91,9 +91,8 @@ fn what_a_vehicle_that_is_lost_was_to_visit_is_visited_by_another() {
 #[test]
 fn who_loses_the_ground_finds_a_better_way_by_itself() {
     let (mut lockstep, _) = sent();
-    let first = Who::only(lockstep.nodes[0].clone());
     let detour = Route::new(vec![[20.0, -38.0, 6.0], [90.0, -38.0, 6.0], [90.0, -14.0, 6.0]]).unwrap();
-    lockstep.swarm.order(&Order::Route(first.clone(), detour.with_targets(&[2]))).unwrap();
+    lockstep.swarm.order(&Order::route(lockstep.nodes[0].clone(), detour.with_targets(&[2]))).unwrap();
     lockstep.run_until(lockstep.swarm.now() + Duration::from_secs(1));
     let task =
         |lockstep: &Lockstep| lockstep.swarm.agents().next().unwrap().status(lockstep.swarm.now()).task;

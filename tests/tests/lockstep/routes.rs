@@ -5,9 +5,10 @@ use std::time::Duration;
 
 use nalgebra::Vector3;
 use skein_agent::Outcome;
-use skein_ground::{Answer, Order, Who};
+use skein_ground::Answer;
 use skein_tests::Lockstep;
-use skein_wire::Route;
+use skein_wire::event::What;
+use skein_wire::{Order, Route, Who};
 
 /// Two that fly east beside one another, with a round zone between north and east.
 const FIELD: &str = "time_limit_s = 120.0\n[bounds]\nmin_m = [-10.0, -30.0, -1.0]\nmax_m = [60.0, 30.0, 15.0]\n\
@@ -47,7 +48,7 @@ impl Field {
 
     /// Sends the first a route, and gives back what it answers.
     fn send(&mut self, points: &[[f64; 3]]) -> Answer {
-        let route = Order::Route(self.first(), Route::new(points.to_vec()).unwrap());
+        let route = Order::route(self.0.nodes[0].clone(), Route::new(points.to_vec()).unwrap());
         let id = self.0.swarm.order(&route).unwrap();
         let answer = |field: &Self| {
             let order = field.0.swarm.ground().orders().find(|order| order.id == id).unwrap();
@@ -103,7 +104,7 @@ fn what_cannot_be_flown_is_refused_with_the_reason_and_the_mission_goes_on() {
 #[test]
 fn a_vehicle_that_is_held_takes_on_a_route_and_flies_it_when_resumed() {
     let mut field = Field::under_way();
-    let hold = Order::Hold(field.first());
+    let hold = Order::new(What::Hold, field.first());
     field.0.swarm.order(&hold).unwrap();
     field.until("it is not held", |field| {
         field.0.swarm.simulation().vehicle(0).unwrap().motion.velocity.norm() < 0.1
@@ -113,7 +114,7 @@ fn a_vehicle_that_is_held_takes_on_a_route_and_flies_it_when_resumed() {
     let later = field.0.swarm.now() + Duration::from_secs(5);
     field.until("time passes", |field| field.0.swarm.now() > later);
     assert!((field.place() - held_at).norm() < 0.5, "it moves though it is held");
-    let resume = Order::Resume(field.first());
+    let resume = Order::new(What::Resume, field.first());
     field.0.swarm.order(&resume).unwrap();
     field.lands_near([20.0, 3.0]);
 }

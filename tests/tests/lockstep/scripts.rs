@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use skein_agent::Outcome;
 use skein_bp::script::{Argument, Assignment, ScriptFile};
-use skein_ground::{Answer, Order, SentScript, Who};
+use skein_ground::{Answer, to_send};
 use skein_sim::scenario::Scenario;
 use skein_tests::Lockstep;
-use skein_wire::NetworkConfig;
+use skein_wire::{NetworkConfig, Order, SentScript, Who};
 
 /// Files that a scenario names are those of the agent.
 const BESIDE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../agent/scripts/test.toml");
@@ -114,7 +114,7 @@ fn curfew(for_s: f64) -> SentScript {
     ];
     let script = ScriptFile::parse("curfew.toml", CURFEW).unwrap();
     let with = with.map(|(name, value)| (name.to_owned(), value)).into();
-    SentScript::new(&Assignment { script, with, called: None }).unwrap()
+    to_send(&Assignment { script, with, called: None }).unwrap()
 }
 
 #[test]
@@ -133,17 +133,17 @@ fn a_script_reaches_a_flying_vehicle_over_a_bad_network_and_is_taken_back() {
         record.answers[&vehicle].clone()
     };
     lockstep.run_until(seconds(8.0));
-    let sent = lockstep.swarm.order(&Order::Load(who(), curfew(3600.0))).unwrap();
+    let sent = lockstep.swarm.order(&Order::load(who(), curfew(3600.0))).unwrap();
     lockstep.run_until(seconds(10.0));
     assert!(matches!(answer(&lockstep, sent), Answer::Acknowledged(_)), "{:?}", answer(&lockstep, sent));
-    let again = lockstep.swarm.order(&Order::Load(who(), curfew(1800.0))).unwrap();
+    let again = lockstep.swarm.order(&Order::load(who(), curfew(1800.0))).unwrap();
     lockstep.run_until(seconds(60.0));
     assert!(matches!(answer(&lockstep, again), Answer::Refused(why) if why.contains("withdraw it first")));
     let state = lockstep.swarm.ground().roster().next().unwrap().1.unwrap();
     assert_eq!(state.scripts, ["curfew"]);
     assert!(position(&lockstep, 0)[0] < -5.0, "it is kept out");
-    let back = lockstep.swarm.order(&Order::Unload(who(), "curfew".into())).unwrap();
-    let never_there = lockstep.swarm.order(&Order::Unload(who(), "patrol".into())).unwrap();
+    let back = lockstep.swarm.order(&Order::unload(who(), "curfew")).unwrap();
+    let never_there = lockstep.swarm.order(&Order::unload(who(), "patrol")).unwrap();
     fly(&mut lockstep, seconds(120.0), |_| {});
     assert!(matches!(answer(&lockstep, back), Answer::Acknowledged(_)));
     assert!(

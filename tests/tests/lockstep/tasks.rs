@@ -3,10 +3,11 @@
 use std::time::Duration;
 
 use skein_agent::Outcome;
-use skein_sim::scenario::{Order, Scenario, Who};
+use skein_sim::fly::vehicle_name;
+use skein_sim::scenario::Scenario;
 use skein_tests::Lockstep;
-use skein_wire::NetworkConfig;
 use skein_wire::event::What;
+use skein_wire::{NetworkConfig, Order, Who};
 
 type Point = [f64; 3];
 
@@ -156,7 +157,7 @@ fn targets_behind_threats_are_reached_together() {
 
 /// The vehicle of this number, from 0, is held for ten seconds from then on.
 fn holding(mut scenario: Scenario, vehicle: usize, from_s: f64) -> Scenario {
-    let given = |at_s, order| Order { at_s, order, who: Who::Vehicle(vehicle + 1) };
+    let given = |at_s, what| (at_s, Order::new(what, Who::only(vehicle_name(vehicle))));
     scenario.orders.extend([given(from_s, What::Hold), given(from_s + 10.0, What::Resume)]);
     scenario
 }

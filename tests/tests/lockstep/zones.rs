@@ -5,10 +5,11 @@ use std::time::Duration;
 
 use nalgebra::{Vector2, Vector3};
 use skein_agent::Outcome;
-use skein_ground::{Answer, Giver, GroundConfig, GroundCore, Order, Refusal, Who};
+use skein_ground::{Answer, Giver, GroundConfig, GroundCore, Refusal};
 use skein_sim::{cli::Controller, fly};
 use skein_tests::Lockstep;
-use skein_wire::{Fleet, KeptZone, MemoryStore, Zone};
+use skein_wire::event::What;
+use skein_wire::{Fleet, KeptZone, MemoryStore, Order, Who, Zone};
 
 /// Two that fly east beside one another.
 const FIELD: &str = "time_limit_s = 200.0\n[bounds]\nmin_m = [-10.0, -40.0, -1.0]\nmax_m = [80.0, 40.0, 15.0]\n\
@@ -152,7 +153,7 @@ fn whoever_is_inside_leaves_by_the_shortest_way_and_one_that_is_held_leaves_too(
     for held in [false, true] {
         let mut field = Field::under_way(22.5);
         if held {
-            field.flight.swarm.order(&Order::Hold(Who::All)).unwrap();
+            field.flight.swarm.order(&Order::new(What::Hold, Who::All)).unwrap();
             field.pass(3);
         }
         field.draw_pond();
@@ -164,7 +165,7 @@ fn whoever_is_inside_leaves_by_the_shortest_way_and_one_that_is_held_leaves_too(
         }
         if held {
             field.pass(3);
-            field.flight.swarm.order(&Order::Resume(Who::All)).unwrap();
+            field.flight.swarm.order(&Order::new(What::Resume, Who::All)).unwrap();
         }
         field.wet.clear();
         field.all_arrive();
@@ -194,8 +195,8 @@ fn neither_the_way_home_nor_the_way_down_is_ever_closed() {
     field.until("it is not confirmed", |field| field.is_confirmed("field"));
     let who = |field: &Field, index: usize| Who::only(field.flight.nodes[index].clone());
     let (home, down) = (who(&field, 0), who(&field, 1));
-    field.flight.swarm.order(&Order::Return(home)).unwrap();
-    field.flight.swarm.order(&Order::Land(down)).unwrap();
+    field.flight.swarm.order(&Order::new(What::Return, home)).unwrap();
+    field.flight.swarm.order(&Order::new(What::Land, down)).unwrap();
     field.until("they do not come down", |field| field.flight.swarm.is_grounded());
 }
 
@@ -234,7 +235,7 @@ fn a_zone_outlives_the_station_and_its_next_life_takes_it_up_and_may_remove_it()
 #[test]
 fn whoever_is_cut_off_learns_of_a_zone_before_it_is_let_go_on() {
     let mut field = Field::under_way(3.0);
-    field.flight.swarm.order(&Order::Hold(Who::All)).unwrap();
+    field.flight.swarm.order(&Order::new(What::Hold, Who::All)).unwrap();
     field.pass(3);
     let away = field.flight.nodes[0].clone();
     field.flight.network.partition(&[std::slice::from_ref(&away)]);
@@ -244,7 +245,7 @@ fn whoever_is_cut_off_learns_of_a_zone_before_it_is_let_go_on() {
     field.pass(1);
     assert_eq!(field.answers("pond")[0], Answer::Missing);
     field.flight.network.heal();
-    field.flight.swarm.order(&Order::Resume(Who::All)).unwrap();
+    field.flight.swarm.order(&Order::new(What::Resume, Who::All)).unwrap();
     field.all_arrive();
     assert_eq!(field.wet, BTreeSet::new());
 }

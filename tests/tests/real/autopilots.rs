@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use skein_agent::Outcome;
 use skein_dbp::Happened;
-use skein_ground::{Order, Who};
 use skein_mav::messages::{HEARTBEAT_DATA, MavMessage, MavModeFlag};
 use skein_mav::{Address, Command, DIALECTS, Dialect, FlightMode, FrameReader, FrameWriter};
 use skein_sim::autopilots::{Autopilots, Companions, make::Make};
@@ -13,7 +12,8 @@ use skein_sim::cli::{Network, Setup};
 use skein_sim::processes::Processes;
 use skein_sim::scenario::Scenario;
 use skein_tests::{Lockstep, flight, fly};
-use skein_wire::event::{Airborne, Declared as _};
+use skein_wire::event::{Airborne, Declared as _, What};
+use skein_wire::{Order, Who};
 
 use crate::turn::turn;
 
@@ -221,7 +221,7 @@ fn a_pilot_gets_it_at_once(autopilots: &Autopilots) {
             if phase == Phase::Return && !ordered && flight.airborne.is_some_and(|up| now > up + seconds(4.0))
             {
                 ordered = true;
-                let home = Order::Return(Who::These(vec![flight.lockstep.nodes[0].clone()]));
+                let home = Order::new(What::Return, Who::These(vec![flight.lockstep.nodes[0].clone()]));
                 flight.lockstep.swarm.order(&home).unwrap();
                 began = Some(now);
             }

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use skein_lab::bench::hold::{Moment, measure};
+use skein_lab::bench::hold::{Holds, Measured, Moment, Swarm};
 use skein_lab::campaign::processes::trial::{Fault, run};
 use skein_sim::autopilots::Autopilots;
 use skein_sim::cli::{Network, Setup};
@@ -40,10 +40,21 @@ fn while_the_disk_of_all_is_full_every_hold_is_answered_within_a_second() {
         return;
     }
     for (moment, port_offset) in [(Moment::Start, 4700), (Moment::Flight, 4800)] {
-        let times_ms = measure(2, 10, Some(moment), port_offset).unwrap();
+        let swarm = Swarm { vehicles: 2, full_disk: Some(moment), garbage: false, port_offset };
+        let times_ms = Holds { swarm, holds: 10, deep_script: false }.measure().unwrap().times_ms;
         assert_eq!(times_ms.len(), 10);
         assert!(times_ms.iter().all(|ms| *ms < 1000.0), "{moment:?}: {times_ms:?}");
     }
+}
+
+#[test]
+fn beside_a_member_of_garbage_and_scripts_that_are_too_deep_every_hold_is_answered_within_a_second() {
+    let _turn = crate::turn::turn();
+    let swarm = Swarm { vehicles: 2, full_disk: None, garbage: true, port_offset: 4850 };
+    let Measured { times_ms, beside } = Holds { swarm, holds: 10, deep_script: true }.measure().unwrap();
+    assert_eq!(times_ms.len(), 10);
+    assert!(times_ms.iter().all(|ms| *ms < 1000.0), "{times_ms:?}");
+    assert!(beside.garbage > 1_000_000 && beside.scripts_refused > 0, "{beside:?}");
 }
 
 /// The folder of a flight in which the mission's thread of the first vehicle hangs a second after take-off.

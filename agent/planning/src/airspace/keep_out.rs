@@ -80,7 +80,7 @@ impl KeepOut {
         (self.airspace.clearance_m(point) - clearance_m) / self.steepness
     }
 
-    /// How much of the straight way between two points is closed, metres; what it cuts off by less than some
+    /// The length of the straight way between two points that is closed, metres; what it cuts off by less than some
     /// centimetres is not counted.
     pub fn inside_m(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
         let length_m = (to - from).norm();
@@ -123,7 +123,7 @@ impl KeepOut {
         self.has_terrain.then(|| point - upwards * (height_m / upwards.norm_squared()))
     }
 
-    /// What a lidar at `origin` would see of the zones, if they could be seen: where each of so many level rays, evenly
+    /// The view of the zones of a lidar at `origin`, if they could be seen: where each of so many level rays, evenly
     /// around, meets one within `reach_m`. Nothing from inside.
     pub fn seen_from(&self, origin: &Vector3<f64>, rays: usize, reach_m: f64) -> Vec<Vector3<f64>> {
         if !(0.0..reach_m).contains(&self.bare_room_m(origin)) {

@@ -8,8 +8,8 @@ use super::{Airspace, NoFlyPrism, NoFlyZone, ThreatZone};
 const SHORTEST: f64 = 0.01;
 
 impl Airspace {
-    /// The same with its threats and no-fly zones grown by a margin, and its box shrunk by it, metres. Terrain stays, and
-    /// so do areas to stay inside of.
+    /// The same with its threats and no-fly zones grown by a margin, and its box shrunk by it, metres. Terrain stays,
+    /// and so do areas to stay inside of.
     #[must_use]
     pub fn keeping_off(&self, margin_m: f64) -> Airspace {
         let inset = Vector3::repeat(margin_m);
@@ -32,8 +32,8 @@ impl Airspace {
         }
     }
 
-    /// How much of the straight way between two points is outside of areas to stay inside of, or nearer to their border
-    /// than so many metres; where several are left, it counts once. Metres.
+    /// The length of the straight way between two points that is outside of areas to stay inside of, or nearer to their
+    /// border than so many metres; where several are left, it counts once. Metres.
     pub fn outside_m(&self, from: &Vector3<f64>, to: &Vector3<f64>, margin_m: f64) -> f64 {
         if self.stay_inside.is_empty() {
             return 0.0;

@@ -72,7 +72,7 @@ pub struct TerrainTable {
     heights_m: Vec<Vec<f64>>,
 }
 
-/// What is wrong with an airspace.
+/// A fault in an airspace.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("`airspace.{field}`: {problem}")]
 pub struct AirspaceError {

@@ -389,8 +389,8 @@ impl Rooms<'_> {
         open_m.min(within)
     }
 
-    /// How far inside the request's box a voxel is, metres; one that reaches inside is. A way through one layer changes
-    /// its height on the way from start to goal, not here.
+    /// The depth of a voxel inside the request's box, metres; one that reaches inside is. A way through one layer
+    /// changes its height on the way from start to goal, not here.
     fn room_within_m(&self, voxel: VoxelIndex) -> f64 {
         let within = &self.request.within;
         if *within == Region::EVERYWHERE {

@@ -108,7 +108,7 @@ impl Potential {
 }
 
 impl Potential {
-    /// What a straight way costs: its length, and `U` along it, metres.
+    /// The cost of a straight way: its length, and `U` along it, metres.
     pub fn along(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
         let length_m = (to - from).norm();
         if self.is_zero() {

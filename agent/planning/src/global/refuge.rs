@@ -22,7 +22,7 @@ const WORTH_M: f64 = 3.0;
 /// Steps in a row of the eight directions: along an axis, and across.
 const STEPS: [[i32; 2]; 8] = [[1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [-1, 1], [-1, -1], [1, -1]];
 
-/// Who looks for a refuge, and from whom. Metres, ENU.
+/// The one that looks for a refuge, and the one it makes way for. Metres, ENU.
 #[derive(Clone, Copy, Debug)]
 pub struct RefugeRequest<'a> {
     pub from: Vector3<f64>,
@@ -32,7 +32,7 @@ pub struct RefugeRequest<'a> {
     pub keep_m: f64,
     /// Those who stand: the refuge is not beside them.
     pub standing: &'a [Vector3<f64>],
-    /// What is not flown through on the way there.
+    /// Places not to fly through on the way there.
     pub discs: &'a [Disc],
     /// Clearance to obstacles, as far as there is so much.
     pub clearance_m: f64,

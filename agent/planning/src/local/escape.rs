@@ -57,7 +57,7 @@ pub enum Verdict {
 pub struct Forces {
     /// The pull along the path, ENU, m/s.
     pub pull: Vector3<f64>,
-    /// What is left of it beside all that repels, ENU, m/s.
+    /// The rest of it beside all that repels, ENU, m/s.
     pub net: Vector3<f64>,
 }
 

@@ -91,7 +91,7 @@ struct Track {
     radius_m: f64,
     seen: Duration,
     sightings: u32,
-    /// How far from where it was expected it was seen lately, metres.
+    /// The distance from where it was expected to where it was seen lately, metres.
     surprise_m: f64,
     /// When it moved last, if it ever did.
     moved: Option<Duration>,

@@ -1,5 +1,5 @@
-//! How fast the vector field histogram is flown: speed that follows the scene, and never steps (Xu 2023, speed
-//! planning).
+//! The speed at which the vector field histogram is flown: speed that follows the scene, and never steps (Xu 2023,
+//! speed planning).
 
 use nalgebra::Vector3;
 

@@ -1,4 +1,4 @@
-//! How far the newest scan saw the way free, further than the map reaches.
+//! The free way that the newest scan saw, further than the map reaches.
 
 use nalgebra::Vector3;
 
@@ -40,7 +40,7 @@ impl FreeRays {
         self.ends.push(end);
     }
 
-    /// How far the way from `origin` (ENU, metres) in the horizontal direction `ahead` was seen to be free, metres:
+    /// The free length of the way from `origin` (ENU, metres) in the horizontal direction `ahead`, metres:
     /// as far as the rays in this direction reach, and to the first thing that stands nearer to the way than
     /// `aside_m`. 0 where no ray went.
     pub fn free_m(&self, origin: &Vector3<f64>, ahead: &Vector3<f64>, aside_m: f64) -> f64 {

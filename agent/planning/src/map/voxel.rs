@@ -315,7 +315,7 @@ impl VoxelMap {
         hit.map(|(offset, _)| self.centre_of(self.voxel_at(offset)))
     }
 
-    /// How far one can look from `origin` along the horizontal direction `direction` before something unknown
+    /// The free line of sight from `origin` along the horizontal direction `direction` before something unknown
     /// or occupied, at most `max_m`, metres. A place counts as seen when any voxel of its column within the
     /// vertical extent was seen: the beam of a tilted lidar passes over or under the vehicle's own layer.
     pub fn sensed_free_m(&self, origin: &Vector3<f64>, direction: &Vector3<f64>, max_m: f64) -> f64 {

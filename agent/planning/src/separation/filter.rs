@@ -171,9 +171,9 @@ struct Limit {
 /// it is too near only by the errors of both positions. `D` is widened by what is not
 /// known of the neighbour, see [`distance_kept_m`]. Distances between vehicles are stretched vertically.
 ///
-/// A vehicle that accelerates towards it at `n . w` and changes that by no more than the jerk `j` goes on doing so for `T
-/// = n . w / j`: what it comes nearer by then, and needs longer to stop, is taken from a gap that is left, `n . v T +
-/// n . w T (T / 3 + (t + |v| / 2a) / 2)`.
+/// A vehicle that accelerates towards it at `n . w` and changes that by no more than the jerk `j` goes on doing so for
+/// `T = n . w / j`: what it comes nearer by then, and needs longer to stop, is taken from a gap that is left, `n . v T
+/// + n . w T (T / 3 + (t + |v| / 2a) / 2)`.
 ///
 /// **Guarantee.** As long as `S_i + S_j <= g` for each two vehicles, all of them can brake at once and none comes
 /// nearer to another than `D`: `d` shrinks by no more than both stops, and `a` is needed in one direction only, so all
@@ -183,8 +183,8 @@ struct Limit {
 /// >= 0` against what stands or cooperates: there is a feasible velocity as long as distances have been kept. What is
 /// flown beyond `t` of lag, below `a` of braking and outside the position errors is not covered.
 ///
-/// Something that comes nearer and does not keep its distance may leave no velocity that can be had in time, nor be kept
-/// by braking: then the vehicle gives way as fast as it can.
+/// Something that comes nearer and does not keep its distance may leave no velocity that can be had in time, nor be
+/// kept by braking: then the vehicle gives way as fast as it can.
 ///
 /// When no velocity is feasible, limits are relaxed in this order, each by as little as possible and equally:
 /// those of neighbours (obstacles do not give way), then all. The caller should climb or land by rank. If the
@@ -252,7 +252,8 @@ fn nearer_m(speed_m_s: f64, accel_m_s2: f64, stop: f64, config: &FilterConfig) -
     lasts_s * (speed_m_s + accel_m_s2 * (lasts_s / 3.0 + stop / 2.0))
 }
 
-/// How far a vehicle of this speed comes, until it stands, for each m/s of its velocity in a direction: `t + |v| / 2a`, seconds.
+/// The way of a vehicle of this speed until it stands, for each m/s of its velocity in a direction: `t + |v| / 2a`,
+/// seconds.
 fn stop_s(speed_m_s: f64, config: &FilterConfig) -> f64 {
     config.latency_s + speed_m_s / (2.0 * config.decel_m_s2)
 }

@@ -35,7 +35,7 @@ impl Default for RepulsionConfig {
     }
 }
 
-/// What to add to the velocity `desired` of a vehicle at `position` (ENU, m/s), so that encounters resolve.
+/// The addition to the velocity `desired` of a vehicle at `position` (ENU, m/s), so that encounters resolve.
 /// Horizontal.
 ///
 /// The radial part is `-grad U` of `U = 1/2 eta (1/rho - 1/rho0)^2` for `rho <= rho0` (the repulsion between

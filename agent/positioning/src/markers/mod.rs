@@ -15,6 +15,7 @@
 //! ```
 
 mod blobs;
+mod calibration;
 mod camera;
 mod cells;
 mod detect;
@@ -26,8 +27,10 @@ mod layout;
 mod plane;
 mod pose;
 mod quadrilateral;
+pub mod sheet;
 mod threshold;
 
+pub use self::calibration::NoCalibration;
 pub use self::camera::{Camera, Lens, NoCamera};
 pub use self::detect::{Detection, detect};
 pub use self::dictionary::{Dictionary, Identity, UnknownDictionary};

@@ -29,7 +29,8 @@ const OUTLIER: f64 = 3.5;
 const STEPS: usize = 30;
 /// Poses whose rotations differ less than this are one, rad.
 const SAME_RAD: f64 = 2e-3;
-/// The other pose is possible up to this difference of the sums of squares, in variances: 99.9 % of two degrees of freedom.
+/// The other pose is possible up to this difference of the sums of squares, in variances: 99.9 % of two degrees of
+/// freedom.
 const POSSIBLE: f64 = 13.8;
 /// Markers lie in one plane up to this share of their extent.
 const FLAT_SHARE: f64 = 1e-3;
@@ -50,7 +51,7 @@ pub struct Solution {
     pub body_to_world: Isometry3<f64>,
     /// As in [`PoseFix`]: of the position on the world's axes, m², and the orientation about the body's axes, rad².
     pub covariance: Matrix6<f64>,
-    /// How far the corners are from where this pose has them, root of the mean square of their distances, pixels.
+    /// The distance of the corners from where this pose has them, root of the mean square of their distances, pixels.
     pub rms_px: f64,
 }
 
@@ -208,7 +209,7 @@ impl Solver {
         plane::poses(&pairs).map(|poses| poses.map(body))
     }
 
-    /// How far a marker's corners are from where a pose has them: root of the mean square of their distances across
+    /// The distance of a marker's corners from where a pose has them: root of the mean square of their distances across
     /// and down, pixels.
     fn off(&self, body: &Isometry3<f64>, marker: &Seen) -> f64 {
         let square = |corner: &Corner| {
@@ -408,7 +409,7 @@ mod tests {
         }
     }
 
-    /// What is seen of some markers from a pose, with so much noise.
+    /// Sightings of some markers from a pose, with so much noise.
     fn seen(at: &Isometry3<f64>, ids: &[u32], sigma_px: f64, noise: &mut Normals) -> Vec<Detection> {
         let (camera, to_camera, layout) = (camera(), (at * mounting()).inverse(), layout());
         let look = |id: &u32| {

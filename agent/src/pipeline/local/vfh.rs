@@ -41,7 +41,7 @@ impl Vfh {
         Self::with_speed(envelope, Self::speed(envelope))
     }
 
-    /// How fast a vehicle of this envelope flies.
+    /// The speeds of a vehicle of this envelope.
     pub fn speed(envelope: &Envelope) -> SpeedConfig {
         let filter_m = envelope.obstacle_clearance_m();
         SpeedConfig {

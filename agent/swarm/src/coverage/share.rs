@@ -29,7 +29,7 @@ pub fn cut_evenly(way: &[Vector2<f64>], pieces: usize, leg_s: &dyn Fn(f64) -> f6
     routes
 }
 
-/// How many vehicles each of some ways gets that take so long, one at least: so that the one that takes
+/// The number of vehicles for each of some ways that take so long, one at least: so that the one that takes
 /// longest for each of its vehicles gets the next.
 pub fn vehicles_for(ways_s: &[f64], vehicles: usize) -> Vec<usize> {
     let mut counts = vec![1; ways_s.len()];

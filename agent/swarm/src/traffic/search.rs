@@ -37,11 +37,11 @@ pub struct Request<'a> {
     pub start: State,
     /// The distance to be kept.
     pub apart: Apart,
-    /// What others will do until they have come to rest, whatever comes: from `step` on three moves each.
+    /// The moves of others until they have come to rest, whatever comes: from `step` on three moves each.
     pub committed: &'a [[Move; 3]],
     /// The plans of those that go before.
     pub before: &'a [&'a Itinerary],
-    /// Who rests at its goal, and would have to make way.
+    /// Those who rest at their goals, and would have to make way.
     pub resting: &'a [State],
 }
 

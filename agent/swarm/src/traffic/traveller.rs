@@ -153,7 +153,7 @@ impl Traveller {
         })
     }
 
-    /// What it says, and what it has heard the others say: all of it is passed on.
+    /// Its own word, and the words that it has heard of the others: all of it is passed on.
     pub fn words(&self) -> impl Iterator<Item = &Word> {
         std::iter::once(&self.word).chain(self.heard.values())
     }

@@ -51,7 +51,7 @@ pub struct State {
     pub zones: Vec<String>,
     /// The person or program whose orders it takes; empty while nobody holds it.
     pub holder: String,
-    /// Who asks the holder for it; empty if nobody does.
+    /// The person or program that asks the holder for it; empty if nobody does.
     pub asked_by: String,
     /// Its right to go first where there is room for one.
     pub right: Right,

@@ -7,16 +7,20 @@ use std::fs::{self, File};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use anyhow::{Context as _, ensure};
 use clap::{Args, ValueEnum};
-use serde_json::json;
+use serde_json::{Value, json};
 use skein_sim::cli::{Exit, Network, Setup};
+use skein_sim::fly::vehicle_name;
 use skein_sim::processes::Processes;
 use skein_sim::scenario::{Overrides, Scenario};
 
+use super::load::{Beat, DeepScripts, Garbage};
 use crate::operator::Operator;
 use crate::quantile::quantile;
 use crate::task::Task;
@@ -24,20 +28,33 @@ use crate::task::Task;
 /// Between two orders, a time that is no multiple of any period in the system.
 const PAUSE: Duration = Duration::from_millis(137);
 
-#[derive(Args)]
+#[derive(Args, Clone, Copy)]
 pub struct Holds {
-    /// Size of the swarm.
-    #[arg(long, value_name = "N", default_value_t = 8)]
-    vehicles: usize,
+    #[command(flatten)]
+    pub swarm: Swarm,
     /// Times that it is held.
     #[arg(long, value_name = "N", default_value_t = 200)]
-    holds: usize,
+    pub holds: usize,
+    /// Beside it a second operator sends, without a pause, a script whose set nests `and` 46 deep.
+    #[arg(long)]
+    pub deep_script: bool,
+}
+
+/// A swarm whose vehicles have a process each, and the trouble that it is in.
+#[derive(Args, Clone, Copy)]
+pub struct Swarm {
+    /// Size of the swarm.
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    pub vehicles: usize,
     /// Keep all states on a file system of 1 MB that is full from then on; for root only.
     #[arg(long, value_name = "WHEN")]
-    full_disk: Option<Moment>,
+    pub full_disk: Option<Moment>,
+    /// One more member of the fleet sends 10 MB of garbage in each second, in place of what it said until then.
+    #[arg(long)]
+    pub garbage: bool,
     /// Use network ports so much further up, beside another swarm on this computer.
     #[arg(long, value_name = "N", default_value_t = 2000)]
-    port_offset: u16,
+    pub port_offset: u16,
 }
 
 /// When the disk becomes full.
@@ -55,49 +72,94 @@ impl Task for Holds {
         "From an operator's Hold to the last vehicle's acknowledgement, each in a process of its own";
 
     fn run(&self, as_json: bool) -> anyhow::Result<Exit> {
-        let Self { vehicles, holds, full_disk, port_offset } = *self;
-        let mut times_ms = measure(vehicles, holds, full_disk, port_offset)?;
+        let Measured { mut times_ms, beside } = self.measure()?;
         times_ms.sort_by(f64::total_cmp);
         let [p50, p99, max] = [0.5, 0.99, 1.0].map(|share| quantile(&times_ms, share));
+        let (vehicles, holds) = (self.swarm.vehicles, times_ms.len());
+        let garbage_mb = beside.garbage as f64 / 1e6;
         if as_json {
             let ack_ms = json!({ "p50": p50, "p99": p99, "max": max });
-            println!("{}", json!({ "vehicles": vehicles, "holds": times_ms.len(), "ack_ms": ack_ms }));
+            let scripts = beside.scripts_refused;
+            println!(
+                "{}",
+                json!({
+                    "vehicles": vehicles, "holds": holds, "ack_ms": ack_ms,
+                    "garbage_mb": garbage_mb, "scripts_refused": scripts,
+                })
+            );
         } else {
             println!(
-                "Hold to the last of {vehicles} acknowledgements, {} times: median {p50:.1} ms, p99 {p99:.1} ms, longest {max:.1} ms",
-                times_ms.len()
+                "Hold to the last of {vehicles} acknowledgements, {holds} times: median {p50:.1} ms, p99 {p99:.1} ms, \
+                 longest {max:.1} ms"
             );
+            if self.swarm.garbage {
+                println!("{garbage_mb:.0} MB of garbage were sent meanwhile");
+            }
+            if self.deep_script {
+                println!("{} deep scripts were refused meanwhile", beside.scripts_refused);
+            }
         }
         Ok(Exit::Done)
     }
 }
 
-/// Holds a swarm so often; the time of each hold in milliseconds, from the moment its order is sent.
-///
-/// # Errors
-/// The swarm does not start or fly, or a hold is lost or refused.
-pub fn measure(
-    vehicles: usize,
-    holds: usize,
-    full_disk: Option<Moment>,
-    port_offset: u16,
-) -> anyhow::Result<Vec<f64>> {
-    with_operator("hold", vehicles, full_disk, port_offset, move |operator| hold(operator, holds))
+/// Times of an operator's orders, and the load beside them.
+#[derive(Debug, Default)]
+pub struct Measured {
+    pub times_ms: Vec<f64>,
+    pub beside: Beside,
 }
 
-/// What an operator measures in a swarm whose vehicles have a process each, once they are all in the air.
+/// Load on a swarm while its operator measures.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Beside {
+    /// Bytes of garbage that a member sent.
+    pub garbage: u64,
+    /// Scripts that a second operator sent, and was refused.
+    pub scripts_refused: usize,
+}
+
+impl Holds {
+    /// Holds the swarm so often; the time of each hold in milliseconds, from the moment its order is sent.
+    ///
+    /// # Errors
+    /// The swarm does not start or fly, a hold is lost or refused, or a script that is too deep is not refused.
+    pub fn measure(self) -> anyhow::Result<Measured> {
+        let Self { swarm, holds, deep_script } = self;
+        let all = vehicles(swarm.vehicles);
+        let refused = Arc::new(AtomicUsize::new(0));
+        let counted = Arc::clone(&refused);
+        let mut measured = with_operator("hold", swarm, move |operator| {
+            let console = operator.console();
+            let load = deep_script.then(|| Beat::of(move || DeepScripts::new(console, &counted)));
+            let times = hold(operator, &all, holds);
+            load.map_or(Ok(()), Beat::end)?;
+            times
+        })?;
+        measured.beside.scripts_refused = refused.load(Ordering::Relaxed);
+        Ok(measured)
+    }
+}
+
+/// The first so many vehicles, as an order names them.
+fn vehicles(count: usize) -> Value {
+    (0..count).map(|index| vehicle_name(index).to_string()).collect()
+}
+
+/// Measurements of an operator in a swarm whose vehicles have a process each, once they are all in the air.
 ///
 /// # Errors
 /// The swarm does not start or fly, or those of `measure`.
 pub fn with_operator(
     what: &str,
-    vehicles: usize,
-    full_disk: Option<Moment>,
-    port_offset: u16,
+    swarm: Swarm,
     measure: impl FnOnce(&mut Operator) -> anyhow::Result<Vec<f64>> + Send + 'static,
-) -> anyhow::Result<Vec<f64>> {
-    let overrides = Overrides { vehicles: Some(vehicles), ..Overrides::default() };
-    // Nobody sets out there before everybody is in the air.
+) -> anyhow::Result<Measured> {
+    let Swarm { vehicles, full_disk, garbage, port_offset } = swarm;
+    // An even number, for the reason below.
+    let members = if garbage { (vehicles + 1).next_multiple_of(2) } else { vehicles };
+    let overrides = Overrides { vehicles: Some(members), ..Overrides::default() };
+    // Where each goal is another's start nobody sets out before everybody is in the air.
     let scenario = Scenario::open("antipodal", &overrides, 1)?;
     let folder =
         std::env::temp_dir().join(format!("skein-bench-{what}-{}-{port_offset}", std::process::id()));
@@ -113,36 +175,45 @@ pub fn with_operator(
     let (go_on, goes_on) = channel();
     let operator = std::thread::spawn(move || {
         let mut operator = Operator::connect(console)?;
-        operator.await_armed(vehicles)?;
+        operator.await_armed(members)?;
         // Whoever measures is there as long as this thread.
         let _ = in_the_air.send(());
         let _ = goes_on.recv();
         measure(&mut operator)
     });
+    let sent = Arc::new(AtomicU64::new(0));
+    let mut load = None;
     while !operator.is_finished() {
         swarm.step();
         if are_in_the_air.try_recv().is_ok() {
             fill()?;
+            if garbage {
+                // From now on the last vehicle is not itself.
+                swarm.kill(&vehicle_name(members - 1))?;
+                let member = Garbage::join(&folder, members - 1, &sent)?;
+                load = Some(Beat::of(move || Ok(member)));
+            }
             let _ = go_on.send(());
         }
     }
     let measured = operator.join().map_err(|_| anyhow::anyhow!("the operator's thread has panicked"))?;
+    load.map_or(Ok(()), Beat::end)?;
     drop(swarm);
     drop(disk);
     // What is left there is of no use to anybody.
     let _ = fs::remove_dir_all(&folder);
-    measured
+    let beside = Beside { garbage: sent.load(Ordering::Relaxed), scripts_refused: 0 };
+    Ok(Measured { times_ms: measured?, beside })
 }
 
 /// Times each hold in milliseconds.
-fn hold(operator: &mut Operator, holds: usize) -> anyhow::Result<Vec<f64>> {
-    let all = json!("all");
+fn hold(operator: &mut Operator, all: &Value, holds: usize) -> anyhow::Result<Vec<f64>> {
     let mut times_ms = Vec::new();
     for _ in 0..holds {
-        times_ms.push(operator.order("hold", &all)?.as_secs_f64() * 1000.0);
+        times_ms.push(operator.order("hold", all)?.as_secs_f64() * 1000.0);
         // On hold, so that nobody arrives meanwhile.
         std::thread::sleep(PAUSE);
-        operator.order("resume", &all)?;
+        operator.order("resume", all)?;
     }
     Ok(times_ms)
 }

@@ -4,6 +4,7 @@ mod bp;
 mod fleet;
 pub mod hold;
 mod link;
+mod load;
 mod mesh;
 mod nav;
 pub mod plan;

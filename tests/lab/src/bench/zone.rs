@@ -9,7 +9,7 @@ use clap::Args;
 use serde_json::json;
 use skein_sim::cli::Exit;
 
-use super::hold::with_operator;
+use super::hold::{Swarm, with_operator};
 use crate::quantile::quantile;
 use crate::task::Task;
 
@@ -50,7 +50,8 @@ impl Task for Zones {
             }
             Ok(times_ms)
         };
-        let mut times_ms = with_operator("zone", vehicles, None, port_offset, measure)?;
+        let swarm = Swarm { vehicles, full_disk: None, garbage: false, port_offset };
+        let mut times_ms = with_operator("zone", swarm, measure)?.times_ms;
         times_ms.sort_by(f64::total_cmp);
         let [p50, p99, max] = [0.5, 0.99, 1.0].map(|share| quantile(&times_ms, share));
         if as_json {

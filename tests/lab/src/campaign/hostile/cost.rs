@@ -14,7 +14,7 @@ const PER_MESSAGE: usize = 512;
 /// Ticks of 20 ms.
 const TICKS_PER_SECOND: usize = 50;
 /// Sets looked at in a tick while one member's messages are taken in. What is read in a tick has some 4000 sets, each of
-/// which is looked at some twenty times; one comparison takes 16384.
+/// which is looked at some twenty times, and up to 16 times as often where it is compared with what is kept.
 #[cfg(feature = "mutants")]
 const SETS_PER_TICK: usize = 1 << 17;
 

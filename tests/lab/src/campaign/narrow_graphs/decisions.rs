@@ -48,7 +48,7 @@ impl<T: Clone + Eq + Hash> Kept<T> {
     }
 }
 
-/// What a b-thread states in one of its states.
+/// The bid of a b-thread in one of its states.
 #[derive(Clone, Debug)]
 pub struct Stated {
     bid: Bid,

@@ -209,7 +209,7 @@ impl std::fmt::Display for Case {
     }
 }
 
-/// Where so many vehicles may be at once.
+/// All places where so many vehicles may be at once.
 fn seatings(graph: &Graph, vehicles: usize) -> Vec<Vec<Place>> {
     (0..vehicles).fold(vec![Vec::new()], |seated, _| {
         let more = seated.iter().flat_map(|seats| {

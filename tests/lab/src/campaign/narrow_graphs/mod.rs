@@ -38,7 +38,7 @@ pub struct NarrowGraphs {
     /// Cases in random graphs of six places, beside them.
     #[arg(long, value_name = "N", default_value_t = 0)]
     random: usize,
-    /// What the order of cases and the random ones come from.
+    /// The order of cases and the random ones come from it.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Cases at most, in an order by chance; all unless given.

@@ -57,7 +57,7 @@ struct Vehicle {
     claim: u32,
     /// It has told of a stretch that is not behind it.
     told: Option<u32>,
-    /// Whom it makes way for, and the narrow place where or before which it was in the way.
+    /// The one that it makes way for, and the narrow place where or before which it was in the way.
     aside: Option<(usize, Place)>,
 }
 
@@ -306,7 +306,7 @@ impl<'a, R: Rule> Model<'a, R> {
         Ok(moves)
     }
 
-    /// What one home hears of the others.
+    /// One home hears of the others.
     fn news(&mut self, state: &State, home: usize, moves: &mut Moves) {
         let fleet = self.names.len();
         for of in (0..fleet).filter(|of| *of != home) {
@@ -334,7 +334,7 @@ impl<'a, R: Rule> Model<'a, R> {
         }
     }
 
-    /// What a vehicle finds out about its own claim, and the passing of time.
+    /// A vehicle finds out about its own claim, and time passes.
     fn facts(&mut self, state: &State, vehicle: usize, moves: &mut Moves) {
         let (fleet, me) = (self.names.len(), self.names[vehicle].clone());
         let mut facts = Vec::new();
