@@ -34,7 +34,7 @@ pub mod pipeline;
 pub mod positioning;
 pub mod precedence;
 mod preflight;
-mod rank;
+pub mod rank;
 mod refuge;
 mod report;
 mod reroute;

@@ -90,6 +90,11 @@ impl Stretch {
         Self { places: self.places.iter().chain(more).copied().collect(), here: self.here }
     }
 
+    /// The number of its places.
+    pub fn len(&self) -> usize {
+        self.places.len()
+    }
+
     /// Whether it is more than where the vehicle is.
     pub fn is_entered(&self) -> bool {
         !self.places.is_empty()

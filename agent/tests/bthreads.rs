@@ -915,6 +915,27 @@ mod right_of_way {
     }
 
     #[test]
+    fn another_that_goes_first_and_was_not_known_to_be_inside_is_let_out() {
+        let way = "6 0 2 90; 6 1 2 90";
+        let mut vehicle = inside();
+        vehicle.hears(announced_from(way, LOWER, "6 0 2 90"));
+        assert!(!vehicle.may(Advance::NAME) && keeps_from(&vehicle, 6.0), "it lets go when it stands");
+        vehicle.after(2 * SECOND);
+        assert!(!keeps_from(&vehicle, 6.0) && !vehicle.may(Advance::NAME));
+        let mut vehicle = inside();
+        vehicle.hears(announced_from("6 9 2 90", LOWER, "6 9 2 90"));
+        vehicle.hears(announced_from("7 0 2 0", LOWER, "7 0 2 0"));
+        assert!(vehicle.may(Advance::NAME), "elsewhere, or the same way");
+        let way = "5 0 2 0; 6 0 2 0; 7 0 2 0";
+        vehicle.hears(announced_from(way, ME, "5 0 2 0"));
+        vehicle.hears(announced_from("7 0 2 180", HIGHER, "7 0 2 180"));
+        assert!(keeps_from(&vehicle, 6.0) && vehicle.may(Advance::NAME), "that one does not go first");
+        vehicle.hears(announced_from("7 0 2 180", LOWER, "7 0 2 180"));
+        vehicle.after(2 * SECOND);
+        assert!(!keeps_from(&vehicle, 7.0) && keeps_from(&vehicle, 5.0), "but where it is");
+    }
+
+    #[test]
     fn who_is_inside_gives_in_to_others_inside_only() {
         let way = "7 0 2 0; 8 0 2 0; 9 0 2 0";
         let mut vehicle = stopped(announced_from(way, ME, "7.2 0 2 0"));

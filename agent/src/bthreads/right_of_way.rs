@@ -316,6 +316,20 @@ impl RightOfWay {
         })
     }
 
+    /// Its phase, if it keeps nobody in. Who has entered what another is in, that goes before it and came there without
+    /// having been asked, stands and lets go all but where it is: else neither gets on.
+    fn let_out(&self, phase: Phase, now: Duration) -> Phase {
+        let keeps_in = |(node, told): (&String, &Told)| {
+            goes_before((node, told.right), (self.me.name(), self.right()))
+                && self.held.leads_against(&told.stretch.here(), &self.me)
+        };
+        if phase == Phase::Clear && self.held.is_entered() && self.told.iter().any(keeps_in) {
+            Phase::Entering { next: self.ahead.len(), until: now + STOPS_WITHIN }
+        } else {
+            phase
+        }
+    }
+
     /// Its change as a whole: what is ahead, whether it is made way for, whether it is out.
     fn hear(&mut self, event: &Event, now: Duration) -> Option<Phase> {
         if let Some(phase) = self.hear_other(event, now) {
@@ -351,6 +365,42 @@ impl RightOfWay {
                 Some(if claims { self.go_on(now) } else { self.phase.clone() })
             }
             _ => None,
+        }
+    }
+
+    /// Its next phase by what happens to its claim.
+    fn go_through(&mut self, event: &Event, now: Duration) -> Phase {
+        let confirmed = Confirmed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
+        let lapsed = BlockLapsed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
+        match (self.phase.clone(), self.me.verb(event)) {
+            (Phase::Claiming { .. }, _) if confirmed => {
+                self.looked = 0;
+                let is_inside = self.right() != Right::Free;
+                self.enter_from(0, now + if is_inside { INSISTS_INSIDE_FOR } else { INSISTS_FOR })
+            }
+            (Phase::Entering { next, until }, Some(Enter::NAME)) => self.enter_from(next + 1, until),
+            (Phase::Entering { .. }, _) if lapsed => {
+                self.keep_entered();
+                self.claim_now(now)
+            }
+            (Phase::Claiming { .. }, None) => self.look_elsewhere(now),
+            (Phase::GivingUp { .. }, Some(Land::NAME)) => Phase::Clear,
+            (Phase::LookingElsewhere, Some(Plan::NAME)) => self.claim_now(now),
+            (Phase::Entering { .. }, None) => self.give_in(now),
+            (Phase::GivingWay, Some(GiveWay::NAME)) => {
+                self.held = self.ahead.here();
+                Phase::Yielding { until: now + PATIENCE }
+            }
+            (Phase::Entering { next, until }, _) => match Stalled::read(event) {
+                Some(stalled) => self.stand_against(&stalled, (next, until), now),
+                None => Phase::Entering { next, until },
+            },
+            (Phase::Yielding { until }, None) if self.met <= until => {
+                self.met = Duration::ZERO;
+                self.claim_now(now)
+            }
+            (Phase::Yielding { .. }, None) => self.go_on(now),
+            (phase, _) => phase,
         }
     }
 }
@@ -394,41 +444,8 @@ impl BThread for RightOfWay {
 
     fn resume(&mut self, event: &Event, cx: &mut Context) {
         let now = cx.now();
-        if let Some(phase) = self.hear(event, now) {
-            self.phase = phase;
-            return;
-        }
-        let confirmed = Confirmed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
-        let lapsed = BlockLapsed::read(event).is_some_and(|fact| &*fact.bthread == NAME);
-        self.phase = match (self.phase.clone(), self.me.verb(event)) {
-            (Phase::Claiming { .. }, _) if confirmed => {
-                self.looked = 0;
-                let is_inside = self.right() != Right::Free;
-                self.enter_from(0, now + if is_inside { INSISTS_INSIDE_FOR } else { INSISTS_FOR })
-            }
-            (Phase::Entering { next, until }, Some(Enter::NAME)) => self.enter_from(next + 1, until),
-            (Phase::Entering { .. }, _) if lapsed => {
-                self.keep_entered();
-                self.claim_now(now)
-            }
-            (Phase::Claiming { .. }, None) => self.look_elsewhere(now),
-            (Phase::GivingUp { .. }, Some(Land::NAME)) => Phase::Clear,
-            (Phase::LookingElsewhere, Some(Plan::NAME)) => self.claim_now(now),
-            (Phase::Entering { .. }, None) => self.give_in(now),
-            (Phase::GivingWay, Some(GiveWay::NAME)) => {
-                self.held = self.ahead.here();
-                Phase::Yielding { until: now + PATIENCE }
-            }
-            (Phase::Entering { next, until }, _) => match Stalled::read(event) {
-                Some(stalled) => self.stand_against(&stalled, (next, until), now),
-                None => Phase::Entering { next, until },
-            },
-            (Phase::Yielding { until }, None) if self.met <= until => {
-                self.met = Duration::ZERO;
-                self.claim_now(now)
-            }
-            (Phase::Yielding { .. }, None) => self.go_on(now),
-            (phase, _) => phase,
-        };
+        let heard = self.hear(event, now);
+        let phase = heard.unwrap_or_else(|| self.go_through(event, now));
+        self.phase = self.let_out(phase, now);
     }
 }
