@@ -118,8 +118,7 @@ mod tests {
     use std::time::Duration;
 
     use nalgebra::Vector3;
-    use skein_bp::Event;
-    use skein_dbp::Origin;
+    use skein_bp::{Event, Origin};
     use skein_wire::event::Text;
 
     use super::*;

@@ -8,11 +8,13 @@ use skein_agent::AgentCore;
 use skein_bp::behaviour::Behaviours;
 use skein_world::sdf::Entry;
 use skein_world::{Account, Scene};
+use toml::Spanned;
+use toml::de::{DeString, DeTable, DeValue};
 
 use crate::element::{Element, Verdict};
 use crate::fly::agent_configs;
 use crate::mission::{self, MissionSet};
-use crate::scenario::{Overrides, Scenario, ScenarioError, read_world};
+use crate::scenario::{Named, Overrides, Scenario, ScenarioError, read_world};
 
 /// The findings in a sound file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -39,23 +41,25 @@ impl fmt::Display for Findings {
 /// Reads a file as what its extension says it is: a world (`.sdf`, `.world`, `.csv`, `.obj`, `.pcd`, `.ply`),
 /// a mission (`.plan`, `.waypoints`, `.kml`, `.geojson`, `.json`), or else a scenario, with what `allowed` lifts.
 pub fn check(file: &Path, allowed: &Overrides, known: &Behaviours) -> Result<Findings, ScenarioError> {
-    let mut elements = mission_elements(file, allowed);
-    let (kind, holds, warnings) = match extension(file).as_deref() {
-        Some("sdf" | "world" | "csv" | "obj" | "pcd" | "ply") => {
+    let elements;
+    let (kind, holds, warnings) = match () {
+        () if is_world(file) => {
             let read = read_world(file, allowed.without_missing)?;
             elements = world_elements(&read.account);
             ("world", world(&read.scene), read.notes())
         }
-        Some("plan" | "waypoints" | "mission" | "txt" | "json" | "geojson" | "kml") => {
+        () if is_mission(file) => {
+            elements = mission_elements(file, allowed);
             let set = mission::read_files(&[file.to_owned()], None, allowed.allowances)?;
             ("mission", missions(&set), notes(file, &set, allowed, known)?)
         }
-        _ => {
+        () => {
             let scenario = Scenario::open_with(&file.to_string_lossy(), allowed, 1, known)?;
             if !allowed.thin_solids {
                 scenario.check_thin_solids()?;
             }
             check_scripts(&scenario)?;
+            elements = scenario_elements(file, allowed, None);
             let vehicles = counted(scenario.vehicles.len(), "vehicle");
             let holds = format!("{vehicles}, {}", world(&scenario.scene));
             ("scenario", holds, scenario.notes)
@@ -64,22 +68,79 @@ pub fn check(file: &Path, allowed: &Overrides, known: &Behaviours) -> Result<Fin
     Ok(Findings { file: file.display().to_string(), kind, holds, warnings, elements })
 }
 
-/// What becomes of each element of a file that is not sound, for this reason; none of one that is too broken to have any.
+/// The fate of each element of a file that is not sound, for this reason; none of one that is too broken to have any.
 pub fn elements(file: &Path, allowed: &Overrides, error: &ScenarioError) -> Vec<Element> {
-    match error {
-        ScenarioError::Lacking(lacking) => world_elements(&lacking.0),
-        _ => mission_elements(file, allowed),
+    match (is_mission(file), error) {
+        (true, _) => mission_elements(file, allowed),
+        (false, ScenarioError::Lacking(lacking)) if is_world(file) => world_elements(&lacking.0),
+        _ if is_world(file) => Vec::new(),
+        _ => scenario_elements(file, allowed, Some(error)),
     }
 }
 
-fn mission_elements(file: &Path, allowed: &Overrides) -> Vec<Element> {
-    if !matches!(
+fn is_world(file: &Path) -> bool {
+    matches!(extension(file).as_deref(), Some("sdf" | "world" | "csv" | "obj" | "pcd" | "ply"))
+}
+
+fn is_mission(file: &Path) -> bool {
+    matches!(
         extension(file).as_deref(),
         Some("plan" | "waypoints" | "mission" | "txt" | "json" | "geojson" | "kml")
-    ) {
-        return Vec::new();
-    }
+    )
+}
+
+fn mission_elements(file: &Path, allowed: &Overrides) -> Vec<Element> {
     mission::account_of(file, None, allowed.allowances).map(|account| account.elements).unwrap_or_default()
+}
+
+/// The fate of a scenario's own fields and tables, and of each element of the world and missions that it names.
+fn scenario_elements(file: &Path, allowed: &Overrides, fault: Option<&ScenarioError>) -> Vec<Element> {
+    let own = own_elements(file, fault);
+    let Named { world, missions } = Named::by(file);
+    let world = allowed.world.clone().or(world);
+    let of_world = match (&world, fault) {
+        (Some(_), Some(ScenarioError::Lacking(lacking))) => world_elements(&lacking.0),
+        (Some(path), _) => {
+            read_world(path, true).map(|read| world_elements(&read.account)).unwrap_or_default()
+        }
+        (None, _) => Vec::new(),
+    };
+    let missions = missions.iter().chain(&allowed.missions);
+    let of_missions = missions.flat_map(|path| {
+        let here = |element| Element { file: Some(path.display().to_string()), ..element };
+        mission_elements(path, allowed).into_iter().map(here)
+    });
+    own.into_iter().chain(of_world).chain(of_missions).collect()
+}
+
+/// The fields and tables at the top of a scenario's file. What it may not say is refused by the reader; the rest is
+/// honoured.
+fn own_elements(file: &Path, fault: Option<&ScenarioError>) -> Vec<Element> {
+    let Ok(text) = std::fs::read_to_string(file) else { return Vec::new() };
+    let Ok(table) = DeTable::parse(&text) else { return Vec::new() };
+    let (faulty, message) = match fault {
+        Some(
+            ScenarioError::Malformed { field, message, .. }
+            | ScenarioError::Contradiction { field, message, .. },
+        ) => (field.split(['.', '[']).next().unwrap_or_default(), message.as_str()),
+        _ => ("", ""),
+    };
+    let element = |(name, value): (&Spanned<DeString<'_>>, &Spanned<DeValue<'_>>)| {
+        let what = name.get_ref().to_string();
+        let is_at_fault = !faulty.is_empty() && what == faulty;
+        let tables = value.get_ref().as_array().filter(|all| all.iter().all(|one| one.get_ref().is_table()));
+        Element {
+            file: None,
+            line: text[..name.span().start].matches('\n').count() + 1,
+            verdict: if is_at_fault { Verdict::Refused } else { Verdict::Honoured },
+            why: if is_at_fault { message.to_owned() } else { String::new() },
+            count: tables.map_or(1, |tables| tables.len().max(1)),
+            what,
+        }
+    };
+    let mut elements: Vec<_> = table.get_ref().iter().map(element).collect();
+    elements.sort_by_key(|element| element.line);
+    elements
 }
 
 fn extension(file: &Path) -> Option<String> {

@@ -227,3 +227,47 @@ fn what_is_rehearsed_comes_as_one_object_and_a_wrong_field_is_named() {
     }
     assert_refused(&["rehearse", "nowhere.json"], &["nowhere.json"]);
 }
+
+#[test]
+fn a_scenario_s_check_lists_its_own_tables_and_each_element_of_the_files_that_it_names() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let tree = "<include><uri>model://pine_tree</uri></include>\n";
+    let wall = "<model name='wall'><static>true</static><pose>0 30 1 0 0 0</pose><link name='l'><collision name='c'>\
+                <geometry><box><size>4 1 2</size></box></geometry></collision></link></model>\n";
+    let world_of = |more: &str| format!("<sdf version='1.6'><world name='w'>\n{wall}{more}</world></sdf>");
+    let world = write(folder.path(), "yard.world", &world_of(""));
+    let plan = r#"{"type":"FeatureCollection","features":[{"type":"Feature","properties":{"altitudeMode":"relativeToGround"},"geometry":
+        {"type":"LineString","coordinates":[[8.0,47.0,5.0],[8.0002,47.0,5.0]]}}]}"#;
+    let mission = write(folder.path(), "way.geojson", plan);
+    let text =
+        "name = \"yard\"\nworld = \"yard.world\"\nmission = [\"way.geojson\"]\ncruise_speed_m_s = 2.0\n";
+    let scenario = write(folder.path(), "yard.toml", text);
+    let checked = |code: i32| -> Vec<(String, String, u64)> {
+        let output = skein_sim(&["check", &scenario, "--json"]);
+        let said: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        let told = |element: &serde_json::Value| {
+            let word = |field: &str| element[field].as_str().unwrap_or_default().to_owned();
+            let file = word("file").rsplit('/').next().unwrap_or_default().to_owned();
+            (format!("{file} {}", word("what")), word("verdict"), element["line"].as_u64().unwrap_or(0))
+        };
+        said["elements"].as_array().expect("the elements").iter().map(told).collect()
+    };
+    let elements = checked(0);
+    let is_there = |elements: &[(String, String, u64)], what: &str, verdict: &str, line: u64| {
+        elements
+            .iter()
+            .any(|element| element.0.starts_with(what) && element.1 == verdict && element.2 == line)
+    };
+    assert!(is_there(&elements, " cruise_speed_m_s", "honoured", 4), "{elements:?}");
+    assert!(is_there(&elements, "yard.world", "honoured", 2), "{elements:?}");
+    assert!(elements.iter().any(|element| element.0.starts_with("way.geojson")), "{elements:?}");
+    // What is missing in its world refuses the scenario, and its line says so.
+    write(folder.path(), "yard.world", &world_of(tree));
+    assert!(is_there(&checked(1), "yard.world", "refused", 3));
+    // A field at fault is named.
+    write(folder.path(), "yard.world", &world_of(""));
+    write(folder.path(), "yard.toml", &text.replace("cruise_speed_m_s = 2.0", "cruise_speed_m_s = -2.0"));
+    assert!(is_there(&checked(1), " cruise_speed_m_s", "refused", 4));
+    let _ = (world, mission);
+}

@@ -60,7 +60,15 @@ state: string, value: string, advice: string, };
 /**
  * A message of a browser.
  */
-export type ClientMessage = { "type": "hello", tag: string | null, name: string, } | { "type": "order" } & OrderMessage | { "type": "draw", tag: string | null, zone: ZoneTable, } | { "type": "erase", tag: string | null, name: string, } | { "type": "replay" } & ReplayMessage | { "type": "why", vehicle: string | null, } | { "type": "read_script", tag: string | null, file: string, text: string, } | { "type": "plan", tag: string | null, to: To, targets: Array<[number, number, number]>, };
+export type ClientMessage = { "type": "hello", tag: string | null, name: string, } | { "type": "order" } & OrderMessage | { "type": "draw", tag: string | null, zone: ZoneTable, } | { "type": "erase", tag: string | null, name: string, } | { "type": "replay" } & ReplayMessage | { "type": "why", vehicle: string | null, } | { "type": "read_script", tag: string | null, file: string, text: string, } | { "type": "plan", tag: string | null, to: To, targets: Array<[number, number, number]>, } | { "type": "rehearse", tag: string | null,
+/**
+ * Points (ENU, metres) by vehicle.
+ */
+routes: Record<string, [number, number, number][]>,
+/**
+ * It is flown so often, with other gusts and errors each time: 1 to 10.
+ */
+flights?: number, };
 
 /**
  * A route's cost, and what it is made of before that is weighed.
@@ -111,6 +119,8 @@ choice: string | null, };
 
 export type EventView = { time_s: number, home: string, seq: number, name: string, data: Record<string, unknown>, requested_by: Array<string>, blocked_by: Array<string>, };
 
+export type Failure = { why: string, seeds: number, };
+
 export type JourneyView = { vehicle: string,
 /**
  * The numbers of its targets, from 1.
@@ -138,6 +148,18 @@ export type Method = "swarm" | "lattice";
 
 export type MissionView = "under_way" | "complete" | "failed";
 
+/**
+ * Two vehicles at the moment at which they are nearest.
+ */
+export type Nearness = { who: [string, string],
+/**
+ * Centre to centre.
+ */
+distance_m: number, at_s: number, seed: number, };
+
+/**
+ * Something that stands in the world: its form, and where its middle is (ENU, metres; a quaternion x, y, z, w).
+ */
 export type Obstacle = { position: [number, number, number], orientation: [number, number, number, number], } & ({ "form": "box", size: [number, number, number], } | { "form": "cylinder", radius: number, height: number, } | { "form": "sphere", radius: number, });
 
 export type OrderMessage = { tag?: string, what: What, to: To, point?: [number, number, number | null],
@@ -167,7 +189,74 @@ export type OrderView = { id: number, by: string, what: string, script: string |
 export type OutcomeView = { succeeded: boolean, failed: { [key in string]: string }, };
 
 /**
- * How a recording is to go on.
+ * The end of a vehicle's flights.
+ */
+export type Played = { vehicle: string,
+/**
+ * With how many seeds it arrives.
+ */
+arrives: number,
+/**
+ * When it has landed, wherever.
+ */
+lands_s?: Range,
+/**
+ * Share of its battery's energy that is left then, 0 to 1.
+ */
+battery?: Range,
+/**
+ * Its waits, and how long they last with each seed on average, the longest first.
+ */
+waits: Array<Wait>,
+/**
+ * Why it does not arrive, and with how many seeds.
+ */
+fails: Array<Failure>, };
+
+/**
+ * The least and the greatest of some numbers, and their mean.
+ */
+export type Range = { least: number, mean: number, most: number, };
+
+/**
+ * The outcome of a rehearsal. Times are seconds since the vehicles in the air set out, or since the beginning if none is.
+ */
+export type Rehearsed = {
+/**
+ * The seeds that it was flown with.
+ */
+seeds: number[],
+/**
+ * With every seed every vehicle arrives that is not held, and nothing collides.
+ */
+succeeded: boolean, vehicles: Array<Played>,
+/**
+ * When the last has landed, of those seeds with which all ended in time.
+ */
+ends_s?: Range,
+/**
+ * The pairs of vehicles that come nearest to one another in the air, the nearest first; of each pair one moment.
+ */
+nearest: Array<Nearness>,
+/**
+ * The least distance from a hull to an obstacle; none where there are none.
+ */
+clearance_m?: number,
+/**
+ * Collisions with obstacles and between vehicles, with all seeds.
+ */
+collisions: [number, number],
+/**
+ * Simulated time of all flights over the time that it took.
+ */
+realtime_factor: number,
+/**
+ * Notes on what was left out.
+ */
+notes: Array<string>, };
+
+/**
+ * A change in how a recording is played.
  */
 export type ReplayMessage = { tag?: string,
 /**
@@ -179,7 +268,7 @@ play?: boolean,
  */
 at_s?: number,
 /**
- * How many times as fast it is to play.
+ * The factor by which it is to play faster.
  */
 speed?: number, };
 
@@ -201,7 +290,7 @@ priority: number | null,
 blocked_by: Array<Blocker>, };
 
 /**
- * What a person or program may do at the console.
+ * The rights of a person or program at the console.
  */
 export type Role = "observer" | "safety" | "operator";
 
@@ -260,9 +349,9 @@ left_out: { [key in string]: string },
  */
 arrival_s: number, cost_m: number,
 /**
- * Who would come too near to whom: a plan with any is not to be sent.
+ * The pairs that would come too near: a plan with any is not to be sent.
  */
-encounters: Array<Encounter>, } | { "type": "mapped", tag: string | null, name: string, } | { "type": "replayed", tag: string | null, } | { "type": "script", tag: string | null, script: unknown, } | { "type": "error", tag: string | null, message: string, };
+encounters: Array<Encounter>, } | { "type": "rehearsed", tag: string | null, rehearsed: Rehearsed, left_out: Record<string, string>, } | { "type": "mapped", tag: string | null, name: string, } | { "type": "replayed", tag: string | null, } | { "type": "script", tag: string | null, script: unknown, } | { "type": "error", tag: string | null, message: string, };
 
 /**
  * Where a vehicle is and what it does.
@@ -307,11 +396,11 @@ export type StateView = { position: [number, number, number], velocity: [number,
  */
 zones: Array<string>,
 /**
- * Whose orders it takes; empty while nobody holds it.
+ * The person or program whose orders it takes; empty while nobody holds it.
  */
 holder: string,
 /**
- * Who asks the holder for it; empty if nobody does.
+ * The person or program that asks the holder for it; empty if nobody does.
  */
 asked_by: string, };
 
@@ -321,7 +410,17 @@ export type VehicleView = { name: string, heard: boolean, link: LinkView, notes:
 /**
  * Its checks before take-off.
  */
-checks: Array<CheckView>, };
+checks: Array<CheckView>,
+/**
+ * The points that it still has to fly, as far as it has told (ENU, metres).
+ */
+way: Array<[number, number, number]>, };
+
+export type Wait = {
+/**
+ * As the vehicle says it.
+ */
+waits_for: string, mean_s: number, };
 
 export type ZoneView = { zone: ZoneTable, by: string, time_s: number,
 /**

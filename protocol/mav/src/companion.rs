@@ -16,11 +16,12 @@ use mavlink::dialects::common::{
 };
 use mavlink::{MavlinkVersion, Message};
 
+use crate::address::Address;
 use crate::command::{Command, CommandResult};
 use crate::dialect::Dialect;
 use crate::event::MavEvent;
 use crate::external::External;
-use crate::frame::{Address, Frame, FrameReader, FrameWriter};
+use crate::frame::{Frame, FrameReader, FrameWriter};
 use crate::geodesy::{Datum, LocalFrame};
 use crate::measured::Measured;
 use crate::mission::MissionItem;

@@ -23,10 +23,11 @@ use mavlink::dialects::common::{
 use mavlink::types::CharArray;
 use nalgebra::Vector3;
 
+use crate::address::Address;
 use crate::command::CommandResult;
 use crate::dialects::px4;
 use crate::external::External;
-use crate::frame::{Address, Frame, FrameReader, FrameWriter};
+use crate::frame::{Frame, FrameReader, FrameWriter};
 use crate::geodesy::{Datum, Geodetic, LocalFrame};
 use crate::measured::Measured;
 use crate::mission::MissionItem;

@@ -29,6 +29,7 @@
 // MAVLink marks messages and frames as superseded that deployed autopilots and ground stations still send.
 #![expect(deprecated)]
 
+mod address;
 pub mod axes;
 mod command;
 mod companion;
@@ -54,6 +55,7 @@ mod station;
 mod telemetry;
 mod unparsed;
 
+pub use address::Address;
 pub use command::{Command, CommandResult};
 pub use companion::{Companion, CompanionConfig};
 pub use dialect::Dialect;
@@ -65,7 +67,7 @@ pub use endpoint::{
 pub use event::MavEvent;
 pub use external::External;
 pub use failsafe::Failsafe;
-pub use frame::{Address, Frame, FrameReader, FrameWriter};
+pub use frame::{Frame, FrameReader, FrameWriter};
 pub use geodesy::{Datum, Geodetic, LocalFrame};
 pub use handling::Handling;
 pub use mavlink::dialects::common as messages;

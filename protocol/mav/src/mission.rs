@@ -14,7 +14,8 @@ use mavlink::dialects::common::{
 };
 use nalgebra::{Vector2, Vector3};
 
-use crate::frame::{Address, FrameWriter};
+use crate::address::Address;
+use crate::frame::FrameWriter;
 use crate::geodesy::{Datum, Geodetic};
 use crate::patience::{Patience, Retry, Turn};
 

@@ -10,7 +10,7 @@ use std::time::Duration;
 use mavlink::consts::v2;
 use sha2::{Digest as _, Sha256};
 
-use crate::frame::Address;
+use crate::address::Address;
 
 /// From 1970 to the beginning of 2015, from which timestamps count.
 const SINCE_1970: Duration = Duration::from_secs(1_420_070_400);

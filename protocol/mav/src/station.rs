@@ -2,7 +2,8 @@
 
 use mavlink::dialects::common::{MavCmd, MavMessage};
 
-use crate::frame::{Address, FrameReader};
+use crate::address::Address;
+use crate::frame::FrameReader;
 
 /// Hears what a station says to the autopilot of one vehicle.
 #[derive(Debug, Clone)]

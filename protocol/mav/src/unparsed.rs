@@ -1,6 +1,7 @@
 //! Messages with a command that the common dialect does not know, and which want an answer all the same.
 
-use crate::frame::{Address, FrameWriter, Unread};
+use crate::address::Address;
+use crate::frame::{FrameWriter, Unread};
 
 const COMMAND_INT: u32 = 75;
 const COMMAND_LONG: u32 = 76;

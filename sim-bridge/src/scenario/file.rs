@@ -34,7 +34,7 @@ use super::targets::Targets;
 use super::walker::Walker;
 use super::window::Window;
 use super::{
-    DEFAULT_TIME_LIMIT_S, Network, Overrides, ReadWorld, SEPARATION_HULLS, Scenario, ScenarioError,
+    DEFAULT_TIME_LIMIT_S, Named, Network, Overrides, ReadWorld, SEPARATION_HULLS, Scenario, ScenarioError,
     VehiclePlan, VehicleScript, check_count, read, read_world, stated_datum,
 };
 use crate::autopilots::make::Make;
@@ -304,12 +304,11 @@ impl ScenarioFile {
     ) -> Result<Scenario, ScenarioError> {
         self.check_tables()?;
         let name = self.name();
+        let named = self.named();
         let world =
-            self.table.world.as_deref().map(|path| read_world(&self.beside(path), allowed.without_missing));
-        let world = world.transpose()?;
+            named.world.as_deref().map(|path| read_world(path, allowed.without_missing)).transpose()?;
         let datum = world.as_ref().and_then(|world| stated_datum(&world.scene));
-        let paths: Vec<_> = self.table.mission.iter().map(|path| self.beside(path)).collect();
-        let set = mission::read_files(&paths, datum, allowed.allowances)?;
+        let set = mission::read_files(&named.missions, datum, allowed.allowances)?;
         let count = self.count(vehicles, set.missions.len());
         check_count(&name, count)?;
         let layout = self.generate(count, seed);
@@ -449,6 +448,15 @@ impl ScenarioFile {
     }
 
     /// Paths in a scenario are relative to its file.
+    /// The files of others that it names.
+    pub fn named(&self) -> Named {
+        let beside = |path: &PathBuf| self.beside(path);
+        Named {
+            world: self.table.world.as_ref().map(beside),
+            missions: self.table.mission.iter().map(beside).collect(),
+        }
+    }
+
     fn beside(&self, path: &Path) -> PathBuf {
         Path::new(&self.file).parent().unwrap_or(Path::new("")).join(path)
     }

@@ -647,6 +647,21 @@ fn check_count(scenario: &str, vehicles: usize) -> Result<(), ScenarioError> {
 }
 
 /// The text of a scenario file; `None` where the argument is a name and not a path.
+/// The files of others that a scenario's file names.
+#[derive(Debug, Default, Clone, PartialEq, Eq)]
+pub struct Named {
+    pub world: Option<PathBuf>,
+    pub missions: Vec<PathBuf>,
+}
+
+impl Named {
+    /// Those that the scenario file at `path` names; none if it cannot be read.
+    pub fn by(path: &Path) -> Self {
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        file::ScenarioFile::parse(&text, &path.to_string_lossy()).map(|file| file.named()).unwrap_or_default()
+    }
+}
+
 fn text_of(name: &str) -> Result<Option<String>, ScenarioError> {
     let path = Path::new(name);
     let names_a_file = path.extension().is_some() || path.components().count() > 1;

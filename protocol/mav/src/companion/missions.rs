@@ -6,8 +6,9 @@ use mavlink::dialects::common::{
     MISSION_REQUEST_DATA, MISSION_REQUEST_INT_DATA, MavMessage, MavMissionResult, MavMissionType,
 };
 
+use crate::address::Address;
 use crate::event::MavEvent;
-use crate::frame::{Address, FrameWriter};
+use crate::frame::FrameWriter;
 use crate::mission::{
     MAX_ITEMS, MissionError, MissionItem, MissionReceiver, MissionSender, is_mission, write_ack,
 };

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use mavlink::dialects::common::{PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA};
 
-use crate::frame::{Address, FrameWriter};
+use crate::address::Address;
+use crate::frame::FrameWriter;
 use crate::parameter::{ParameterEncoding, ParameterValue, name_from_wire, wire_name};
 use crate::patience::{Patience, Retry, Turn};
 

@@ -7,9 +7,9 @@ use mavlink::dialects::common::{COMMAND_INT_DATA, COMMAND_LONG_DATA, MavCmd, Mav
 use nalgebra::Vector3;
 
 use super::request::AutopilotCommand;
+use crate::address::Address;
 use crate::command::CommandResult;
 use crate::dialects::px4;
-use crate::frame::Address;
 use crate::geodesy::{Datum, Geodetic};
 use crate::mode::FlightMode;
 

@@ -8,7 +8,8 @@ use mavlink::dialects::common::{
     MavMissionResult, MavMissionType,
 };
 
-use crate::frame::{Address, FrameWriter};
+use crate::address::Address;
+use crate::frame::FrameWriter;
 use crate::mission::{MissionItem, MissionReceiver, is_mission, write_ack, write_count};
 
 /// The lists, and the transfer under way, if any: there is one at a time, so that nobody is told of a list

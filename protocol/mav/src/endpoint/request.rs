@@ -3,8 +3,8 @@
 use mavlink::dialects::common::MavCmd;
 use nalgebra::Vector3;
 
+use crate::address::Address;
 use crate::external::External;
-use crate::frame::Address;
 use crate::mode::FlightMode;
 use crate::set_point::SetPoint;
 

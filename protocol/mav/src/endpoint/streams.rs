@@ -10,7 +10,7 @@ use mavlink::dialects::common::{
     LOCAL_POSITION_NED_DATA, MISSION_CURRENT_DATA, OPTICAL_FLOW_RAD_DATA, SYS_STATUS_DATA, VFR_HUD_DATA,
 };
 
-use crate::frame::Address;
+use crate::address::Address;
 
 /// Shortest interval granted.
 const MIN_INTERVAL: Duration = Duration::from_millis(4);

@@ -8,8 +8,9 @@ use mavlink::dialects::common::{
 use nalgebra::Vector3;
 
 use super::Instruments;
+use crate::address::Address;
 use crate::axes;
-use crate::frame::{Address, FrameReader, FrameWriter};
+use crate::frame::{FrameReader, FrameWriter};
 use crate::geodesy::Datum;
 
 /// PX4's clock is never at 0.

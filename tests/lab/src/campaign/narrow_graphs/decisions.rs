@@ -52,7 +52,7 @@ impl<T: Clone + Eq + Hash> Kept<T> {
 #[derive(Clone, Debug)]
 pub struct Stated {
     bid: Bid,
-    /// What it requests and does not block itself.
+    /// Its request that it does not block itself.
     pub requests: Vec<u32>,
     /// All that it blocks of others.
     pub claim: u32,
