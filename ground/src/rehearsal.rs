@@ -357,7 +357,8 @@ mod tests {
     #[test]
     fn each_field_that_is_not_what_it_may_be_is_named() {
         assert_eq!(rehearsal().check(), Ok(()));
-        let cases: [(&str, fn(&mut Rehearsal)); 12] = [
+        type Spoils = fn(&mut Rehearsal);
+        let cases: [(&str, Spoils); 12] = [
             ("vehicles", |it| it.vehicles.clear()),
             ("seeds", |it| it.seeds.clear()),
             ("max_m", |it| it.max_m[2] = it.min_m[2]),

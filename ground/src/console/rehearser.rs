@@ -134,7 +134,8 @@ fn find(program: &Path) -> Option<PathBuf> {
     folders.map(|folder| folder.join(&named)).find(|candidate| candidate.is_file())
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use std::os::unix::fs::PermissionsExt as _;
 

@@ -161,7 +161,7 @@ impl<'a, R: Rule> Model<'a, R> {
         let vehicles = names.iter().enumerate().map(|(index, me)| {
             let others: Vec<_> = names.iter().filter(|other| *other != me).map(Me::name).collect();
             let mut number = self.decisions.state(rule(me, &others), me.name());
-            for other in others.iter().filter_map(|other| NodeName::new(*other).ok()) {
+            for other in others.iter().filter_map(|other| NodeName::new(other).ok()) {
                 let joined = self.decisions.number(PeerJoined { node: other, incarnation: 1 }.at(me.name()));
                 number = self.decisions.after(number, joined, me.name());
             }
