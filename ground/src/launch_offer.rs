@@ -18,7 +18,7 @@ const MOST_OFFERS: usize = 16;
 pub struct LaunchOffer {
     pub token: String,
     pub what: What,
-    /// Who has asked for it; nobody else can take it up.
+    /// The one who has asked for it; nobody else can take it up.
     pub by: Giver,
     /// Those that would take off, in this order.
     pub candidates: Vec<Candidate>,

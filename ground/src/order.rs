@@ -9,7 +9,7 @@ use skein_wire::{Destination, Order, SentScript};
 
 use crate::giver::Giver;
 
-/// How many states of a script are looked at before it is sent.
+/// The number of states of a script that are looked at before it is sent.
 const STATES_TRIED: usize = 20_000;
 
 /// Why a script is not sent.

@@ -25,7 +25,7 @@ pub struct Replay {
     recorded: Recorded,
     span: (Duration, Duration),
     at: Duration,
-    /// How many notes are played.
+    /// The number of notes that are played.
     played: usize,
     is_playing: bool,
     speed: f64,
@@ -195,7 +195,7 @@ pub struct Digest {
     pub from_s: f64,
     pub to_s: f64,
     pub vehicles: Vec<String>,
-    /// How many events happened.
+    /// The number of events that happened.
     pub events: usize,
     /// Whether every vehicle did what it was sent for; none if the mission was not over.
     pub succeeded: Option<bool>,

@@ -140,7 +140,7 @@ impl ZoneLog {
         self.revision
     }
 
-    /// What the station's next life is to take up.
+    /// The zones that the station's next life is to take up.
     pub(crate) fn kept(&self) -> Vec<KeptZone> {
         let kept = |record: &ZoneRecord| KeptZone { by: record.by.to_string(), zone: record.zone.clone() };
         self.standing().map(kept).collect()

@@ -19,7 +19,7 @@ pub struct Element {
     pub count: usize,
 }
 
-/// What becomes of an element.
+/// The fate of an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {

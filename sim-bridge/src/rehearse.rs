@@ -28,7 +28,7 @@ use crate::summary::Traffic;
 
 /// Vehicles in the air are told to go on so long after they are let go.
 const SETTLES: Duration = Duration::from_millis(100);
-/// Whoever has not set out so long after that does not.
+/// A vehicle that has not set out so long after that does not.
 const SETS_OUT: Duration = Duration::from_secs(5);
 /// The waits of vehicles are looked at so often.
 const LOOK: Duration = Duration::from_millis(200);

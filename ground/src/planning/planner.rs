@@ -93,7 +93,7 @@ fn routes(
     Some(Ok(journeys))
 }
 
-/// What the legs of one vehicle's journey have in common.
+/// The common part of the legs of one vehicle's journey.
 struct Legs<'a> {
     open: &'a Open,
     cost: RouteCost,

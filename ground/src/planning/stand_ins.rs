@@ -12,12 +12,12 @@ use skein_wire::event::{Arrived, Complete, Declared as _, Failed, Rerouted};
 /// A vehicle that has been silent for this long is not reckoned with any more.
 const LOST_AFTER: Duration = Duration::from_secs(5);
 
-/// What each vehicle still has to do, as far as it has told.
+/// The rest of each vehicle's task, as far as it has told.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Task {
     /// The places it is to be at, each with the number of its leg, in order (ENU, metres).
     stops: Vec<(usize, Vector3<f64>)>,
-    /// Who has sent it there.
+    /// The one who has sent it there.
     by: String,
 }
 
@@ -27,7 +27,7 @@ pub(crate) struct Orphaned {
     pub(crate) of: NodeName,
     /// ENU, metres.
     pub(crate) targets: Vec<Vector3<f64>>,
-    /// Who has sent it there.
+    /// The one who has sent it there.
     pub(crate) by: String,
 }
 

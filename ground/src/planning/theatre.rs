@@ -23,7 +23,7 @@ pub enum UnfitTheatre {
 }
 
 impl Theatre {
-    /// What stands in `airspace`, in a box (ENU, metres).
+    /// The obstacles of `airspace` in a box (ENU, metres).
     ///
     /// # Errors
     /// The box is none, or a number of `craft` is not what it must be.

@@ -324,7 +324,7 @@ impl EventSet {
         }
     }
 
-    /// How much of a set it is.
+    /// The extent of a set.
     pub fn extent(&self) -> Extent {
         match self {
             Self::Not(set) => Extent::around([set.extent()]),

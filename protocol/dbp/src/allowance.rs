@@ -1,4 +1,4 @@
-//! What one member may make happen here: so much at once, and so much more with time.
+//! The allowance of one member here: so much at once, and so much more with time.
 
 use std::time::Duration;
 

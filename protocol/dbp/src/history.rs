@@ -11,7 +11,7 @@ use crate::message::Occurrence;
 #[derive(Clone, Debug)]
 pub(crate) struct History {
     kept: VecDeque<Occurrence>,
-    /// What they weigh.
+    /// Their weight.
     bytes: usize,
     capacity: usize,
     latest_seq: u64,

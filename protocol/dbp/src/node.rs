@@ -65,7 +65,7 @@ pub struct Node {
     stats: NodeStats,
 }
 
-/// What one member has made a node do since the start, and keep at present.
+/// The work that one member has made for a node since the start, and the entries that it makes it keep at present.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Caused {
     /// Facts that were told to all.
@@ -299,7 +299,7 @@ impl Node {
         self.channel.peers.name(name.as_str())
     }
 
-    /// What a member has made this node do and keep.
+    /// The work that a member has made for this node, and the entries that it makes it keep.
     pub fn caused_by(&self, member: &NodeName) -> Caused {
         let telling = self.run.telling(member);
         let (entries, entry_bytes) = self.home.table.entries_of(member);

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use crate::name::NodeName;
 
 skein_bp::events! {
-    /// What an operator requests of any node.
+    /// An operator's requests of any node.
     pub const RULES;
 
     /// Lift a block that outlives its holder (G5).
     Lift = "lift", Operator {
-        /// Whose block it is.
+        /// The holder of the block.
         node: NodeName,
         bthread: Arc<str>,
     }

@@ -18,7 +18,7 @@ pub(crate) struct Patience {
     repeats: u8,
 }
 
-/// What to do now.
+/// The next step.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Turn {
     Wait,

@@ -122,7 +122,7 @@ pub struct Telemetry {
     pub position: Option<Stamped<Vector3<f64>>>,
     /// When that was measured, on the autopilot's clock.
     pub position_time: Option<Duration>,
-    /// How old it was when it arrived; `None` while it is not known where the autopilot's clock stands.
+    /// Its age when it arrived; `None` while it is not known where the autopilot's clock stands.
     pub position_age: Option<Duration>,
     /// Standard deviations of the position by its word, horizontal and vertical, m; `None` while it tells none.
     pub position_sigma_m: Option<Stamped<[f64; 2]>>,

@@ -13,7 +13,7 @@ const UNSUPPORTED: u8 = 3;
 /// Longest of the payloads that are looked at, in bytes.
 const LEN: usize = 38;
 
-/// What such a message wants.
+/// The wish of such a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Want {
     /// A command is to be done.

@@ -7,7 +7,7 @@ use skein_dbp::NodeName;
 
 use crate::key::Key;
 
-/// Whose messages they are; none for those whose sender has no queue of its own.
+/// The sender of the messages; none for those whose sender has no queue of its own.
 pub type Owner = Option<NodeName>;
 
 /// Messages in the order of their arrival, with a bound on those of each sender and on all together. Where there is no

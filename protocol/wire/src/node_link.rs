@@ -51,7 +51,7 @@ pub struct NodeLink {
     skewed: BTreeMap<NodeName, u32>,
     mailbox: Mailbox,
     shares: Shares,
-    /// What each member, and all others together, have sent.
+    /// The messages of each member, and of all others together.
     senders: BTreeMap<Owner, SenderStats>,
     has_met: bool,
     /// Whether there are other members, so that all others are strangers.
@@ -317,7 +317,7 @@ impl NodeLink {
         self.senders.entry(owner).or_default()
     }
 
-    /// What has come from each member, and, under no name, from all others together.
+    /// The messages from each member, and, under no name, from all others together.
     pub fn senders(&self) -> impl Iterator<Item = (Option<&NodeName>, SenderStats)> {
         self.senders.iter().map(|(owner, stats)| {
             let dropped = self.mailbox.dropped().get(owner).copied().unwrap_or(0);

@@ -15,7 +15,7 @@ const PER_BYTE_OF_BIDS: usize = 4;
 /// A share is for so long.
 const TICK_MS: u128 = 20;
 
-/// What is left of each sender's share.
+/// The rest of each sender's share.
 #[derive(Debug, Default)]
 pub(crate) struct Shares {
     left: BTreeMap<Option<NodeName>, Share>,

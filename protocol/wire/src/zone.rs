@@ -127,7 +127,7 @@ impl Zone {
         [self.from_s.unwrap_or(f64::NEG_INFINITY), self.until_s.unwrap_or(f64::INFINITY)]
     }
 
-    /// How many corners it has.
+    /// The number of its corners.
     pub fn corners(&self) -> usize {
         match &self.outline {
             Outline::Polygon(corners) => corners.len(),

@@ -58,7 +58,7 @@ impl Holder {
     }
 }
 
-/// What was done for a node.
+/// The work done for a node.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Issued {
     pub node: NodeName,

@@ -28,7 +28,7 @@ const DENIED: &str = " is unauthorized to Put (ingress) on ";
 
 static LINKS: Mutex<Links> = Mutex::new(Links::new());
 
-/// What is known of this process's links.
+/// The known state of this process's links.
 struct Links {
     roster: Option<(NodeName, Roster)>,
     /// The links, each by the address of its far end.
@@ -90,7 +90,7 @@ pub(crate) fn note_silent(heard: impl Fn(&NodeName) -> Option<Option<Duration>>)
     }
 }
 
-/// What there is to tell since the last call, each once.
+/// News since the last call, each once.
 pub fn take() -> Vec<String> {
     std::mem::take(&mut links().untold)
 }
@@ -174,7 +174,7 @@ fn after<'a>(text: &'a str, words: &str) -> Option<&'a str> {
     text.split_once(words).map(|(_, after)| after)
 }
 
-/// What rustls found wrong with the other end's certificate, in plain words.
+/// The fault that rustls found in the other end's certificate, in plain words.
 fn fault(cause: &str) -> String {
     let words = [
         (&["xpired"][..], "the other end's certificate has expired, or this computer's clock is wrong"),
@@ -194,7 +194,7 @@ fn fault(cause: &str) -> String {
     )
 }
 
-/// What the other end found wrong with this node's certificate.
+/// The fault that the other end found in this node's certificate.
 fn alert(cause: &str) -> String {
     let words = [
         (&["CertificateExpired", "expired"][..], "it has expired, or is not valid yet, by the clock there"),

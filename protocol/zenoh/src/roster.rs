@@ -1,4 +1,4 @@
-//! Who takes part in a secured network, by the names of their certificates.
+//! The members of a secured network, by the names of their certificates.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use skein_wire::NodeName;
 /// The serial number of a node's first certificate.
 pub const FIRST_SERIAL: u32 = 1;
 
-/// Who takes part, and the serial number of each one's certificate.
+/// The members, and the serial number of each one's certificate.
 ///
 /// A certificate's common name is `<node>;<serial>`, such as `uav/1;2`. One without a serial is the first, and
 /// `uav-1` counts as `uav/1`, for authorities that allow no `/`.

@@ -208,7 +208,7 @@ impl Host for Lockstep {
 struct Agents {
     configs: Vec<AgentConfig>,
     parts: Box<dyn Fn(&AgentConfig) -> Parts>,
-    /// What decides on board; the ground station has b-threads where they do.
+    /// The mind on board; the ground station has b-threads where they do.
     controller: cli::Controller,
 }
 

@@ -1,6 +1,6 @@
 //! `MAV_CMD`: what an item of a mission asks of a multirotor.
 
-/// What becomes of a command.
+/// The fate of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     Waypoint,

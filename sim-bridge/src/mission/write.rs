@@ -29,7 +29,7 @@ pub struct Surroundings<'a> {
     pub rally: &'a [Vector3<f64>],
 }
 
-/// What a plan cannot hold.
+/// Parts that a plan cannot hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum WriteError {
     #[error("a plan holds no terrain: expected an airspace without mountains and heights of the ground")]
@@ -45,7 +45,7 @@ pub enum WriteError {
 /// The text of a plan.
 ///
 /// # Errors
-/// What of the surroundings a plan cannot hold.
+/// Parts of the surroundings that a plan cannot hold.
 pub fn to_plan(mission: &Mission, around: &Surroundings<'_>) -> Result<String, WriteError> {
     if !around.airspace.mountains.is_empty() || around.airspace.heights.is_some() {
         return Err(WriteError::Terrain);

@@ -157,7 +157,7 @@ fn command(payload: &Payload) -> Option<PayloadCommand> {
     Some(PayloadCommand { command, params: payload.params })
 }
 
-/// How long a mission's legs and stays last, in seconds.
+/// The duration of a mission's legs and stays, in seconds.
 fn lasts_s(mission: &Mission, usual_m_s: f64) -> f64 {
     let places = std::iter::once(mission.home).chain(mission.waypoints.iter().map(|w| w.position));
     let legs = mission

@@ -9,7 +9,7 @@ pub trait Files {
     fn open(&self, uri: &str, from: &str) -> Found;
 }
 
-/// What there is under a name.
+/// The thing under a name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Found {
     /// Its content, and the name under which it calls for others.

@@ -86,7 +86,7 @@ pub(crate) struct FixErrors {
     lost: Lost,
 }
 
-/// What is lost now.
+/// The senses that are lost now.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Lost {
     pub(crate) fixes: bool,

@@ -134,7 +134,7 @@ impl Sensors {
         }
     }
 
-    /// What is lost now.
+    /// The senses that are lost now.
     pub(crate) fn lost(&self) -> Lost {
         self.errors.lost()
     }

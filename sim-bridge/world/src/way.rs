@@ -83,7 +83,7 @@ impl Way {
             .map_or_else(Vector3::zeros, |(leg, since_s)| leg.from + leg.velocity * since_s.min(leg.moves_s))
     }
 
-    /// How it moves then; world ENU, m/s.
+    /// Its velocity then; world ENU, m/s.
     pub fn velocity(&self, now: Duration) -> Vector3<f64> {
         let moving = self.leg(now).filter(|(leg, since_s)| *since_s < leg.moves_s);
         moving.map_or_else(Vector3::zeros, |(leg, _)| leg.velocity)

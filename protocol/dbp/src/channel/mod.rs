@@ -36,7 +36,7 @@ pub(crate) struct Channel {
     double_told: Option<Duration>,
     /// When each peer that lives in a life before the last was last told so.
     former_told: BTreeMap<NodeName, Duration>,
-    /// Who knows this node in a later life, and in which.
+    /// The nodes that know this one in a later life, and in which.
     outlived: Option<(NodeName, u64)>,
     outgoing: Vec<(Recipient, Message)>,
     #[cfg(feature = "mutants")]

@@ -35,7 +35,7 @@ pub(crate) struct Stream {
     latest: u64,
     /// Occurrences ahead of a hole.
     pending: BTreeMap<u64, Occurrence>,
-    /// What they weigh.
+    /// Their weight.
     pending_bytes: usize,
     repair_due: Duration,
 }

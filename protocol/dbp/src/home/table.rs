@@ -253,7 +253,7 @@ impl BidTable {
         self.bidders.get(node).map_or(&[], |bidder| &bidder.refused)
     }
 
-    /// What is kept of `node`: how many entries, and about how many bytes.
+    /// The entries kept of `node`, and about how many bytes they are.
     pub(crate) fn entries_of(&self, node: &NodeName) -> (usize, usize) {
         let Some(bidder) = self.bidders.get(node) else { return (0, 0) };
         let Bidder { bids, released, served, refused, lifted, .. } = bidder;
@@ -370,7 +370,7 @@ impl BidTable {
         (!bid.block.is_none()).then_some(&bid.asked_block)
     }
 
-    /// What each remote b-thread blocks here, under its node and its name, as it was asked for.
+    /// The blocks of each remote b-thread here, under its node and its name, as it was asked for.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = (&NodeName, &str, &EventSet)> {
         self.bidders.iter().flat_map(|(node, bidder)| {
             let blocking = bidder.bids.iter().filter(|(_, bid)| !bid.block.is_none());

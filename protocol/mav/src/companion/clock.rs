@@ -114,7 +114,7 @@ impl Clock {
         self.soonest = known.or(Some(heard));
     }
 
-    /// How old something is that was measured at `time` on the autopilot's clock; `None` while it is not known where
+    /// The age of a measurement of `time` on the autopilot's clock; `None` while it is not known where
     /// that stands.
     pub(super) fn age(&self, now: Duration, time: Duration) -> Option<Duration> {
         let age_s = now.as_secs_f64() + self.reading.or(self.soonest)?.ahead_s - time.as_secs_f64();

@@ -34,7 +34,7 @@ struct Upload {
     receiver: MissionReceiver,
 }
 
-/// What is another than before.
+/// The parts that have changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Changed {
     Mission,

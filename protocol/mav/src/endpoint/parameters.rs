@@ -6,7 +6,7 @@ use super::parameter_table::{ParameterError, ParameterTable};
 use crate::frame::FrameWriter;
 use crate::parameter::{ParameterEncoding, ParameterValue, name_from_wire, wire_name};
 
-/// How many parameters of a list are sent at each report, so that a list does not crowd out telemetry.
+/// The number of a list's parameters that are sent at each report, so that a list does not crowd out telemetry.
 const LISTED_PER_REPORT: usize = 2;
 const ENCODING: ParameterEncoding = ParameterEncoding::Bytewise;
 

@@ -68,7 +68,7 @@ impl ImageFaults {
 }
 
 impl Glare {
-    /// What it adds to the pixel of a ray.
+    /// Its addition to the pixel of a ray.
     fn on(&self, camera_to_world: &Isometry3<f64>, ray: &Vector2<f64>) -> f32 {
         let way = camera_to_world.rotation * Vector3::new(ray.x, ray.y, 1.0);
         let from = camera_to_world.translation.vector - self.at;

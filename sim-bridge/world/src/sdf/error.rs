@@ -1,4 +1,4 @@
-//! What makes a world file wrong.
+//! Faults of a world file.
 
 use thiserror::Error;
 

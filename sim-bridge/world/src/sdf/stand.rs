@@ -27,7 +27,7 @@ struct Standing<'m> {
     obstacles: Vec<Obstacle>,
 }
 
-/// What holds a model.
+/// The holder of a model.
 struct Above {
     name: String,
     /// From where its frames have it to where its state has it.
