@@ -66,7 +66,7 @@ fn a_route_is_drawn_rehearsed_sent_read_back_and_changed_in_flight() {
     let Some(browser) = Browser::find() else { return };
     let field = browser.scripts.join("two-lanes.toml");
     let flight = Flight::start(&[field.to_str().unwrap()]);
-    let health = flight.get("/health");
+    let health = flight.healthy();
     assert!(health.contains("200 OK") && health.contains("{\"ok\":true,\"age_ms\":"), "{health}");
     assert!(
         flight.get("/messages.ts").contains("export type ClientMessage ="),
@@ -254,7 +254,18 @@ impl Flight {
         socket
     }
 
-    /// The status of the answer to a browser that asks for `path` with these headers.
+    /// The answer of the health end-point once the station works: it listens before it has done its first step.
+    fn healthy(&self) -> String {
+        let deadline = Instant::now() + Duration::from_secs(10);
+        loop {
+            let said = self.get("/health");
+            if said.contains("200 OK") || Instant::now() > deadline {
+                return said;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
     /// All that is answered to a request for `path`.
     fn get(&self, path: &str) -> String {
         let mut stream = TcpStream::connect(self.host()).unwrap();
@@ -264,6 +275,7 @@ impl Flight {
         answer
     }
 
+    /// The status of the answer to a browser that asks for `path` with these headers.
     fn status_of(&self, path: &str, host: &str, origin: Option<&str>) -> u16 {
         let mut stream = TcpStream::connect(self.host()).unwrap();
         let origin = origin.map(|origin| format!("Origin: {origin}\r\n")).unwrap_or_default();
