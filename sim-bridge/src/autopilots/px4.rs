@@ -24,8 +24,10 @@ const SIMULATOR_PORT: u16 = 4560;
 const MOST_INSTANCES: usize = 40;
 /// Instances that somebody else starts all speak to one port from here on.
 const MOST_OF_OTHERS: usize = 10;
-/// Names of the airframe that it flies, the newer first.
-const AIRFRAMES: [&str; 2] = ["none_iris", "iris"];
+/// Names of the airframe that it flies, and the line that tells it that there is no remote control. Until 1.13 it
+/// would return for want of one as soon as a station lets it hold.
+const AIRFRAMES: [(&str, &str); 2] =
+    [("none_iris", "param set COM_RC_IN_MODE 4\n"), ("iris", "param set COM_RCL_EXCEPT 7\n")];
 /// Patience with a PX4 until it connects.
 const TIME_TO_CONNECT: Duration = Duration::from_secs(30);
 /// Before its mixer is loaded PX4 does not answer; so long is waited for it in each step.
@@ -228,9 +230,11 @@ fn launch(index: usize, model: &VehicleModel, program: &Path, folder: &Path) -> 
                 program.display()
             )
         })?;
-    let airframe = find_airframe(&etc)?;
+    let (airframe, without_remote) = find_airframe(&etc)?;
     let folder = fresh(folder)?;
-    for (name, script) in [("px4-rc.params", parameters_of(model)), ("px4-rc.mavlink", links())] {
+    for (name, script) in
+        [("px4-rc.params", parameters_of(model) + without_remote), ("px4-rc.mavlink", links())]
+    {
         std::fs::write(folder.join(name), script).with_context(|| format!("{}/{name}", folder.display()))?;
     }
     // Its start script takes these two from the path, and those of PX4 itself only after it.
@@ -249,27 +253,26 @@ fn launch(index: usize, model: &VehicleModel, program: &Path, folder: &Path) -> 
     Instance::start(command, &folder)
 }
 
-/// The name by which this PX4 knows the airframe without a simulator of its own; until 1.13 a plain `iris`.
-fn find_airframe(etc: &Path) -> anyhow::Result<&'static str> {
+/// The one of [`AIRFRAMES`] that this PX4 has.
+fn find_airframe(etc: &Path) -> anyhow::Result<(&'static str, &'static str)> {
     let folder = etc.join("init.d-posix/airframes");
     let listed = std::fs::read_dir(&folder).with_context(|| folder.display().to_string())?;
     let files: Vec<String> =
         listed.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-    let is_there = |airframe: &&str| {
+    let is_there = |(airframe, _): &(&str, &str)| {
         files.iter().any(|file| file.split_once('_').is_some_and(|(_, name)| name == *airframe))
     };
     AIRFRAMES.into_iter().find(is_there).with_context(|| {
-        format!("{}: expected the airframe {}; build px4_sitl", folder.display(), AIRFRAMES.join(" or "))
+        let names = AIRFRAMES.map(|(name, _)| name).join(" or ");
+        format!("{}: expected the airframe {names}; build px4_sitl", folder.display())
     })
 }
 
-/// Sets parameters for this world: its battery empties as the vehicle's does in hover, there is no remote control,
-/// and nobody reads its logs.
+/// Sets parameters for this world: its battery empties as the vehicle's does in hover, and nobody reads its logs.
 fn parameters_of(model: &VehicleModel) -> String {
     let endurance_s = model.battery.capacity_wh / model.battery.hover_power_w * 3600.0;
     format!(
-        "param set SIM_BAT_DRAIN {endurance_s:.0}\nparam set SIM_BAT_MIN_PCT 0\n\
-         param set COM_RC_IN_MODE 4\nparam set SDLOG_MODE -1\n"
+        "param set SIM_BAT_DRAIN {endurance_s:.0}\nparam set SIM_BAT_MIN_PCT 0\nparam set SDLOG_MODE -1\n"
     )
 }
 
@@ -317,6 +320,7 @@ mod tests {
             }
             let log = fs::read_to_string(folder.join("log.txt")).unwrap();
             assert!(log.starts_with(&format!("{airframe}\nparam set SIM_BAT_DRAIN ")), "{log}");
+            assert_eq!(log.contains("COM_RCL_EXCEPT"), airframe == "iris", "{log}");
             assert!(log.contains("-u 14583 -r 4000000 -f -m onboard -o 14543\n"), "{log}");
         }
     }
