@@ -15,7 +15,8 @@ use anyhow::Context as _;
 
 /// Of vehicle 0's companion link, the port that it listens on and the one that it sends to.
 pub const COMPANION: (u16, u16) = (14580, 14540);
-const GROUND: (u16, u16) = (18570, 14550);
+/// The same of its ground link; all vehicles send to one port.
+pub const GROUND: (u16, u16) = (18570, 14550);
 /// Silence after which nothing is sent to a client any more.
 const SILENT_AFTER: Duration = Duration::from_secs(10);
 /// Largest datagram taken in; MAVLink's frames are at most 280 bytes.

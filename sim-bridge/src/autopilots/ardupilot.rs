@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::Context as _;
 use skein_mav::simulator::Motion;
@@ -12,7 +12,7 @@ use skein_mav::simulator::ardupilot::{Servos, answer};
 use skein_mav::{ARDUPILOT, Datum};
 use skein_world::{MotorCommands, Pilot, Quadrotor, STEP, SensorReadings, VehicleModel};
 
-use super::instance::{Instance, fresh};
+use super::instance::{Instance, ending, fresh, wait_for};
 use super::legs::Legs;
 
 /// The port to which instance 0 sends its servos, and the one on which it speaks MAVLink.
@@ -35,7 +35,7 @@ const QUADRATIC: f64 = 0.65;
 /// A vehicle flown by ArduPilot.
 pub(super) struct ArduPilot {
     /// None of one that somebody else has started.
-    _instance: Option<Instance>,
+    instance: Option<Instance>,
     name: String,
     servos: UdpSocket,
     mavlink: Option<TcpStream>,
@@ -68,26 +68,22 @@ impl ArduPilot {
         let mut instance =
             program.map(|program| launch(index, &datum, model, program, defaults, folder)).transpose()?;
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port(MAVLINK_PORT)));
-        let began = Instant::now();
-        let mavlink = loop {
-            match TcpStream::connect(address) {
-                Ok(stream) => break stream,
-                Err(error) => {
-                    if let Some(instance) = &mut instance {
-                        instance.check(folder).with_context(|| name.clone())?;
-                    }
-                    anyhow::ensure!(
-                        began.elapsed() < TIME_TO_CONNECT,
-                        "{name}: it does not listen on TCP {address}: {error}"
-                    );
-                }
-            }
-            std::thread::sleep(Duration::from_millis(20));
-        };
+        let mavlink = wait_for(&mut instance, TIME_TO_CONNECT, || {
+            TcpStream::connect(address).with_context(|| format!("it does not listen on TCP {address}"))
+        })
+        .with_context(|| name.clone())?;
+        if instance.is_some() {
+            // It reads its parameters only now, and ends when it cannot.
+            servos.set_read_timeout(Some(Duration::from_millis(5)))?;
+            wait_for(&mut instance, TIME_TO_CONNECT, || {
+                servos.peek(&mut [0; 1]).context("it sends no servos")
+            })
+            .with_context(|| name.clone())?;
+        }
         mavlink.set_nodelay(true)?;
         mavlink.set_nonblocking(true)?;
         Ok(Self {
-            _instance: instance,
+            instance,
             name,
             servos,
             mavlink: Some(mavlink),
@@ -131,7 +127,7 @@ impl ArduPilot {
 
     /// It is gone, and its rotors stand.
     fn lose(&mut self) {
-        tracing::warn!("{} has gone", self.name);
+        tracing::warn!("{} has gone{}", self.name, ending(&mut self.instance));
         self.mavlink = None;
         self.throttle = [0.0; 4];
     }
@@ -156,7 +152,7 @@ impl Pilot for ArduPilot {
 
     fn commands(&mut self) -> MotorCommands {
         for number in 1..=ANSWERS {
-            if !self.exchange(f64::from(number) / f64::from(ANSWERS)) {
+            if self.mavlink.is_none() || !self.exchange(f64::from(number) / f64::from(ANSWERS)) {
                 break;
             }
         }
@@ -210,7 +206,7 @@ fn launch(
         Some(defaults) => defaults.canonicalize().with_context(|| defaults.display().to_string())?,
         None => find_defaults(&program)?,
     };
-    fresh(folder)?;
+    let folder = fresh(folder)?;
     let parameters = folder.join("skein.parm");
     std::fs::write(&parameters, parameters_of(index, model))?;
     let place = datum.place();
@@ -227,7 +223,7 @@ fn launch(
         .args(["--sysid", &(index + 1).to_string()])
         .arg("--defaults")
         .arg(format!("{},{}", defaults.display(), parameters.display()));
-    Instance::start(command, folder)
+    Instance::start(command, &folder)
 }
 
 /// The parameters of its default copter, where its releases and its sources have them.
@@ -261,6 +257,7 @@ fn parameters_of(index: usize, model: &VehicleModel) -> String {
 #[allow(clippy::unwrap_used)] // A test fails by panicking.
 mod tests {
     use std::net::TcpListener;
+    use std::time::Instant;
 
     use super::*;
 

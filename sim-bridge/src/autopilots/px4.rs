@@ -13,15 +13,19 @@ use skein_mav::simulator::{Instruments, Px4Link};
 use skein_world::{MotorCommands, Pilot, Quadrotor, SensorReadings, VehicleModel};
 
 use super::companions::Companions;
-use super::instance::{Instance, fresh};
+use super::instance::{Instance, ending, fresh, wait_for};
 use super::legs::Legs;
 use super::magnetism;
-use crate::mavlink_ports::COMPANION;
+use crate::mavlink_ports::{COMPANION, GROUND};
 
 /// The simulator's port of instance 0.
 const SIMULATOR_PORT: u16 = 4560;
-/// Instances from here on all speak to one port.
-const MOST_INSTANCES: usize = 10;
+/// The ports that companions hear on and those that they speak to are so many apart.
+const MOST_INSTANCES: usize = 40;
+/// Instances that somebody else starts all speak to one port from here on.
+const MOST_OF_OTHERS: usize = 10;
+/// Names of the airframe that it flies, the newer first.
+const AIRFRAMES: [&str; 2] = ["none_iris", "iris"];
 /// Patience with a PX4 until it connects.
 const TIME_TO_CONNECT: Duration = Duration::from_secs(30);
 /// Before its mixer is loaded PX4 does not answer; so long is waited for it in each step.
@@ -48,7 +52,7 @@ impl Companion {
 /// A vehicle flown by PX4.
 pub(super) struct Px4 {
     /// None of one that somebody else has started.
-    _instance: Option<Instance>,
+    instance: Option<Instance>,
     name: String,
     stream: Option<TcpStream>,
     link: Px4Link,
@@ -75,9 +79,10 @@ impl Px4 {
         companions: Companions,
     ) -> anyhow::Result<Self> {
         let name = format!("PX4 of uav/{}", index + 1);
+        let most = if program.is_some() { MOST_INSTANCES } else { MOST_OF_OTHERS };
         anyhow::ensure!(
-            index < MOST_INSTANCES,
-            "{name}: at most {MOST_INSTANCES} PX4s are served; beyond that they share one port"
+            index < most,
+            "{name}: at most {most} PX4s are served; beyond that they share one port"
         );
         let port = |base: u16| base + index as u16;
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port(SIMULATOR_PORT))).with_context(|| {
@@ -88,17 +93,15 @@ impl Px4 {
             Companions::Elsewhere => None,
         };
         let mut instance = program.map(|program| launch(index, model, program, folder)).transpose()?;
-        let stream = accept(&listener, |waited| {
-            if let Some(instance) = &mut instance {
-                instance.check(folder)?;
-            }
-            anyhow::ensure!(waited < TIME_TO_CONNECT, "it has not connected within {TIME_TO_CONNECT:?}");
-            Ok(())
+        listener.set_nonblocking(true)?;
+        let (stream, _) = wait_for(&mut instance, TIME_TO_CONNECT, || {
+            listener.accept().with_context(|| format!("it has not connected within {TIME_TO_CONNECT:?}"))
         })
         .with_context(|| name.clone())?;
+        stream.set_nonblocking(false)?;
         stream.set_nodelay(true)?;
         Ok(Self {
-            _instance: instance,
+            instance,
             name,
             stream: Some(stream),
             link: Px4Link::new(datum),
@@ -151,7 +154,7 @@ impl Px4 {
 
     /// It is gone, and its rotors stand.
     fn lose(&mut self) {
-        tracing::warn!("{} has gone", self.name);
+        tracing::warn!("{} has gone{}", self.name, ending(&mut self.instance));
         self.stream = None;
         self.commands = [0.0; 4];
     }
@@ -225,8 +228,14 @@ fn launch(index: usize, model: &VehicleModel, program: &Path, folder: &Path) -> 
                 program.display()
             )
         })?;
-    fresh(folder)?;
-    let endurance_s = model.battery.capacity_wh / model.battery.hover_power_w * 3600.0;
+    let airframe = find_airframe(&etc)?;
+    let folder = fresh(folder)?;
+    for (name, script) in [("px4-rc.params", parameters_of(model)), ("px4-rc.mavlink", links())] {
+        std::fs::write(folder.join(name), script).with_context(|| format!("{}/{name}", folder.display()))?;
+    }
+    // Its start script takes these two from the path, and those of PX4 itself only after it.
+    let others = std::env::var_os("PATH").unwrap_or_default();
+    let path = std::iter::once(folder.clone()).chain(std::env::split_paths(&others));
     let mut command = Command::new(program);
     command
         .args(["-d", "-i"])
@@ -234,32 +243,81 @@ fn launch(index: usize, model: &VehicleModel, program: &Path, folder: &Path) -> 
         .arg("-s")
         .arg(etc.join("init.d-posix/rcS"))
         .arg(&etc)
-        .env("PX4_SIM_MODEL", "none_iris")
-        .env_remove("PX4_SIMULATOR")
-        // Its battery empties as the vehicle's does in hover. There is no remote control, and nobody reads its logs.
-        .env("PX4_PARAM_SIM_BAT_DRAIN", format!("{endurance_s:.0}"))
-        .env("PX4_PARAM_SIM_BAT_MIN_PCT", "0")
-        .env("PX4_PARAM_COM_RC_IN_MODE", "4")
-        .env("PX4_PARAM_SDLOG_BACKEND", "0");
-    Instance::start(command, folder)
+        .env("PATH", std::env::join_paths(path)?)
+        .env("PX4_SIM_MODEL", airframe)
+        .env_remove("PX4_SIMULATOR");
+    Instance::start(command, &folder)
 }
 
-/// Waits for a connection; `go_on` says after each look whether to wait on.
-fn accept(
-    listener: &TcpListener,
-    mut go_on: impl FnMut(Duration) -> anyhow::Result<()>,
-) -> anyhow::Result<TcpStream> {
-    listener.set_nonblocking(true)?;
-    let began = Instant::now();
-    loop {
-        match listener.accept() {
-            Ok((stream, _)) => {
-                stream.set_nonblocking(false)?;
-                return Ok(stream);
+/// The name by which this PX4 knows the airframe without a simulator of its own; until 1.13 a plain `iris`.
+fn find_airframe(etc: &Path) -> anyhow::Result<&'static str> {
+    let folder = etc.join("init.d-posix/airframes");
+    let listed = std::fs::read_dir(&folder).with_context(|| folder.display().to_string())?;
+    let files: Vec<String> =
+        listed.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    let is_there = |airframe: &&str| {
+        files.iter().any(|file| file.split_once('_').is_some_and(|(_, name)| name == *airframe))
+    };
+    AIRFRAMES.into_iter().find(is_there).with_context(|| {
+        format!("{}: expected the airframe {}; build px4_sitl", folder.display(), AIRFRAMES.join(" or "))
+    })
+}
+
+/// Sets parameters for this world: its battery empties as the vehicle's does in hover, there is no remote control,
+/// and nobody reads its logs.
+fn parameters_of(model: &VehicleModel) -> String {
+    let endurance_s = model.battery.capacity_wh / model.battery.hover_power_w * 3600.0;
+    format!(
+        "param set SIM_BAT_DRAIN {endurance_s:.0}\nparam set SIM_BAT_MIN_PCT 0\n\
+         param set COM_RC_IN_MODE 4\nparam set SDLOG_MODE -1\n"
+    )
+}
+
+/// Opens its links to ground stations and to its companion, each on a port of its own.
+fn links() -> String {
+    let ((hears_on, speaks_to), (ground_hears_on, _)) = (COMPANION, GROUND);
+    format!(
+        "mavlink start -x -u $(({ground_hears_on}+px4_instance)) -r 4000000 -f\n\
+         mavlink start -x -u $(({hears_on}+px4_instance)) -r 4000000 -f -m onboard -o $(({speaks_to}+px4_instance))\n"
+    )
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)] // A test fails by panicking.
+mod tests {
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt as _;
+
+    use super::*;
+
+    /// A program that tells which airframe it is given, and what the scripts say that it finds on its path.
+    const TELLS: &str = "#!/bin/sh\necho $PX4_SIM_MODEL\npx4_instance=3\n\
+        param() { echo param $*; }\nmavlink() { echo mavlink $*; }\n. px4-rc.params\n. px4-rc.mavlink\n";
+
+    #[test]
+    fn old_and_new_ones_get_their_airframe_and_the_parameters_of_this_world() {
+        let build = tempfile::tempdir().unwrap();
+        let airframes = build.path().join("etc/init.d-posix/airframes");
+        fs::create_dir_all(&airframes).unwrap();
+        fs::write(build.path().join("etc/init.d-posix/rcS"), "").unwrap();
+        let program = build.path().join("bin/px4");
+        fs::create_dir(build.path().join("bin")).unwrap();
+        fs::write(&program, TELLS).unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        let model = VehicleModel::built_in("x500").unwrap();
+        let folder = build.path().join("uav-1");
+        let error = launch(0, &model, &program, &folder).err().unwrap().to_string();
+        assert!(error.contains("expected the airframe none_iris or iris"), "{error}");
+        for (file, airframe) in [("10016_iris", "iris"), ("10016_none_iris", "none_iris")] {
+            fs::write(airframes.join(file), "").unwrap();
+            let mut instance = launch(0, &model, &program, &folder).unwrap();
+            let deadline = Instant::now() + TIME_TO_CONNECT;
+            while instance.check().is_ok() {
+                assert!(Instant::now() < deadline);
             }
-            Err(error) if error.kind() == ErrorKind::WouldBlock => go_on(began.elapsed())?,
-            Err(error) => return Err(error.into()),
+            let log = fs::read_to_string(folder.join("log.txt")).unwrap();
+            assert!(log.starts_with(&format!("{airframe}\nparam set SIM_BAT_DRAIN ")), "{log}");
+            assert!(log.contains("-u 14583 -r 4000000 -f -m onboard -o 14543\n"), "{log}");
         }
-        std::thread::sleep(Duration::from_millis(5));
     }
 }

@@ -174,7 +174,7 @@ impl Browser {
         let node = Command::new("node").arg("--version").stdout(Stdio::null()).status();
         let chromium = std::env::var_os("SKEIN_CHROMIUM").unwrap_or_else(|| "/usr/bin/chromium".into());
         if !node.is_ok_and(|status| status.success()) {
-            skipped("Node");
+            skipped("Node 20 or newer, as `node` on the path");
         } else if !Path::new(&chromium).is_file() {
             skipped("Chromium: SKEIN_CHROMIUM, or /usr/bin/chromium");
         } else if !scripts.join("node_modules/playwright-core").is_dir() {
