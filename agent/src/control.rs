@@ -696,6 +696,11 @@ impl Control {
     }
 
     #[must_use]
+    pub fn neighbours(&self) -> &Neighbours {
+        &self.neighbours
+    }
+
+    #[must_use]
     pub fn guidance(&self) -> &Guidance {
         &self.guidance
     }

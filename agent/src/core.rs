@@ -301,6 +301,11 @@ impl AgentCore {
         self.side.control.guidance().planning.is_under_way()
     }
 
+    /// The other vehicles that it remembers.
+    pub fn known_vehicles(&self) -> usize {
+        self.side.control.neighbours().remembered()
+    }
+
     /// The vehicle's node name.
     pub fn name(&self) -> &NodeName {
         self.mission.name()

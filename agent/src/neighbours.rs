@@ -234,6 +234,11 @@ impl Neighbours {
         self.around.clear();
     }
 
+    /// How many other vehicles are remembered.
+    pub fn remembered(&self) -> usize {
+        self.last.len()
+    }
+
     /// Everybody as of the last look around, in the order of their names.
     pub fn around(&self) -> &[Neighbour] {
         &self.around

@@ -936,6 +936,22 @@ mod right_of_way {
     }
 
     #[test]
+    fn another_that_is_out_of_range_is_let_out_by_nobody() {
+        for radio_range_m in [None, Some(15.0)] {
+            let mut vehicle = Vehicle::in_the_air(&AgentConfig { radio_range_m, ..config() });
+            vehicle.reports(Planned::NAME);
+            vehicle.learns(joined(LOWER));
+            vehicle.hears(announced_from("6 0 2 90; 6 1 2 90", LOWER, "6 0 2 90"));
+            vehicle.learns(lost(LOWER, "right_of_way"));
+            vehicle.hears(announced(WAY));
+            vehicle.after(8 * SECOND);
+            vehicle.learns(confirmed());
+            vehicle.after(2 * SECOND);
+            assert_eq!(vehicle.may(Advance::NAME), radio_range_m.is_some());
+        }
+    }
+
+    #[test]
     fn who_is_inside_gives_in_to_others_inside_only() {
         let way = "7 0 2 0; 8 0 2 0; 9 0 2 0";
         let mut vehicle = stopped(announced_from(way, ME, "7.2 0 2 0"));

@@ -317,10 +317,16 @@ impl RightOfWay {
     }
 
     /// Its phase, if it keeps nobody in. Who has entered what another is in, that goes before it and came there without
-    /// having been asked, stands and lets go all but where it is: else neither gets on.
+    /// having been asked, stands and lets go all but where it is: else neither gets on. One that is out of range is not
+    /// there as far as can be known: of that, it might never hear the end.
     fn let_out(&self, phase: Phase, now: Duration) -> Phase {
+        let is_there = |node: &str| {
+            let is_lost = matches!(self.others.get(node), Some(Other::Lost | Other::LostClaiming));
+            !(self.radio_is_short && is_lost)
+        };
         let keeps_in = |(node, told): (&String, &Told)| {
-            goes_before((node, told.right), (self.me.name(), self.right()))
+            is_there(node)
+                && goes_before((node, told.right), (self.me.name(), self.right()))
                 && self.held.leads_against(&told.stretch.here(), &self.me)
         };
         if phase == Phase::Clear && self.held.is_entered() && self.told.iter().any(keeps_in) {

@@ -69,8 +69,8 @@ bounds! {
         "An event, and the names of those who asked for it.";
     BoardBytes = "board_bytes", 256 << 10, "bytes of a board, or of a vehicle's checks",
         "A board is cut to 128 KiB by whoever sends it.";
-    SceneBytes = "scene_bytes", 1 << 20, "bytes of a scene",
-        "4096 bodies are 400 KiB; only ground stations listen.";
+    SceneBytes = "scene_bytes", 512 << 10, "bytes of a scene",
+        "4096 bodies are 450 KB, and more of one member may not wait; only ground stations listen.";
     ScanBytes = "scan_bytes", 32 << 10, "bytes of a scan",
         "4096 rays are 16 KiB.";
     RecordBids = "record_bids", 512, "bids of one record",

@@ -122,6 +122,11 @@ impl Program {
         self.restate(place, bid.for_proxy());
     }
 
+    /// The b-threads that have ended and whose names are remembered.
+    pub fn ended_names(&self) -> usize {
+        self.ended.len()
+    }
+
     /// Withdraws a proxy's bid; `false` when there was none.
     pub fn remove_proxy(&mut self, name: &str) -> bool {
         let removed = self.board.proxy(name).and_then(|place| self.board.remove(place));

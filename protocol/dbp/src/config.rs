@@ -49,7 +49,8 @@ pub struct NodeConfig {
     pub remote_priority: RangeInclusive<i32>,
     /// The number of occurrences that are kept for those who missed them; at least 1.
     pub history: usize,
-    /// Selections in one step after which the program counts as unsettled.
+    /// Selections in one step after which the program counts as unsettled. They count from the last one that another
+    /// node has asked for, and what others have decided does not count: no other node can make a program unsettled.
     pub settle_limit: usize,
     /// The promise that this node breaks on purpose.
     #[cfg(feature = "mutants")]

@@ -34,6 +34,11 @@ impl History {
         self.kept.len() >= self.capacity || self.bytes > Bound::HistoryBytes.most()
     }
 
+    /// The weight of all that are kept, bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
     /// The number of the latest occurrence, 0 before the first.
     pub(crate) fn latest_seq(&self) -> u64 {
         self.latest_seq

@@ -338,6 +338,11 @@ impl Node {
         NodeExplanation { local, remote }
     }
 
+    /// The weight of the own occurrences that are kept for those who missed them, bytes.
+    pub fn history_bytes(&self) -> usize {
+        self.home.history.bytes()
+    }
+
     /// Every bid on this node's table now.
     pub fn board(&self) -> Board {
         let (program, now) = (&self.run.program, self.clock.now());

@@ -368,6 +368,43 @@ fn wishes_for_repair_bring_no_more_than_may_be_repeated() {
 }
 
 #[test]
+fn no_number_of_occurrences_or_requests_of_others_keeps_a_step_from_settling() {
+    let most = Bound::PendingOccurrences.stated() as u64;
+    let mut node = self::node();
+    let echo = [Op::Sync(Bid::new().wait_for("uav/2/last")), Op::Sync(Bid::new().request("uav/1/echo"))];
+    node.program_mut().add("echo", Script::new(&echo).unwrap());
+    node.handle(Duration::ZERO, presence("uav/2", 0));
+    (2..most).for_each(|seq| node.handle(Duration::ZERO, occurrence("uav/2", seq, "uav/2/x")));
+    node.handle(Duration::ZERO, occurrence("uav/2", most, "uav/2/last"));
+    node.step(Duration::from_millis(20)).unwrap();
+    node.take_selections();
+    // All of them come at once with the one that was missing.
+    node.handle(Duration::from_millis(20), occurrence("uav/2", 1, "uav/2/x"));
+    node.step(Duration::from_millis(40)).unwrap();
+    let happened = node.take_selections();
+    assert!(happened.len() as u64 > most && happened.last().unwrap().event.name() == "uav/1/echo");
+
+    // Whatever each of ten members may ask for at once, answered by ten events each.
+    let members: Vec<NodeName> = (2..12).map(|number| name(&format!("uav/{number}"))).collect();
+    let mut program = Program::new(ProgramConfig::vehicle(1));
+    let answers = Op::repeat(10, [Op::Sync(Bid::new().request("uav/1/answer").priority(1))]);
+    let ask = Op::Sync(Bid::new().wait_for("uav/1/x"));
+    program.add("answers", Script::new(&[Op::forever([ask, answers])]).unwrap());
+    let mut node = Node::new(NodeConfig::new(name("uav/1"), 3, members.clone()), program);
+    let requests = Bound::RecordRequests.stated();
+    for member in &members {
+        node.handle(Duration::ZERO, presence(member.as_str(), 0));
+        let asked = |n: usize| Event::new("uav/1/x").with("n", n as i64).with("by", member.as_str());
+        let bids = (0..requests).map(|n| bid(&format!("b{n}"), vec![asked(n)], EventSet::None));
+        let Message::Bid(record) = record(1, 1, bids.collect()) else { unreachable!() };
+        node.handle(Duration::ZERO, Message::Bid(BidRecord { node: member.clone(), ..record }));
+    }
+    node.step(Duration::from_millis(20)).unwrap();
+    let answered = node.take_selections().iter().filter(|one| one.event.kind() == "answer").count();
+    assert_eq!(answered, 10 * requests * members.len());
+}
+
+#[test]
 fn long_events_do_not_fill_the_memory() {
     let long = |n: u64| Event::new("uav/1/x").with("text", "x".repeat(30_000)).with("n", n as i64);
     let mut program = Program::new(ProgramConfig::vehicle(1));

@@ -98,4 +98,20 @@ mod tests {
         assert_eq!(store.save(&kept()), Saving::Done);
         assert_eq!(PromiseStore::open(folder.path(), &node()).1.unwrap(), kept());
     }
+
+    // Whoever writes to the first byte of its own memory gets EIO.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_disk_with_an_input_output_error_is_named_and_tried_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut store, _) = PromiseStore::open(folder.path(), &node());
+        assert_eq!(store.save(&kept()), Saving::Done);
+        let before = fs::read(folder.path().join("uav-1.kept.json")).unwrap();
+        std::os::unix::fs::symlink("/proc/self/mem", folder.path().join("uav-1.kept.new")).unwrap();
+        let Saving::Failed(why) = store.save(&Kept::default()) else { panic!("it was kept on nothing") };
+        assert!(why.contains("uav-1.kept.json") && why.contains("os error 5"), "{why}");
+        assert_eq!(fs::read(folder.path().join("uav-1.kept.json")).unwrap(), before);
+        assert_eq!(store.save(&Kept::default()), Saving::Done);
+        assert_eq!(PromiseStore::open(folder.path(), &node()).1.unwrap(), Kept::default());
+    }
 }

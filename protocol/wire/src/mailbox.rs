@@ -110,11 +110,12 @@ impl Mailbox {
         if self.waiting.is_empty() {
             return;
         }
-        let mut newest: BTreeMap<&Key, u64> = BTreeMap::new();
+        let mut newest: BTreeMap<&Key, (u64, &Owner)> = BTreeMap::new();
         let mut superseded = Vec::new();
         for (number, (owner, key, _)) in self.waiting.iter().filter(|(_, (_, key, _))| key.says_all()) {
-            if let Some(before) = newest.insert(key, *number) {
-                superseded.push((before, owner.clone()));
+            // The one before may lie in another queue: its sender had none of its own then.
+            if let Some((before, its_owner)) = newest.insert(key, (*number, owner)) {
+                superseded.push((before, its_owner.clone()));
             }
         }
         for (number, owner) in superseded {
@@ -132,6 +133,11 @@ impl Mailbox {
 
     pub fn bytes(&self) -> usize {
         self.bytes
+    }
+
+    /// The senders of whom anything waits; those without a queue of their own count as one.
+    pub fn senders(&self) -> usize {
+        self.queues.len()
     }
 
     /// The messages that wait of one sender, and their bytes.
@@ -253,6 +259,23 @@ mod tests {
         mailbox.push(key("uav/2"), vec![9]);
         mailbox.push(key("uav/x1"), vec![0; 10_000]);
         assert_eq!(left_of(&mut mailbox, "uav/2"), [9]);
+    }
+
+    #[test]
+    fn a_message_that_came_while_its_sender_had_no_queue_goes_when_a_newer_one_comes() {
+        let mut mailbox = mailbox();
+        // The members' queues are empty.
+        let most = Bound::WaitingSenders.stated() + 2;
+        for sender in 0..=most {
+            mailbox.push(key(&format!("uav/x{sender}")), vec![0; 100]);
+        }
+        let last = format!("uav/x{most}");
+        let gone = mailbox.take(|key, _| key.sender().as_str() != last);
+        assert_eq!((gone.len(), mailbox.waiting_of(&None)), (most, (1, 100)));
+        mailbox.push(key(&last), vec![1; 10]);
+        assert!(mailbox.take(|_, _| false).is_empty());
+        assert_eq!((mailbox.len(), mailbox.bytes(), mailbox.waiting_of(&None)), (1, 10, (0, 0)));
+        assert_eq!(left_of(&mut mailbox, &last), [1]);
     }
 
     #[test]

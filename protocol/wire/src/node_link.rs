@@ -327,6 +327,11 @@ impl NodeLink {
         })
     }
 
+    /// The messages that wait for their share of the node's time.
+    pub fn mailbox(&self) -> &Mailbox {
+        &self.mailbox
+    }
+
     /// The nodes whose messages this build cannot read, each with the version it speaks.
     pub fn skewed(&self) -> impl Iterator<Item = (&NodeName, u32)> {
         self.skewed.iter().map(|(node, version)| (node, *version))

@@ -1,10 +1,13 @@
 //! An operator at a ground station's console, as a program: a WebSocket client that orders and sees who has heard.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, ensure};
 use serde_json::{Value, json};
+use skein_dbp::facts::DiskFails;
+use skein_wire::event::Declared as _;
 use tungstenite::{Message, WebSocket, stream::MaybeTlsStream};
 
 /// Patience with the console, a swarm, or an answer.
@@ -14,6 +17,8 @@ const PATIENCE: Duration = Duration::from_secs(120);
 pub struct Operator {
     socket: WebSocket<MaybeTlsStream<TcpStream>>,
     console: SocketAddr,
+    /// The nodes whose disk fails, as the console has told.
+    disks_that_fail: BTreeSet<String>,
 }
 
 impl Operator {
@@ -29,7 +34,7 @@ impl Operator {
                     if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
                         stream.set_nodelay(true)?;
                     }
-                    return Self { socket, console }.introduced();
+                    return Self { socket, console, disks_that_fail: BTreeSet::new() }.introduced();
                 }
                 Err(error) if Instant::now() > deadline => {
                     return Err(error).context("the console does not answer");
@@ -136,6 +141,40 @@ impl Operator {
         self.change_map(&json!({ "type": "draw", "tag": "draw", "zone": zone }), kept)
     }
 
+    /// Draws a zone; gives the vehicles that will not keep it, with the reason, once every vehicle has answered.
+    ///
+    /// # Errors
+    /// Somebody has not within two minutes, or the station refuses it.
+    pub fn draw_or_refuse(&mut self, zone: &Value) -> anyhow::Result<BTreeMap<String, String>> {
+        let mut refusals = BTreeMap::new();
+        let answered = |records: &[Value]| {
+            let drawn = records.iter().find(|record| record["zone"]["name"] == zone["name"]);
+            let Some(answers) = drawn.and_then(|record| record["answers"].as_object()) else { return false };
+            let refused = answers.iter().filter(|(_, answer)| answer["state"] == "refused");
+            let why = |(vehicle, answer): (&String, &Value)| (vehicle.clone(), answer["why"].to_string());
+            refusals = refused.map(why).collect();
+            let is_closed =
+                |answer: &Value| answer["state"] == "acknowledged" || answer["state"] == "refused";
+            !answers.is_empty() && answers.values().all(is_closed)
+        };
+        self.change_map(&json!({ "type": "draw", "tag": "draw", "zone": zone }), answered)?;
+        Ok(refusals)
+    }
+
+    /// Waits until the console has told that the disks of these fail, and of some.
+    ///
+    /// # Errors
+    /// It has not within two minutes.
+    pub fn await_disks_that_fail(&mut self, nodes: &BTreeSet<String>) -> anyhow::Result<()> {
+        let began = Instant::now();
+        while nodes.is_empty() || !nodes.is_subset(&self.disks_that_fail) {
+            let told = &self.disks_that_fail;
+            ensure!(began.elapsed() < PATIENCE, "the console tells that the disks of {told:?} fail");
+            self.next()?;
+        }
+        Ok(())
+    }
+
     /// Removes a zone; returns how long it took until no vehicle had regard for it.
     ///
     /// # Errors
@@ -148,7 +187,7 @@ impl Operator {
     fn change_map(
         &mut self,
         request: &Value,
-        is_done: impl Fn(&[Value]) -> bool,
+        mut is_done: impl FnMut(&[Value]) -> bool,
     ) -> anyhow::Result<Duration> {
         let began = Instant::now();
         self.socket.send(Message::text(request.to_string()))?;
@@ -171,8 +210,17 @@ impl Operator {
     fn next(&mut self) -> anyhow::Result<Value> {
         loop {
             if let Message::Text(text) = self.socket.read()? {
-                return Ok(serde_json::from_str(&text)?);
+                let message: Value = serde_json::from_str(&text)?;
+                self.note_disks(&message);
+                return Ok(message);
             }
         }
+    }
+
+    fn note_disks(&mut self, message: &Value) {
+        let events = message["events"].as_array().into_iter().flatten();
+        let names = events.filter_map(|event| event["name"].as_str()?.rsplit_once('/'));
+        let fails = names.filter(|(_, kind)| *kind == DiskFails::NAME).map(|(home, _)| home.to_owned());
+        self.disks_that_fail.extend(fails);
     }
 }

@@ -14,6 +14,11 @@ pub(super) struct Ended {
 }
 
 impl Ended {
+    /// How many names are known.
+    pub(super) fn len(&self) -> usize {
+        self.seen.len()
+    }
+
     pub(super) fn note(&mut self, name: Arc<str>, sync: u64) {
         self.seen.insert(name, sync);
         if self.seen.len() > Bound::EndedNames.most() {

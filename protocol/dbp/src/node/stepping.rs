@@ -43,12 +43,14 @@ impl Node {
 
     /// Lets the program run until it has settled and knows all facts that this brought about; `select` takes each step.
     fn settle(&mut self, select: &mut Select<'_>) -> Result<(), NodeError> {
-        let before = self.run.selections.len();
+        // The program's own selections since the last one that another node has asked for. What others have decided and
+        // ask for is bounded by what they may say, and is no sign that the program goes round.
+        let mut own = 0;
         let mut outcome = Ok(());
         self.joint.tell_step(&mut self.run);
         for _ in 0..MOST_ROUNDS {
             self.check_blocks();
-            if let Err(error) = self.run_program(before, select) {
+            if let Err(error) = self.run_program(&mut own, select) {
                 outcome = Err(error);
             }
             outcome = outcome.and(self.state_bids());
@@ -72,7 +74,7 @@ impl Node {
         self.guest.state_bids(&self.config.name, &Routes { here, roster, peers }, &mut self.run)
     }
 
-    fn run_program(&mut self, before: usize, select: &mut Select<'_>) -> Result<(), NodeError> {
+    fn run_program(&mut self, own: &mut usize, select: &mut Select<'_>) -> Result<(), NodeError> {
         let now = self.clock.of_bthreads();
         #[cfg(feature = "mutants")]
         if self.config.mutant == Some(crate::mutant::Mutant::G9)
@@ -93,9 +95,10 @@ impl Node {
             }
         }
         while let Some(selection) = select(&mut self.run.program, now)? {
-            self.publish(selection);
+            // A request counts once, so only so many that others ask for can follow one another.
+            *own = if self.publish(selection) { 0 } else { *own + 1 };
             let limit = self.config.settle_limit;
-            if self.run.selections.len() - before > limit {
+            if *own > limit {
                 let recent = self.run.selections.iter().rev().take(limit / 2);
                 let bthreads: BTreeSet<_> =
                     recent.flat_map(|happened| happened.requested_by.iter()).collect();
@@ -144,12 +147,13 @@ impl Node {
         Ok(())
     }
 
-    /// Numbers what was selected here and tells it to all.
-    fn publish(&mut self, selection: Selection) {
+    /// Numbers what was selected here and tells it to all; gives whether another node has asked for it.
+    fn publish(&mut self, selection: Selection) -> bool {
         let choice = choice(&selection);
         let Selection { event, origin, requested_by, .. } = selection;
         let requested_by = requested_by.into_vec();
         let (requests_served, proxies) = self.home.table.serve(&requested_by);
+        let serves_others = !proxies.is_empty();
         self.stats.occurred += 1;
         let travels = self.home.events.contains(&event);
         let decision = self.joint.next_decision().filter(|_| travels && Roster::is_joint(&event));
@@ -182,6 +186,7 @@ impl Node {
         }
         self.heed(&event);
         self.run.change_proxies(proxies);
+        serves_others
     }
 
     fn send_what_is_due(&mut self) {

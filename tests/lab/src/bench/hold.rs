@@ -10,15 +10,17 @@ use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, ensure};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use skein_dbp::facts::DiskFails;
 use skein_sim::cli::{Exit, Network, Setup};
-use skein_sim::fly::vehicle_name;
+use skein_sim::fly::{GROUND, vehicle_name};
 use skein_sim::processes::Processes;
 use skein_sim::scenario::{Overrides, Scenario};
+use skein_wire::event::Declared as _;
 
 use super::load::{Beat, DeepScripts, Garbage};
 use crate::operator::Operator;
@@ -27,6 +29,8 @@ use crate::task::Task;
 
 /// Between two orders, a time that is no multiple of any period in the system.
 const PAUSE: Duration = Duration::from_millis(137);
+/// Patience with a disk that is busy.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 #[derive(Args, Clone, Copy)]
 pub struct Holds {
@@ -46,9 +50,10 @@ pub struct Swarm {
     /// Size of the swarm.
     #[arg(long, value_name = "N", default_value_t = 8)]
     pub vehicles: usize,
-    /// Keep all states on a file system of 1 MB that is full from then on; for root only.
-    #[arg(long, value_name = "WHEN")]
-    pub full_disk: Option<Moment>,
+    /// Keep all states on a file system of 1 MB that fails so; for root only. While it fails a zone is drawn first, which
+    /// must be kept on it.
+    #[arg(long, value_name = "FAULT")]
+    pub disk: Option<DiskFault>,
     /// One more member of the fleet sends 10 MB of garbage in each second, in place of what it said until then.
     #[arg(long)]
     pub garbage: bool,
@@ -57,13 +62,25 @@ pub struct Swarm {
     pub port_offset: u16,
 }
 
-/// When the disk becomes full.
+/// A fault of the disk that all states are kept on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Moment {
-    /// Before anything is kept on it.
-    Start,
-    /// When everybody is in the air.
-    Flight,
+pub enum DiskFault {
+    /// It is full before anything is kept on it.
+    FullFromStart,
+    /// It is full as soon as everybody is in the air, as with those that follow.
+    Full,
+    /// It can only be read.
+    ReadOnly,
+    /// A file is where the folder was.
+    Replaced,
+    /// The folder is gone. Whoever keeps something makes it again, so that nothing fails.
+    Removed,
+}
+
+impl DiskFault {
+    pub fn all() -> &'static [Self] {
+        Self::value_variants()
+    }
 }
 
 impl Task for Holds {
@@ -132,6 +149,9 @@ impl Holds {
         let mut measured = with_operator("hold", swarm, move |operator| {
             let console = operator.console();
             let load = deep_script.then(|| Beat::of(move || DeepScripts::new(console, &counted)));
+            if let Some(fault) = swarm.disk {
+                keep_zone(operator, fault)?;
+            }
             let times = hold(operator, &all, holds);
             load.map_or(Ok(()), Beat::end)?;
             times
@@ -155,7 +175,7 @@ pub fn with_operator(
     swarm: Swarm,
     measure: impl FnOnce(&mut Operator) -> anyhow::Result<Vec<f64>> + Send + 'static,
 ) -> anyhow::Result<Measured> {
-    let Swarm { vehicles, full_disk, garbage, port_offset } = swarm;
+    let Swarm { vehicles, disk, garbage, port_offset } = swarm;
     // An even number, for the reason below.
     let members = if garbage { (vehicles + 1).next_multiple_of(2) } else { vehicles };
     let overrides = Overrides { vehicles: Some(members), ..Overrides::default() };
@@ -163,10 +183,9 @@ pub fn with_operator(
     let scenario = Scenario::open("antipodal", &overrides, 1)?;
     let folder =
         std::env::temp_dir().join(format!("skein-bench-{what}-{}-{port_offset}", std::process::id()));
-    let disk = full_disk.map(|_| SmallDisk::mount(&folder.join("state"))).transpose()?;
-    let fill = || disk.as_ref().map_or(Ok(()), SmallDisk::fill);
-    if full_disk == Some(Moment::Start) {
-        fill()?;
+    let small = disk.map(|_| SmallDisk::mount(&folder.join("state"))).transpose()?;
+    if let (Some(DiskFault::FullFromStart), Some(small)) = (disk, &small) {
+        small.fill()?;
     }
     let setup = Setup { network: Network::Peer, port_offset, launch_on_order: false, secure: false };
     let mut swarm = Processes::start(&scenario, &folder, setup)?;
@@ -186,7 +205,9 @@ pub fn with_operator(
     while !operator.is_finished() {
         swarm.step();
         if are_in_the_air.try_recv().is_ok() {
-            fill()?;
+            if let (Some(fault), Some(small)) = (disk, &small) {
+                small.fail(fault)?;
+            }
             if garbage {
                 // From now on the last vehicle is not itself.
                 swarm.kill(&vehicle_name(members - 1))?;
@@ -198,12 +219,33 @@ pub fn with_operator(
     }
     let measured = operator.join().map_err(|_| anyhow::anyhow!("the operator's thread has panicked"))?;
     load.map_or(Ok(()), Beat::end)?;
+    let log = fs::read_to_string(swarm.log_of(&GROUND)).unwrap_or_default();
     drop(swarm);
-    drop(disk);
+    drop(small);
     // What is left there is of no use to anybody.
     let _ = fs::remove_dir_all(&folder);
     let beside = Beside { garbage: sent.load(Ordering::Relaxed), scripts_refused: 0 };
-    Ok(Measured { times_ms: measured?, beside })
+    let measured = measured?;
+    let fails = disk.is_some_and(|fault| fault != DiskFault::Removed);
+    for vehicle in (0..vehicles).map(vehicle_name).filter(|_| fails) {
+        let told = vehicle.event_name(DiskFails::NAME);
+        ensure!(log.contains(&told), "the station's log does not have {told}");
+    }
+    Ok(Measured { times_ms: measured, beside })
+}
+
+/// Draws a zone, which every vehicle has to keep on its disk: sees that it does, or that it says why it does not, and
+/// that the console tells whose disk fails.
+fn keep_zone(operator: &mut Operator, fault: DiskFault) -> anyhow::Result<()> {
+    let zone = json!({ "name": "pond", "kind": "no_fly", "centre_m": [500, 0], "radius_m": 5 });
+    let refusals = operator.draw_or_refuse(&zone)?;
+    if fault == DiskFault::Removed {
+        ensure!(refusals.is_empty(), "a folder that could be made again was not: {refusals:?}");
+        return Ok(());
+    }
+    let vehicles = refusals.keys().cloned().collect();
+    let told = operator.await_disks_that_fail(&vehicles);
+    told.with_context(|| format!("they do not keep the zone: {refusals:?}"))
 }
 
 /// Times each hold in milliseconds.
@@ -218,7 +260,7 @@ fn hold(operator: &mut Operator, all: &Value, holds: usize) -> anyhow::Result<Ve
     Ok(times_ms)
 }
 
-/// A file system of 1 MB in memory. It is unmounted with this.
+/// A file system of 1 MB in memory. It is unmounted with this, if it is still there.
 struct SmallDisk(PathBuf);
 
 impl SmallDisk {
@@ -229,6 +271,42 @@ impl SmallDisk {
         let status = mount.status().context("mount")?;
         ensure!(status.success(), "{}: cannot be mounted: only root may", at.display());
         Ok(Self(at.to_owned()))
+    }
+
+    fn fail(&self, fault: DiskFault) -> anyhow::Result<()> {
+        match fault {
+            DiskFault::FullFromStart => Ok(()),
+            DiskFault::Full => self.fill(),
+            DiskFault::ReadOnly => self.make_read_only(),
+            DiskFault::Removed => self.remove(),
+            DiskFault::Replaced => {
+                self.remove()?;
+                // Until somebody who keeps something has not made the folder again.
+                while File::create_new(&self.0).is_err() {
+                    fs::remove_dir_all(&self.0).with_context(|| self.0.display().to_string())?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn make_read_only(&self) -> anyhow::Result<()> {
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            let mut mount = Command::new("mount");
+            let status = mount.args(["-o", "remount,ro"]).arg(&self.0).status().context("mount")?;
+            if status.success() {
+                return Ok(());
+            }
+            // It is busy while a file is written.
+            ensure!(Instant::now() < deadline, "{}: cannot be made read-only", self.0.display());
+        }
+    }
+
+    fn remove(&self) -> anyhow::Result<()> {
+        let status = Command::new("umount").arg("--lazy").arg(&self.0).status().context("umount")?;
+        ensure!(status.success(), "{}: cannot be unmounted", self.0.display());
+        fs::remove_dir(&self.0).with_context(|| self.0.display().to_string())
     }
 
     /// Leaves no room on it.
@@ -242,6 +320,7 @@ impl SmallDisk {
 impl Drop for SmallDisk {
     fn drop(&mut self) {
         // It is in memory, and goes with the computer at the latest.
-        let _ = Command::new("umount").arg("--lazy").arg(&self.0).status();
+        let mut umount = Command::new("umount");
+        let _ = umount.args(["--lazy", "--quiet"]).arg(&self.0).status();
     }
 }

@@ -50,7 +50,7 @@ impl Task for Zones {
             }
             Ok(times_ms)
         };
-        let swarm = Swarm { vehicles, full_disk: None, garbage: false, port_offset };
+        let swarm = Swarm { vehicles, disk: None, garbage: false, port_offset };
         let mut times_ms = with_operator("zone", swarm, measure)?.times_ms;
         times_ms.sort_by(f64::total_cmp);
         let [p50, p99, max] = [0.5, 0.99, 1.0].map(|share| quantile(&times_ms, share));

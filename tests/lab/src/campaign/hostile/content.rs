@@ -1,7 +1,9 @@
 //! What the decoders have let through, held against the bounds.
 
-use skein_bp::{Bound, Event, EventSet};
+use skein_bp::script::Assignment;
+use skein_bp::{Bid, Bound, Event, EventSet};
 use skein_dbp::Message;
+use skein_wire::event::{Declared as _, Load};
 use skein_wire::{Payload, State};
 
 /// Whether something in a message that was decoded is beyond a bound: the bound, and how much of it there is.
@@ -110,10 +112,30 @@ impl Finding {
     }
 
     fn event(&mut self, event: &Event) {
+        if event.kind() == Load::NAME
+            && let Some(text) = event.text("script")
+        {
+            self.script(text);
+        }
         self.name(event.name());
         self.count(Bound::EventFields, event.data().len());
         let data = event.data().map(|(key, value)| key.len() + value.as_text().map_or(0, |text| text.len()));
         self.count(Bound::EventBytes, event.name().len() + data.sum::<usize>());
+    }
+
+    /// A script that its reader lets through, as a vehicle binds and tries it.
+    fn script(&mut self, text: &str) {
+        let Ok(assignment) = Assignment::from_json(text) else { return };
+        let Ok(script) = assignment.bind("uav/1").map(|bound| bound.bthread) else { return };
+        let bids = || script.bids();
+        let sets = bids().flat_map(|bid| [bid.waits(), bid.blocks(), bid.interrupts()]);
+        self.count(Bound::ScriptNodes, sets.map(|set| set.extent().nodes).sum());
+        let texts = bids().flat_map(Bid::requests).flat_map(Event::data);
+        self.count(
+            Bound::ScriptBytes,
+            texts.map(|(_, value)| value.as_text().map_or(0, |text| text.len())).sum(),
+        );
+        self.count(Bound::ScriptEvents, script.listened_to().len().max(script.blocked().len()));
     }
 }
 

@@ -11,6 +11,8 @@ use skein_wire::{NodeLink, SenderStats};
 const LONGEST: usize = Bound::SceneBytes.stated();
 /// Each message costs as much as so many bytes, at least.
 const PER_MESSAGE: usize = 512;
+/// Nodes of the fleet.
+const MEMBERS: usize = 5;
 /// Ticks of 20 ms.
 const TICKS_PER_SECOND: usize = 50;
 /// Sets looked at in a tick while one member's messages are taken in. What is read in a tick has some 4000 sets, each of
@@ -69,7 +71,9 @@ impl Cost {
         happened: &[&Happened],
         worst: &mut Worst,
     ) -> Vec<(&'static str, Counted)> {
-        let (_, stats) = node.senders().find(|(name, _)| *name == Some(member)).unwrap_or_default();
+        // Those whom nobody knows are counted together.
+        let known = node.node().member(member);
+        let (_, stats) = node.senders().find(|(name, _)| *name == known).unwrap_or_default();
         let passed = now - std::mem::replace(&mut self.at, now);
         let since = |of: fn(&SenderStats) -> u64| of(&stats) - of(&self.before);
         let (messages, bytes) = (since(|stats| stats.messages), since(|stats| stats.bytes));
@@ -123,6 +127,18 @@ impl Cost {
                 proxies().map(|(_, bid)| bid.blocks().extent().nodes).max().unwrap_or(0) as u64,
                 Bound::SetNodes.stated(),
             ),
+            (
+                "waiting_senders",
+                node.mailbox().senders() as u64,
+                Bound::WaitingSenders.stated() + MEMBERS + 1,
+            ),
+            ("waiting_in_all", node.mailbox().bytes() as u64, Bound::WaitingInAll.stated()),
+            (
+                "history_bytes",
+                node.node().history_bytes() as u64,
+                Bound::HistoryBytes.stated() + Bound::EventBytes.stated(),
+            ),
+            ("ended_names", program.ended_names() as u64, Bound::EndedNames.stated()),
             #[cfg(feature = "mutants")]
             ("sets_per_tick", since(|stats| stats.nodes), SETS_PER_TICK),
         ];

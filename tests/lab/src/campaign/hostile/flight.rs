@@ -84,7 +84,7 @@ pub fn fly(story: &Story) -> anyhow::Result<Flown> {
     let mut flight = Flight::new(story)?;
     let end = match story.rank {
         Rank::Vehicle => PATIENCE,
-        Rank::Operator => OPERATOR_END,
+        Rank::Operator | Rank::Crowd => OPERATOR_END,
     };
     let mut violation = None;
     while violation.is_none() && flight.swarm.now() < end && !flight.is_over() {
@@ -129,15 +129,20 @@ impl<'a> Flight<'a> {
             vehicles: (0..count).map(|index| link(&vehicle_name(index))).collect(),
             ground: link(&GROUND),
         };
+        let mut agents = fly::agent_configs(&scenario);
+        if story.rank == Rank::Crowd {
+            agents.iter_mut().for_each(|agent| agent.roster = Vec::new());
+        }
         let mut swarm = Swarm::new(
             Simulation::new(fly::simulation_config(&scenario)),
-            fly::agent_configs(&scenario),
+            agents,
             fly::ground_config(&scenario, Fleet::new(FLEET)?, Controller::Bp),
             links,
         )?;
         let member = match story.rank {
             Rank::Vehicle => vehicle_name(FLYING),
             Rank::Operator => node_name("script", "operator"),
+            Rank::Crowd => node_name("uav", "crowd"),
         };
         network.leave(&member);
         swarm.kill_agent(FLYING);
@@ -265,6 +270,12 @@ impl<'a> Flight<'a> {
                 found.extend(beyond.map(|beyond| (name.clone(), beyond)));
             }
         }
+        for agent in self.swarm.agents().take(FLYING) {
+            // In a fleet without a roster nobody is known by name.
+            let known = agent.known_vehicles() as u64;
+            let beyond = note(&mut worst, "strangers", known, Bound::Strangers.stated());
+            found.extend(beyond.map(|beyond| (agent.name().clone(), beyond)));
+        }
         for (name, repeated) in std::mem::take(&mut self.mouth.repeated) {
             let (used, at) = self.repeats.entry(name.clone()).or_default();
             let passed = now - std::mem::replace(at, now);
@@ -347,7 +358,7 @@ pub fn scenario(story: &Story, goals: &[[f64; 2]]) -> anyhow::Result<Scenario> {
     });
     let member = match story.rank {
         Rank::Vehicle => "[[vehicle]]\nstart_m = [0.0, 18.0]\nwaypoints_m = [[14.0, 18.0, 3.0]]\n",
-        Rank::Operator => "",
+        Rank::Operator | Rank::Crowd => "",
     };
     let text = lanes.collect::<String>() + member;
     Ok(Scenario::from_toml(&text, "hostile.toml", None, story.seed)?)

@@ -5,6 +5,7 @@ mod cost;
 mod flight;
 mod mouth;
 mod processes;
+mod scripts;
 mod story;
 
 use std::collections::BTreeMap;

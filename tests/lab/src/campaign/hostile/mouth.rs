@@ -11,13 +11,16 @@ use skein_dbp::{
     BidAck, BidRecord, Board, BoardRow, JointWord, Lift, Message, NewRoster, NodeName, Occurrence, OnLoss,
     Presence, Refusal, RefusalReason, RemoteBid, Repair, ServedRequest,
 };
-use skein_sim::fly::{FLEET, GROUND};
-use skein_wire::event::{Declared as _, Enter, Events as _, Handover, OrderTaken, SWARM, Takeoff, What};
+use skein_sim::fly::{FLEET, GROUND, node_name};
+use skein_wire::event::{
+    Declared as _, Enter, Events as _, Handover, Load, OrderTaken, SWARM, Takeoff, What,
+};
 use skein_wire::{
     Check, CheckState, Fleet, Key, Link, MAX_PAYLOAD, MissionState, Payload, Readiness, Route, Scan, Scene,
     State,
 };
 
+use super::scripts;
 use super::story::{Habit, Rank, Say};
 
 /// It goes on saying that it is there, in so many ticks.
@@ -28,6 +31,8 @@ const OVERHEARD: usize = 64;
 const MOST_BLOCKS: usize = 40;
 /// B-threads of its own that block what another one of them waits for.
 const WAITS_FOR: usize = 8;
+/// Names of its own invention.
+const INVENTED: usize = 10_000;
 /// A field that no version knows, with a length before its content: number 1000.
 const UNKNOWN_FIELD: [u8; 2] = [0xc2, 0x3e];
 
@@ -125,6 +130,9 @@ impl Mouth {
     }
 
     fn say(&mut self, habit: &Habit, random: &mut ChaCha8Rng) {
+        if self.rank == Rank::Crowd {
+            self.me = invented(random.random_range(0..INVENTED));
+        }
         // Sizes of every order, the greatest most often.
         let order = if random.random_bool(0.5) { 1.0 } else { random.random_range(0.75_f64..=1.0) };
         let size = (habit.size.max(1) as f64).powf(order).round() as u64;
@@ -156,9 +164,7 @@ impl Mouth {
             Say::Fields => self.fields(count, random),
             Say::Refuses => self.refuse(count, random),
             Say::Happens => self.happen(size),
-            Say::Long => {
-                self.occur(1, Event::new(self.me.event_name("said")).with("text", "l".repeat(count)))
-            }
+            Say::Long => self.long(count),
             Say::Serves => self.serve(count),
             Say::Wants => self.want(size, random),
             Say::Forges => (0..size).for_each(|_| self.forge(random)),
@@ -168,6 +174,13 @@ impl Mouth {
             Say::Padded => self.padded(count, random),
             Say::Floods => self.flood(size, random),
             Say::Garbage => self.garbage(count, random),
+            Say::Loads => self.load(count, random),
+            Say::Ends => {
+                let home = self.others[1].clone();
+                let count = count.min(Bound::RecordRequests.stated());
+                self.send_scripts(&home, vec![scripts::that_ends_at_once(); count]);
+            }
+            Say::Invents => self.invent(count),
         }
     }
 
@@ -391,7 +404,7 @@ impl Mouth {
         // A vehicle may ask for that by right, and may not block it.
         let (awaited, requests) = match self.rank {
             Rank::Vehicle => ("launch", Vec::new()),
-            Rank::Operator => ("abort", (0..count).map(abort).collect()),
+            Rank::Operator | Rank::Crowd => ("abort", (0..count).map(abort).collect()),
         };
         let block = EventSet::from(format!("{SWARM}/{awaited}"));
         let keeps = (0..WAITS_FOR).map(|number| self.bid(&format!("keeps{number}"), block.clone()));
@@ -434,8 +447,8 @@ impl Mouth {
     fn refuse(&mut self, count: usize, random: &mut ChaCha8Rng) {
         let node = pick(random, &self.others.clone());
         let refusal = |number: usize| Refusal {
-            bthread: if number == 0 { "hold".to_owned() } else { format!("r{number}") },
-            sync: random_of(number),
+            bthread: if number == 0 { "hold".to_owned() } else { format!("r{}", number % 10) },
+            sync: some_sync(number),
             reason: RefusalReason::ALL[number % RefusalReason::ALL.len()],
         };
         let ack = BidAck {
@@ -484,21 +497,76 @@ impl Mouth {
         }
     }
 
+    fn long(&mut self, bytes: usize) {
+        let text = "l".repeat(bytes);
+        self.occur(1, Event::new(self.me.event_name("said")).with("text", text.clone()));
+        // What an operator may ask for is kept at its home, however long it is.
+        if self.rank == Rank::Operator {
+            let home = self.others[0].clone();
+            let order = OrderTaken::plain(What::Hold, "mallory").at(&home).with("text", text);
+            let bid = RemoteBid { requests: vec![order], ..self.bid("orders", EventSet::None) };
+            let record = self.record(&home, vec![bid]);
+            self.put_record(record);
+        }
+    }
+
+    /// A script for a vehicle, of about so many sets.
+    fn load(&mut self, count: usize, random: &mut ChaCha8Rng) {
+        let vehicles: Vec<NodeName> = self.others.iter().filter(|node| **node != *GROUND).cloned().collect();
+        let home = pick(random, &vehicles);
+        let body = match random.random_range(0..3) {
+            0 => scripts::of_many_events(count),
+            1 => scripts::of_many_sets(count),
+            _ => scripts::that_becomes_long(count),
+        };
+        self.send_scripts(&home, vec![body]);
+    }
+
+    fn send_scripts(&mut self, home: &NodeName, bodies: Vec<serde_json::Value>) {
+        let mut bid_for = |(number, body)| {
+            let name = format!("s{}of{}", number, self.epoch);
+            let load =
+                Load { name: None, script: scripts::text(&name, body).into(), by: Some("mallory".into()) };
+            RemoteBid { requests: vec![load.at(home)], ..self.bid(&format!("loads{number}"), EventSet::None) }
+        };
+        let bids = bodies.into_iter().enumerate().map(&mut bid_for).collect();
+        let record = self.record(home, bids);
+        self.put_record(record);
+    }
+
+    /// Vehicles that nobody knows, whose words are long.
+    fn invent(&mut self, count: usize) {
+        let me = self.me.clone();
+        for number in 0..count {
+            self.me = invented(number);
+            self.occur(1, Event::new(self.me.event_name("said")).with("text", "i".repeat(30_000)));
+            self.put_state(self.state());
+        }
+        self.me = me;
+    }
+
     fn serve(&mut self, count: usize) {
         self.seq += 1;
         let served = |number: usize| ServedRequest {
             node: self.others[number % self.others.len()].clone(),
             incarnation: 1,
             bthread: format!("b{number}"),
-            sync: random_of(number),
+            sync: some_sync(number),
         };
         let by = |number: usize| format!("{}#b{number}", self.me).into();
-        let occurrence = Occurrence {
-            requests_served: (0..count).map(served).collect(),
-            requested_by: (0..count).map(by).collect(),
-            ..self.occurrence(Event::new(self.me.event_name("said")))
+        let of_names = |from: usize, to: usize| {
+            let occurrence = Occurrence {
+                requests_served: (from..to).map(served).collect(),
+                requested_by: (from..to).map(by).collect(),
+                ..self.occurrence(Event::new(self.me.event_name("said")))
+            };
+            Payload::Message(Message::Occurrence(occurrence)).encode()
         };
-        self.put_occurrence(occurrence);
+        // No more names than may be are written at once; written one after another, such messages are one.
+        let most = Bound::NamesServed.stated();
+        let parts = (0..count).step_by(most).map(|from| of_names(from, (from + most).min(count)));
+        let encoded = parts.flatten().collect();
+        self.put_bytes(&Key::to_all::<Occurrence>(&self.fleet, self.me.clone()), encoded);
     }
 
     fn want(&mut self, count: u64, random: &mut ChaCha8Rng) {
@@ -764,8 +832,12 @@ fn pick<T: Clone>(random: &mut ChaCha8Rng, among: &[T]) -> T {
     among[random.random_range(0..among.len())].clone()
 }
 
-fn random_of(number: usize) -> u64 {
-    number as u64 % 7
+fn some_sync(number: usize) -> u64 {
+    1 + number as u64 % 7
+}
+
+fn invented(number: usize) -> NodeName {
+    node_name("uav", &format!("x{number}"))
 }
 
 fn varint(mut number: usize) -> Vec<u8> {

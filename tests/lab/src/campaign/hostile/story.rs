@@ -13,6 +13,8 @@ skein_bp::words! {
     pub enum Rank {
         Vehicle = "vehicle",
         Operator = "operator",
+        /// None: whoever is beside a fleet without certificates and without a roster speaks under ever new names.
+        Crowd = "crowd",
     }
 }
 
@@ -77,6 +79,12 @@ skein_bp::words! {
         Floods = "floods",
         /// What is no message; bytes.
         Garbage = "garbage",
+        /// Scripts that have many or deep sets, or become long when they are filled in; sets, more or less.
+        Loads = "loads",
+        /// Scripts of ever new names that end at once; how many.
+        Ends = "ends",
+        /// Long occurrences and states of vehicles that nobody knows; vehicles.
+        Invents = "invents",
     }
 }
 
@@ -112,6 +120,9 @@ impl Say {
             Self::Padded => (15_000, 1_200_000),
             Self::Floods => (200, 1500),
             Self::Garbage => (100, 1_200_000),
+            Self::Loads => (100, 390),
+            Self::Ends => (8, 100),
+            Self::Invents => (100, 200),
         }
     }
 }
@@ -154,13 +165,27 @@ pub struct Story {
 }
 
 impl Story {
-    /// The story of a seed; every fourth is an operator's.
+    /// The story of a seed; every fourth is an operator's, every tenth a crowd's.
     #[must_use]
     pub fn of(seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let rank = if seed.is_multiple_of(4) { Rank::Operator } else { Rank::Vehicle };
+        let rank = match seed {
+            seed if seed.is_multiple_of(4) => Rank::Operator,
+            seed if seed % 10 == 5 => Rank::Crowd,
+            _ => Rank::Vehicle,
+        };
         let count = random.random_range(6..=14);
-        Self { seed, rank, habits: (0..count).map(|_| habit(&mut random)).collect() }
+        let mut habits: Vec<Habit> = (0..count).map(|_| any_habit(&mut random)).collect();
+        // What only this rank may.
+        let own: &[Say] = match rank {
+            Rank::Vehicle => &[],
+            Rank::Operator => &[Say::Loads, Say::Ends, Say::Long],
+            Rank::Crowd => &[Say::Invents],
+        };
+        // It does so all the time: what it brings about adds up.
+        let always = |say: &Say| Habit { from: 20, until: LAST_TICK, every: 2, ..habit(*say, &mut random) };
+        habits.extend(own.iter().map(always));
+        Self { seed, rank, habits }
     }
 
     /// Stories that are shorter or smaller by one thing, the greatest simplifications first.
@@ -212,7 +237,7 @@ impl fmt::Display for Story {
     }
 }
 
-fn habit(random: &mut ChaCha8Rng) -> Habit {
+fn any_habit(random: &mut ChaCha8Rng) -> Habit {
     let say = loop {
         let say = Say::ALL[random.random_range(0..Say::ALL.len())];
         // One that has led its last life says nothing more that counts.
@@ -220,6 +245,10 @@ fn habit(random: &mut ChaCha8Rng) -> Habit {
             break say;
         }
     };
+    habit(say, random)
+}
+
+fn habit(say: Say, random: &mut ChaCha8Rng) -> Habit {
     let (common, worst) = say.sizes();
     let most = if random.random_bool(0.35) { worst } else { common };
     let size = (most as f64).powf(random.random_range(0.8_f64..=1.0)).round() as u64;

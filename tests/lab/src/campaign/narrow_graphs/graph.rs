@@ -158,6 +158,14 @@ impl Case {
         Self { graph, starts: vec![3, 0], goals: vec![2, 1] }
     }
 
+    /// Two cross where four ways meet, and neither stands where the other comes out.
+    #[cfg(test)]
+    pub fn four_ways() -> Self {
+        let narrow = vec![true, false, false, false, false];
+        let graph = Graph::new(5, [[0, 1], [0, 2], [0, 3], [0, 4]], narrow);
+        Self { graph, starts: vec![1, 3], goals: vec![2, 4] }
+    }
+
     /// A random case in a random graph.
     pub fn random(places: usize, vehicles: usize, random: &mut ChaCha8Rng) -> Self {
         loop {

@@ -219,6 +219,7 @@ mod tests {
             (Case::corridor(2), true),
             (Case::met_inside(), false),
             (Case::crossing(), true),
+            (Case::four_ways(), true),
         ] {
             let outcome = explored(&case, stale, None);
             assert!(!outcome.is_cut && outcome.shared.is_none() && outcome.stuck.is_none(), "{outcome:?}");
@@ -230,6 +231,12 @@ mod tests {
         for missing in [Missing::Confirmation, Missing::Hold] {
             assert!(explored(&Case::corridor(1), false, Some(missing)).shared.is_some(), "{missing:?}");
         }
+    }
+
+    #[test]
+    fn where_nobody_gives_in_two_that_stand_in_nobody_s_way_claim_a_crossing_for_ever() {
+        let outcome = explored(&Case::four_ways(), false, Some(Missing::GivingIn));
+        assert!(!outcome.is_cut && outcome.stuck.is_some(), "{outcome:?}");
     }
 
     #[test]
