@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, anyhow, bail};
 use clap::Args;
+use nix::unistd::{Uid, User};
 use rustls::pki_types::pem::PemObject as _;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName};
 use rustls::{ClientConfig, ClientConnection, RootCertStore, StreamOwned};
@@ -115,16 +116,21 @@ fn refusal<R: tungstenite::handshake::HandshakeRole>(error: tungstenite::Handsha
     }
 }
 
+/// The name of the account that this runs under.
+fn account() -> Option<String> {
+    let named = ["USER", "USERNAME"].iter().find_map(|variable| std::env::var(variable).ok());
+    named.or_else(|| User::from_uid(Uid::current()).ok().flatten().map(|user| user.name))
+}
+
 impl Caller {
     fn introduce(&mut self, by: Option<&str>) -> anyhow::Result<()> {
         let you = self.next_of("you")?;
         let certified = you["name"].as_str().filter(|_| you["certified"] == true);
         let name = match (by, certified) {
             (Some(name), _) | (None, Some(name)) => name.to_owned(),
-            (None, None) => ["USER", "USERNAME"]
-                .iter()
-                .find_map(|variable| std::env::var(variable).ok())
-                .context("nobody is named who gives this order: add `--by NAME`")?,
+            (None, None) => {
+                account().context("your account has no name, and orders need one: add `--by NAME`")?
+            }
         };
         let you = self.ask(json!({ "type": "hello", "name": name }), "you")?;
         self.name = you["name"].as_str().unwrap_or_default().to_owned();
