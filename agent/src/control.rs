@@ -401,8 +401,9 @@ impl Control {
     pub fn look_ahead(&mut self, now: Duration) -> Vec<Report> {
         self.guidance.arrival_m_s = self.arrival_m_s();
         let Some(motion) = self.flown_motion() else { return Vec::new() };
-        let (map, around) = (self.perception.map(), self.neighbours.around());
-        self.guidance.look_ahead(now, &motion, map, around)
+        let (map, around) = (self.perception.map_mut(), self.neighbours.around());
+        let found = self.guidance.look_ahead(now, &motion, map, around);
+        found.into_iter().map(|report| self.with_zone(report)).collect()
     }
 
     /// The time that the vehicle has to go at cruise speed until it arrives together with others, s; none if it does

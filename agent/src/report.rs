@@ -10,7 +10,7 @@ use skein_wire::event::{
     Airborne, Arrived, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed, Cornered,
     FenceBreached, FoundAirborne, InTheWay, Landed, Leave, OrderTaken, OutOfTheWay, PathBlocked, PilotTook,
     PlaceFree, PlaceTaken, Planned, PositionDoubted, PositionTrusted, Ready, Refuge, Right, Slept,
-    SourceFound, SourceLost, Stuck, TooClose, Unplannable, Unready, What, ZoneNews, ZoneState,
+    SourceFound, SourceLost, Stuck, TooClose, Unplannable, Unready, WayBack, What, ZoneNews, ZoneState,
 };
 
 use crate::energy::Changed;
@@ -96,6 +96,11 @@ pub enum Report {
     Refuge(Vector3<f64>),
     /// The path runs into something.
     PathBlocked,
+    /// It is outside the space that paths lead through, and goes straight back to this place of it (m ENU).
+    WayBack {
+        to: Vector3<f64>,
+        why: String,
+    },
     /// The vehicle makes no progress in spite of leave to move.
     Stuck,
     /// A narrow stretch lies ahead, with that part of it in which the vehicle is.
@@ -159,6 +164,7 @@ impl Report {
             Self::PlaceFree => me.event(PlaceFree),
             Self::Refuge(at) => me.event(Refuge { x: at.x, y: at.y, z: at.z }),
             Self::PathBlocked => me.event(PathBlocked),
+            Self::WayBack { to, why } => me.event(WayBack { x: to.x, y: to.y, z: to.z, why: why.into() }),
             Self::Stuck => me.event(Stuck),
             Self::Passage(stretch) => match stretch.passage() {
                 Some(passage) => me.event(passage),
