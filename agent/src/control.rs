@@ -16,6 +16,7 @@ use skein_wire::{Limits, Readiness, Scan, State, Zone};
 use crate::{
     apart::decisions::{Decisions, Standing, is_too_late},
     arrival,
+    autopilot_words::AutopilotWords,
     config::AgentConfig,
     energy::{Energy, known_charge},
     flight::{Flight, FlightPhase},
@@ -71,6 +72,7 @@ pub struct Control {
     station: Station,
     /// Lines that the autopilot wrote, until they are taken.
     texts: Vec<Text>,
+    words: AutopilotWords,
     preflight: Preflight,
     failsafes: Failsafes,
     handling: HandlingParameters,
@@ -123,6 +125,7 @@ impl Control {
             }),
             station: Station::of(config.system_id),
             texts: Vec::new(),
+            words: AutopilotWords::default(),
             preflight: Preflight::default(),
             failsafes: Failsafes::new(config.system_id),
             handling: HandlingParameters::default(),
@@ -321,12 +324,14 @@ impl Control {
             self.failsafes.hear(&event, self.companion.dialect());
             self.handling.hear(&event, self.companion.dialect());
             reports.extend(self.flight.hear(now, &event, &mut self.companion));
-            if let MavEvent::Text(text) = event
-                && self.texts.len() < Telemetry::MAX_TEXTS
-            {
-                self.texts.push(text);
+            if let MavEvent::Text(text) = event {
+                self.words.hear(&text);
+                if self.texts.len() < Telemetry::MAX_TEXTS {
+                    self.texts.push(text);
+                }
             }
         }
+        reports.extend(self.words.tell(now));
         let envelope = self.handling.within(self.config.envelope, self.companion.dialect());
         if envelope != *self.guidance.envelope() {
             self.guidance.handle(envelope);
@@ -401,8 +406,9 @@ impl Control {
     pub fn look_ahead(&mut self, now: Duration) -> Vec<Report> {
         self.guidance.arrival_m_s = self.arrival_m_s();
         let Some(motion) = self.flown_motion() else { return Vec::new() };
-        let (map, around) = (self.perception.map(), self.neighbours.around());
-        self.guidance.look_ahead(now, &motion, map, around)
+        let (map, around) = (self.perception.map_mut(), self.neighbours.around());
+        let found = self.guidance.look_ahead(now, &motion, map, around);
+        found.into_iter().map(|report| self.with_zone(report)).collect()
     }
 
     /// The time that the vehicle has to go at cruise speed until it arrives together with others, s; none if it does

@@ -10,6 +10,7 @@ pub mod apart;
 pub mod arrival;
 #[cfg(feature = "zenoh")]
 pub mod autopilot_link;
+mod autopilot_words;
 pub mod bthreads;
 #[cfg(feature = "zenoh")]
 mod cli;

@@ -5,14 +5,15 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_bp::Event;
 use skein_dbp::NodeName;
-use skein_mav::FlightMode;
+use skein_mav::{FlightMode, Text};
 use skein_wire::event::{
-    Airborne, Arrived, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed, Cornered,
-    FenceBreached, FoundAirborne, InTheWay, Landed, Leave, OrderTaken, OutOfTheWay, PathBlocked, PilotTook,
-    PlaceFree, PlaceTaken, Planned, PositionDoubted, PositionTrusted, Ready, Refuge, Right, Slept,
-    SourceFound, SourceLost, Stuck, TooClose, Unplannable, Unready, What, ZoneNews, ZoneState,
+    Airborne, Arrived, AutopilotSays, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed,
+    Cornered, FenceBreached, FoundAirborne, InTheWay, Landed, Leave, OrderTaken, OutOfTheWay, PathBlocked,
+    PilotTook, PlaceFree, PlaceTaken, Planned, PositionDoubted, PositionTrusted, Ready, Refuge, Right, Slept,
+    SourceFound, SourceLost, Stuck, TooClose, Unplannable, Unready, WayBack, What, ZoneNews, ZoneState,
 };
 
+use crate::autopilot_words;
 use crate::energy::Changed;
 use crate::me::Me;
 use crate::positioning::SourceNews;
@@ -96,6 +97,16 @@ pub enum Report {
     Refuge(Vector3<f64>),
     /// The path runs into something.
     PathBlocked,
+    /// A line of the autopilot, and how often it came since it was told last.
+    AutopilotSays {
+        text: Text,
+        times: i64,
+    },
+    /// It is outside the space that paths lead through, and goes straight back to this place of it (m ENU).
+    WayBack {
+        to: Vector3<f64>,
+        why: String,
+    },
     /// The vehicle makes no progress in spite of leave to move.
     Stuck,
     /// A narrow stretch lies ahead, with that part of it in which the vehicle is.
@@ -159,6 +170,12 @@ impl Report {
             Self::PlaceFree => me.event(PlaceFree),
             Self::Refuge(at) => me.event(Refuge { x: at.x, y: at.y, z: at.z }),
             Self::PathBlocked => me.event(PathBlocked),
+            Self::AutopilotSays { text: Text { severity, text }, times } => me.event(AutopilotSays {
+                severity: autopilot_words::severity(severity),
+                text: text.into(),
+                times,
+            }),
+            Self::WayBack { to, why } => me.event(WayBack { x: to.x, y: to.y, z: to.z, why: why.into() }),
             Self::Stuck => me.event(Stuck),
             Self::Passage(stretch) => match stretch.passage() {
                 Some(passage) => me.event(passage),

@@ -105,7 +105,7 @@ impl Flight {
             self.guidance.grant_leave(self.now);
             if tick % 5 == 0 {
                 self.looks();
-                let (map, motion) = (self.perception.map(), self.motion);
+                let (map, motion) = (self.perception.map_mut(), self.motion);
                 for report in self.guidance.look_ahead(self.now, &motion, map, &[]) {
                     if report == Report::PathBlocked {
                         reports.extend(self.plans());

@@ -83,7 +83,7 @@ impl Flight {
             self.reports.extend(self.guidance.go_on_planning(self.perception.map_mut()));
             if tick % 5 == 0 {
                 self.looks();
-                let told = self.guidance.look_ahead(self.now, &self.motion, self.perception.map(), &[]);
+                let told = self.guidance.look_ahead(self.now, &self.motion, self.perception.map_mut(), &[]);
                 if tick == 0 || told.contains(&Report::PathBlocked) {
                     self.plans();
                 }

@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use foxglove::messages::{FrameTransforms, LaserScan, PoseInFrame, SceneUpdate};
+use foxglove::messages::{FrameTransforms, LaserScan, Log, PoseInFrame, SceneUpdate};
 use nalgebra::{Isometry3, Vector3};
 use prost::Message;
 use skein_bp::{Event, Origin};
 use skein_dbp::Happened;
 use skein_ground::recorder::{Level, Recorder, RecorderError};
 use skein_wire::NodeName;
+use skein_wire::event::{AutopilotSays, Declared as _, Severity};
 use skein_wire::proto::TraceEvent;
 use skein_wire::{Form, Scan, Solid};
 
@@ -197,5 +198,26 @@ fn eight_vehicles_cost_little() -> Outcome {
     let per_second = begin.elapsed() / 20;
     println!("{per_second:?} per simulated second");
     assert!(per_second < ms(60), "{per_second:?}");
+    Ok(())
+}
+
+#[test]
+fn a_line_of_an_autopilot_is_as_serious_in_the_log_as_it_was() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("mission.mcap");
+    let mut recorder = Recorder::create(&path)?;
+    for severity in [Severity::Emergency, Severity::Error, Severity::Warning, Severity::Info] {
+        let said = AutopilotSays { severity, text: "motor 3".into(), times: 2 }.at("uav/1");
+        recorder.event(ms(20), &Happened { event: said, ..event(20, "uav/1/advance") })?;
+    }
+    recorder.finish()?;
+    let file = std::fs::read(&path)?;
+    let logged = by_topic(&file)?["/log"]
+        .iter()
+        .map(|message| Log::decode(&*message.data))
+        .collect::<Result<Vec<_>, _>>()?;
+    let levels: Vec<_> = logged.iter().map(Log::level).collect();
+    assert_eq!(levels, [Level::Fatal, Level::Error, Level::Warning, Level::Info]);
+    assert!(logged[0].message.contains("motor 3"), "{}", logged[0].message);
     Ok(())
 }

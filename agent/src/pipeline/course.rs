@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use skein_dbp::NodeName;
 use skein_planning::{Path, Region, map::ClearanceMap};
 
-use super::global::Found;
+use super::{global::Found, way_back::Space};
 use crate::instruction::Waypoint;
 
 /// A path is kept while its clearance is less by no more than this, m.
@@ -43,6 +43,8 @@ pub struct Following {
     pub is_blocked: bool,
     /// The length for which it was searched, if that does not reach the waypoint, m; what follows is a guess.
     searched_m: Option<f64>,
+    /// It leads straight back into this space, and is not known to the map.
+    pub back_into: Option<Space>,
 }
 
 impl Course {
@@ -61,7 +63,22 @@ impl Course {
 impl Following {
     /// A path to the waypoint from its beginning, planned to stay within a region.
     pub fn new(Found { path, clearance_m, is_level }: Found, within: Region) -> Self {
-        Self { path, clearance_m, is_level, within, station_m: 0.0, is_blocked: false, searched_m: None }
+        Self {
+            path,
+            clearance_m,
+            is_level,
+            within,
+            station_m: 0.0,
+            is_blocked: false,
+            searched_m: None,
+            back_into: None,
+        }
+    }
+
+    /// The way back into the space that paths lead through.
+    pub fn back(path: Path, space: Space, within: Region) -> Self {
+        let found = Found { path, clearance_m: None, is_level: false };
+        Self { back_into: Some(space), ..Self::new(found, within) }
     }
 
     /// A path that ends short of the waypoint; from there it goes straight on to the place `beyond`, as far as is
@@ -110,6 +127,9 @@ impl Following {
     /// Whether a vehicle at `position` that is to stay `within` a region can fly on along the path, as far as the map
     /// tells.
     pub fn can_be_flown(&self, position: &Vector3<f64>, within: &Region, map: &ClearanceMap) -> bool {
+        if self.back_into.is_some() {
+            return true;
+        }
         if *within != self.within {
             return false;
         }

@@ -23,6 +23,7 @@ use super::{
     progress::{Around, Felt, Leave, Progress},
     steering::{Lead, Steering},
     surroundings::Surroundings,
+    way_back::Tidings,
     way_of_others::{WayOfOthers, goes_first},
 };
 use crate::{
@@ -59,6 +60,7 @@ pub struct Guidance {
     /// The way to a refuge, and when it was found, while the vehicle makes way.
     aside: Option<(Following, Duration)>,
     pub steering: Steering,
+    back: Tidings,
 }
 
 impl Guidance {
@@ -78,6 +80,7 @@ impl Guidance {
             way_of_others: WayOfOthers::new(envelope.separation_m, &passages),
             aside: None,
             steering: Steering::new(envelope, follower, repulsion, filter),
+            back: Tidings::default(),
         }
     }
 
@@ -156,6 +159,7 @@ impl Guidance {
         self.progress.forget();
         self.way_of_others.forget();
         self.aside = None;
+        self.back.forget();
         self.planning.abandon();
     }
 
@@ -297,9 +301,10 @@ impl Guidance {
         &mut self,
         now: Duration,
         motion: &Motion,
-        map: &ClearanceMap,
+        map: &mut ClearanceMap,
         neighbours: &[Neighbour],
     ) -> Vec<Report> {
+        let back = self.look_back(now, motion, map, neighbours);
         let aside = self.keep_aside(now, motion, map, neighbours);
         let (has_leave, allowed, makes_way) = (self.has_leave(now), self.allowed(), self.aside.is_some());
         let leave = match (has_leave, makes_way) {
@@ -316,11 +321,34 @@ impl Guidance {
             let in_the_way = InTheWay { is_stuck: false, minimum: None, neighbours, movers };
             self.planning.extend(in_the_way, &mut self.course, allowed.region, motion, map);
         }
-        aside.into_iter().chain(along).collect()
+        back.into_iter().chain(aside).chain(along).collect()
+    }
+
+    /// On the way back into the space that paths lead through: tells of it, and plans on once it is there.
+    fn look_back(
+        &mut self,
+        now: Duration,
+        motion: &Motion,
+        map: &mut ClearanceMap,
+        neighbours: &[Neighbour],
+    ) -> Option<Report> {
+        let following = self.course.following.as_ref();
+        let Some((space, end)) = following.and_then(|way| Some((way.back_into?, way.path.end()))) else {
+            self.back.forget();
+            return None;
+        };
+        if space.is_entered_at(&motion.position) && !self.planning.is_under_way() {
+            return self.plan(false, motion, map, neighbours);
+        }
+        let moves = (&motion.position, motion.velocity.norm());
+        self.back.look(now, moves, end, &space, self.has_leave(now))
     }
 
     /// For what the vehicle waits though it has leave to move.
     pub fn waits_for(&self) -> Option<&'static str> {
+        if self.back.is_held_up() {
+            return Some("something to leave its way back inside");
+        }
         let waits = self.progress.waits().then_some("something that moves to leave its way");
         let dawdles = self.arrival_m_s < 0.5 * self.envelope.cruise_m_s;
         waits.or(dawdles.then_some("those together with which it is to arrive"))

@@ -28,4 +28,5 @@ pub mod set_point;
 pub mod steering;
 pub mod surroundings;
 pub mod touchdown;
+mod way_back;
 pub mod way_of_others;

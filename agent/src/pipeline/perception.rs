@@ -49,7 +49,7 @@ const BELOW_WAYPOINTS_M: f64 = 1.0;
 /// No path is lower than this above the take-off place, m.
 const LEAST_HEIGHT_M: f64 = 0.6;
 /// Beyond every map, m.
-const FAR_CORNER: Vector3<f64> = Vector3::new(1e9, 1e9, 1e9);
+pub(super) const FAR_CORNER: Vector3<f64> = Vector3::new(1e9, 1e9, 1e9);
 /// Paths keep this far out of zones, m: what a vehicle strays from its path, the error of its position, and its hull.
 pub const ZONE_MARGIN_M: f64 = 1.0;
 /// Paths keep this high above terrain that is known, m.

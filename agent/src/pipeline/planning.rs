@@ -12,6 +12,7 @@ use super::{
     course::{Course, Following},
     global::{Found, PathFinder, Task},
     route_search::{ALLOWANCE, RouteSearch},
+    way_back::Space,
 };
 use crate::{
     config::{Envelope, Fence},
@@ -115,6 +116,7 @@ impl Planning {
     /// Begins to plan a path to the waypoint, `within` a region. Where the vehicle is stuck, neighbours that stand
     /// around, and what moves, are obstacles too. A neighbour that has fallen silent always is, as large as its ghost
     /// will be. The answer comes at once if this tick's allowance is enough for it, else from [`Planning::go_on`].
+    /// From outside the space that paths lead through the way leads straight back, and is planned on from there.
     pub fn begin(
         &mut self,
         in_the_way: InTheWay<'_>,
@@ -127,8 +129,20 @@ impl Planning {
             return Some(Report::Unplannable { leg: 0, why: "there is no waypoint".to_owned(), zone: None });
         };
         self.extends = false;
+        let space = self.space(map);
+        let back = space.is_left_at(&motion.position).then(|| space.way_from(&motion.position, map));
+        if let Some(path) = back.flatten() {
+            self.abandon();
+            let following = course.following.insert(Following::back(path, space, within));
+            return Some(Report::Planned { leg: waypoint.leg, length_m: following.path.length_m() });
+        }
         self.prepare(in_the_way, waypoint, within, motion, map);
         self.search(course, map)
+    }
+
+    /// The space that paths lead through.
+    fn space(&self, map: &ClearanceMap) -> Space {
+        Space::of(&self.fence, map, self.envelope.obstacle_clearance_m())
     }
 
     /// Begins to plan on from where the vehicle is, if the path that it flies ends short of the waypoint and half of

@@ -158,7 +158,7 @@ impl Progress {
         if leave != Leave::ToMakeWay {
             reports.extend(check_path(course, allowed, motion, map));
         }
-        let following = course.following.as_ref();
+        let following = course.following.as_ref().filter(|following| following.back_into.is_none());
         reports.extend(self.check_passage(following, leave == Leave::ToMakeWay, motion, map));
         let moves_at = Some(now).filter(|_| leave == Leave::ToMove);
         let moves_at = moves_at.filter(|now| !self.queues(*now, course, motion, map, neighbours));
@@ -302,7 +302,9 @@ impl Progress {
         motion: &Motion,
         felt: Felt<'_>,
     ) -> Option<Report> {
-        if course.waypoint.is_none() || course.has_arrived {
+        // What holds it up on its way back no plan leads around.
+        let goes_back = course.following.as_ref().is_some_and(|following| following.back_into.is_some());
+        if course.waypoint.is_none() || course.has_arrived || goes_back {
             self.escape.reset();
             self.patience.forget();
             return None;

@@ -6,6 +6,7 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_mav::SetPoint;
 use skein_planning::{
+    Path,
     local::{
         apf, braking,
         escape::Forces,
@@ -41,6 +42,16 @@ const STATION_KEEPING_M_S: f64 = 0.5;
 /// Speed at which a vehicle that is to land goes to where it can, at most, m/s; further away, for each metre, 1/s.
 const SETTLING_M_S: f64 = 1.0;
 const SETTLING_SHARE: f64 = 0.5;
+/// Speed at which a vehicle goes back to where paths lead, at most, m/s; nearer to it, for each metre, 1/s.
+const BACK_M_S: f64 = 2.0;
+const BACK_SHARE: f64 = 0.5;
+/// It goes up or down no further beside its way than this, m.
+const BACK_BESIDE_M: f64 = 1.0;
+/// And at least, m/s.
+const BACK_LEAST_M_S: f64 = 0.2;
+/// Where the way back is seen free no further than this, m, another is looked for, that is free so far.
+const BLOCKED_BACK_M: f64 = 5.0;
+const FREE_BACK_M: f64 = 8.0;
 
 /// Makes set-points.
 #[derive(Debug)]
@@ -183,6 +194,9 @@ impl Steering {
         };
         let wish = match (self.settles_at, lead) {
             (Some(place), _) => self.aside(place, motion),
+            (None, Some(Lead { following, .. })) if following.back_into.is_some() => {
+                part_of(self.straight_back(following, motion, allowed, surroundings))
+            }
             (None, Some(lead)) => part_of(self.along_path(lead, motion, allowed, surroundings)),
             (None, None) => part_of(self.keep_station(motion, surroundings.map)),
         };
@@ -221,6 +235,47 @@ impl Steering {
         let far_m_s = (SETTLING_SHARE * offset.norm()).min(self.envelope.cruise_m_s);
         let velocity = apf::limited(offset, far_m_s.max(SETTLING_M_S));
         Wish { velocity, height_m: place.z }
+    }
+
+    /// Straight back to where paths lead, beside the map: no faster than the newest scan sees the way free.
+    fn straight_back(
+        &mut self,
+        following: &mut Following,
+        motion: &Motion,
+        allowed: &Allowed,
+        surroundings: &Surroundings<'_>,
+    ) -> Wish {
+        self.follower.pause();
+        self.hover_at = None;
+        let position = &motion.position;
+        let hard = self.envelope.braking(self.envelope.brake_m_s2);
+        let kept_m = self.envelope.obstacle_clearance_m();
+        let seen_m = |ahead: &Vector3<f64>| match surroundings.sees {
+            true => surroundings.rays.free_m(position, ahead, BACK_BESIDE_M),
+            false => SEEN_AHEAD_M,
+        };
+        let cap_m_s = |ahead: &Vector3<f64>| braking::sensed_cap(seen_m(ahead) - kept_m, &hard);
+        let level = |path: &Path| (path.end() - position).xy().push(0.0);
+        let space = following.back_into;
+        let off_m = level(&following.path).norm();
+        let is_level_way = off_m > BACK_BESIDE_M || space.is_some_and(|space| space.is_beside(position));
+        if is_level_way && seen_m(&level(&following.path)) < off_m.min(BLOCKED_BACK_M) {
+            let is_free = |ahead: &Vector3<f64>, to_go_m: f64| seen_m(ahead) > to_go_m.min(FREE_BACK_M);
+            let around = space.and_then(|space| space.way_around(position, surroundings.map, is_free));
+            following.path = around.unwrap_or_else(|| following.path.clone());
+        }
+        following.station_m = following.path.project(position).station_m;
+        let (end, offset) = (following.path.end(), level(&following.path));
+        let free_m_s = if is_level_way { cap_m_s(&offset) } else { BACK_M_S };
+        let gentle_m_s = |to_go_m: f64| (BACK_SHARE * to_go_m).clamp(BACK_LEAST_M_S, BACK_M_S);
+        let most_m_s = gentle_m_s(offset.norm()).min(free_m_s).min(allowed.speed_m_s);
+        let velocity = apf::limited(offset, most_m_s);
+        if is_level_way {
+            return Wish { velocity, height_m: following.path.start().z };
+        }
+        let climb_m = end.z - position.z;
+        let climb_m_s = gentle_m_s(climb_m.abs()).min(climb_m.abs()) * climb_m.signum();
+        Wish { velocity: velocity.xy().push(climb_m_s), height_m: end.z }
     }
 
     fn along_path(

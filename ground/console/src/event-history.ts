@@ -63,6 +63,21 @@ function concerns(event: SwarmEvent, vehicle: string): boolean {
   );
 }
 
+/** How serious a line of an autopilot is: trouble, or something to be careful of. */
+export function severityOf(event: SwarmEvent): 'bad' | 'warn' | null {
+  switch (event.data.severity) {
+    case 'emergency':
+    case 'alert':
+    case 'critical':
+    case 'error':
+      return 'bad';
+    case 'warning':
+      return 'warn';
+    default:
+      return null;
+  }
+}
+
 /** An event's vehicle (or station) and verb: `uav/1/takeoff` is `uav/1` and `takeoff`. */
 export function split(name: string): { node: string; verb: string } {
   const chunks = name.split('/');

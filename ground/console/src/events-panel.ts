@@ -4,7 +4,7 @@
 
 import { badge } from './badge';
 import { html, setText } from './dom';
-import { EventHistory, passes, split } from './event-history';
+import { EventHistory, passes, severityOf, split } from './event-history';
 import { type Identity, identities } from './identity';
 import type { SwarmEvent } from './protocol';
 import type { Selection } from './selection';
@@ -149,6 +149,8 @@ export class EventsPanel {
       html('span', { class: 'event-verb' }, spaced(verb || event.name)),
       html('span', { class: 'event-data' }, data),
     );
+    const severity = severityOf(event);
+    if (severity) row.dataset.severity = severity;
     const asked = event.requested_by.map((bthread) => shortName(bthread, node));
     if (asked.length > 0) row.append(html('span', { class: 'event-by' }, `by ${asked.join(', ')}`));
     const blocked = event.blocked_by.map((bthread) => shortName(bthread, node));

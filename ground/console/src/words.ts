@@ -69,8 +69,9 @@ export function clockWords(seconds: number): string {
 
 /** An event's data in one line, what and why first: `the path is blocked · leg 1 · at 1.0, 2.0, 3.0`. */
 export function dataWords(data: Record<string, unknown>): string {
-  const { what, why, x, y, z, ...rest } = data;
-  const words = [what, why].filter((value) => value !== undefined).map(valueWords);
+  const { what, why, severity, text, times, x, y, z, ...rest } = data;
+  const often = typeof times === 'number' && times > 1 ? `${times} times` : undefined;
+  const words = [severity, what, why, text, often].filter((value) => value !== undefined).map(valueWords);
   for (const [key, value] of Object.entries(rest)) words.push(key === 'leg' ? legWords(value) : `${spaced(key)} ${valueWords(value)}`);
   const place = [x, y, z].filter((coordinate) => typeof coordinate === 'number');
   if (place.length > 0) words.push(`at ${place.map((coordinate) => coordinate.toFixed(1)).join(', ')}`);

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { EventHistory, passes, split } from '../src/event-history';
+import { EventHistory, passes, severityOf, split } from '../src/event-history';
 import type { SwarmEvent } from '../src/protocol';
 
 function event(seq: number, over: Partial<SwarmEvent> = {}): SwarmEvent {
@@ -54,4 +54,11 @@ test('a filter by text looks everywhere', () => {
 test("an event's name is its node and its verb", () => {
   assert.deepEqual(split('uav/1/takeoff'), { node: 'uav/1', verb: 'takeoff' });
   assert.deepEqual(split('odd'), { node: 'odd', verb: '' });
+});
+
+test('a line of an autopilot stands out by how serious it is', () => {
+  const said = (severity: string) => severityOf(event(1, { name: 'uav/1/autopilot_says', data: { severity, text: 'x', times: 1 } }));
+  assert.deepEqual(['emergency', 'alert', 'critical', 'error'].map(said), ['bad', 'bad', 'bad', 'bad']);
+  assert.deepEqual(['warning', 'notice', 'info'].map(said), ['warn', null, null]);
+  assert.equal(severityOf(event(1)), null);
 });

@@ -97,7 +97,8 @@ impl Recording {
             self.write(move |recorder| recorder.trace(&name, &traced));
             // The trace holds every leave to move; people do not need to read each.
             if !matches!(happened.event.kind(), Advance::NAME | Homeward::NAME) {
-                self.note(now, Level::Info, happened.home.as_str(), &format!("{:#}", happened.event));
+                let said = happened.clone();
+                self.write(move |recorder| recorder.event(now, &said));
             }
         }
         let heard: Vec<&State> = station.roster().filter_map(|(_, state)| state).collect();

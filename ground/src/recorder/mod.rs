@@ -32,6 +32,7 @@ use mcap::{Compression, McapError, WriteOptions, Writer};
 use nalgebra::{Isometry3, Vector3};
 use prost::Message;
 use skein_dbp::{Board, Happened, NodeName};
+use skein_wire::event::{AutopilotSays, Declared as _, Severity};
 use skein_wire::proto::{self, TraceEvent};
 use skein_wire::{Scan, Solid, State};
 use thiserror::Error;
@@ -234,6 +235,12 @@ impl Recorder {
         self.write("/log", now, &message)
     }
 
+    /// An event, as a message for people.
+    pub fn event(&mut self, now: Duration, happened: &Happened) -> Result<(), RecorderError> {
+        let level = AutopilotSays::read(&happened.event).map_or(Level::Info, |said| level(said.severity));
+        self.log(now, level, happened.home.as_str(), &format!("{:#}", happened.event))
+    }
+
     /// An event that `node` selected or heard of, for `/skein/trace`, at the event's own time.
     pub fn trace(&mut self, node: &NodeName, happened: &Happened) -> Result<(), RecorderError> {
         let event = TraceEvent::new(node, happened);
@@ -353,4 +360,13 @@ fn timestamp(time: Duration) -> Timestamp {
 /// A range to the next of 1/512 m, which the noise is well above: its zero bits make scans a third as large on disk.
 fn short(range_m: f32) -> f64 {
     (f64::from(range_m) * 512.0).round() / 512.0
+}
+/// The level of a line of an autopilot.
+fn level(severity: Severity) -> Level {
+    match severity {
+        Severity::Emergency | Severity::Alert => Level::Fatal,
+        Severity::Critical | Severity::Error => Level::Error,
+        Severity::Warning => Level::Warning,
+        Severity::Notice | Severity::Info => Level::Info,
+    }
 }

@@ -148,7 +148,7 @@ fn what_a_vehicle_takes_and_its_own_are_as_they_were() {
     };
     let catalogue = Catalogue::standard();
     assert_eq!(named(&mut catalogue.gateway()), ["order", "handover", "load", "unload"]);
-    assert_eq!(catalogue.own().count(), 53);
+    assert_eq!(catalogue.own().count(), 55);
     let others = catalogue.of_vehicle().filter(|event| event.whose == Whose::Anyone);
     assert_eq!(
         named(&mut { others }),

@@ -91,12 +91,7 @@ impl Recording {
             self.recorder.trace(&happened.home, happened)?;
             // The trace holds every leave to move; people do not need to read each.
             if happened.event.kind() != Advance::NAME {
-                self.recorder.log(
-                    now,
-                    Level::Info,
-                    happened.home.as_str(),
-                    &format!("{:#}", happened.event),
-                )?;
+                self.recorder.event(now, happened)?;
             }
         }
         Ok(())

@@ -130,6 +130,23 @@ impl Swarm {
         }
     }
 
+    /// Begins another life of the agent of vehicle `index`, over this link.
+    ///
+    /// # Errors
+    /// [`AgentError`] names what is wrong in its configuration.
+    pub fn restart_agent(
+        &mut self,
+        index: usize,
+        config: AgentConfig,
+        link: Box<dyn Link>,
+    ) -> Result<(), AgentError> {
+        if let Some(vehicle) = self.vehicles.get_mut(index) {
+            let agent = AgentCore::durable(config, Box::new(MemoryStore::default()))?;
+            *vehicle = Vehicle { agent, link, is_dead: false, has_mission: true };
+        }
+        Ok(())
+    }
+
     /// Ends the ground station as if its process had been killed.
     pub fn kill_ground(&mut self) {
         self.ground_is_dead = true;

@@ -8,6 +8,7 @@ mod determinism;
 mod explain;
 mod faults;
 mod gazebo_worlds;
+mod handed_back;
 mod indoor;
 mod landing;
 mod limits;

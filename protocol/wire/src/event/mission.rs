@@ -2,6 +2,25 @@
 
 use super::Text;
 
+skein_bp::words! {
+    /// How serious a line of the autopilot is (RFC 5424), the most serious first.
+    pub enum Severity {
+        /// The system is unusable.
+        Emergency = "emergency",
+        /// Act at once.
+        Alert = "alert",
+        /// A primary system fails.
+        Critical = "critical",
+        /// A secondary system fails.
+        Error = "error",
+        /// Possible trouble ahead.
+        Warning = "warning",
+        /// Unusual, not an error.
+        Notice = "notice",
+        Info = "info",
+    }
+}
+
 skein_bp::events! {
     /// The stages of a flight, and what interrupts it.
     pub const MISSION;
@@ -17,6 +36,13 @@ skein_bp::events! {
     Airborne = "airborne", Own;
     /// The vehicle stands on the ground, disarmed.
     Landed = "landed", Own;
+    /// The autopilot has written a line. Its events, as PX4 has them, come as numbers.
+    AutopilotSays = "autopilot_says", Own {
+        severity: Severity,
+        text: Text,
+        /// How often, since it was told last.
+        times: i64 ["", 1.0..=f64::INFINITY],
+    }
     /// The mission is complete and the vehicle is on the ground.
     Complete = "complete", Anyone;
     /// The mission ended without reaching its goal.

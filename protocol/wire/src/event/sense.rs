@@ -48,6 +48,15 @@ skein_bp::events! {
     }
     /// The path ahead runs into an obstacle that was not known when it was planned.
     PathBlocked = "path_blocked", Own;
+    /// The vehicle is above its map or outside its fence, where no path leads: it goes straight to this place first,
+    /// and does not plan before it is there.
+    WayBack = "way_back", Own {
+        x: f64 ["m"],
+        y: f64 ["m"],
+        z: f64 ["m"],
+        /// Where it is, and whether something holds it up.
+        why: Text,
+    }
     /// Leave to move was given, and yet the vehicle makes no way.
     Stuck = "stuck", Own;
     /// Where the way ends another vehicle stays, nearer than this one may come.

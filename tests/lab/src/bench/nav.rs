@@ -202,7 +202,7 @@ impl<'a> Flight<'a> {
         self.perception.take_in(&scan, &pose, &others, &[]);
         let mapped = cpu_time::this_thread()?;
         self.guidance.grant_leave(now);
-        let reports = self.guidance.look_ahead(now, &self.motion, self.perception.map(), &[]);
+        let reports = self.guidance.look_ahead(now, &self.motion, self.perception.map_mut(), &[]);
         let looked = cpu_time::this_thread()?;
         let surroundings = Surroundings {
             sees: true,
