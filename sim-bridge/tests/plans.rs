@@ -637,3 +637,19 @@ fn a_plan_is_flown_high_above_where_it_takes_off_and_no_higher_than_maps_reach()
         scenario(&plan(&HOME, &[takeoff(3.0), waypoint(20.0, 0.0, 200.0)]), 1, "").expect_err("too high");
     assert!(error.to_string().starts_with("a mission goes 200 m above its home"), "{error}");
 }
+
+#[test]
+fn altitude_zero_in_a_waypoint_file_keeps_the_height_before_it() {
+    let text = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t46.5\t7.25\t620\t1\n\
+                1\t0\t3\t22\t0\t0\t0\t0\t46.5\t7.25\t12\t1\n\
+                2\t0\t3\t16\t0\t0\t0\t0\t46.5001\t7.25\t0\t1\n\
+                3\t0\t3\t16\t0\t0\t0\t0\t46.5002\t7.25\t30\t1\n\
+                4\t0\t0\t82\t0\t0\t0\t0\t46.5003\t7.25\t0\t1\n";
+    let set = read(text);
+    let heights: Vec<f64> = set.missions[0].waypoints.iter().map(|w| w.position.z).collect();
+    assert_eq!(heights, [12.0, 30.0, 30.0]);
+    let told = set.warnings.iter().filter(|warning| warning.message.contains("keeps the height")).count();
+    assert_eq!(told, 2);
+    let below = text.replace("7.25\t30\t1", "7.25\t-3\t1");
+    assert!(refusal(&below).contains("f.plan:5: field `column 11, parameter 7`"));
+}

@@ -80,6 +80,12 @@ impl Item<'_> {
         }
     }
 
+    /// A place in a waypoint file whose altitude is 0: ArduPilot, whose tools write these files, stays at the
+    /// height it has.
+    pub fn keeps_height(&self) -> bool {
+        matches!(self.origin, Origin::Row { .. }) && self.params[6] == 0.0
+    }
+
     /// The parameter is absent or 0.
     pub fn is_unset(&self, index: usize) -> bool {
         self.params[index].is_nan() || self.params[index] == 0.0

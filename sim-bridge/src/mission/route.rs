@@ -332,6 +332,11 @@ impl Draft {
         }
         if !is_here {
             let ground = self.place(item)?;
+            if item.keeps_height() {
+                const WHY: &str = "an altitude of 0 keeps the height of the item before, as with ArduPilot";
+                self.warn(|| item.origin.warning(Part::Parameter(6), WHY));
+                return Ok(ground.xy().push(self.here().z));
+            }
             return Ok(ground.xy().push(self.height(item)?));
         }
         let here = self.here();

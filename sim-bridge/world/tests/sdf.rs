@@ -212,7 +212,8 @@ fn sizes_that_no_solid_can_have_are_refused() {
 #[test]
 fn what_is_not_quite_xml_is_taken() {
     let content = format!(
-        "<!-- run: gz sim \n--verbose -->{}<gz:note gz:by='me'/><!-- b --><model name='x'><pose>a</pose></model>",
+        "<!-- run: gz sim \n--verbose -->{}<gz:note gz:by='me'/><gz::rank>3</gz::rank>\
+         <!-- b --><model name='x'><pose>a</pose></model>",
         model("", "<sphere><radius>1</radius></sphere>")
     );
     let message = refuse(&world(&content));

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // A test fails by panicking.
 
+mod autopilot_words;
 mod cross_node_behaviours;
 mod dark_obstacles;
 mod determinism;

@@ -48,8 +48,8 @@ skein_bp::events! {
     }
     /// The path ahead runs into an obstacle that was not known when it was planned.
     PathBlocked = "path_blocked", Own;
-    /// The vehicle is above its map or outside its fence, where no path leads: it goes straight to this place first,
-    /// and does not plan before it is there.
+    /// The vehicle is above its map or outside its fence, where no path leads: it goes straight to this place
+    /// first, and does not plan before it is there.
     WayBack = "way_back", Own {
         x: f64 ["m"],
         y: f64 ["m"],

@@ -90,8 +90,8 @@ impl<'a> Source<'a> {
     }
 }
 
-/// The text without what is no XML but what Gazebo takes: prefixes that nobody has declared, comments with
-/// `--` in them, a declaration that is not at the beginning.
+/// The text without what is no XML but what Gazebo takes: prefixes that nobody has declared, names with `::` in
+/// them, comments with `--` in them, a declaration that is not at the beginning.
 fn mended(text: &str, error: &roxmltree::Error) -> Option<String> {
     match error {
         roxmltree::Error::UnknownNamespace(prefix, _) => {
@@ -103,9 +103,24 @@ fn mended(text: &str, error: &roxmltree::Error) -> Option<String> {
             let (before, after) = (text.get(..open)?, text.get(open + length..)?);
             Some(format!("{before}{}{after}", " ".repeat(length)))
         }
+        roxmltree::Error::InvalidName(_) => Some(plain_names(text)).filter(|plain| plain != text),
         roxmltree::Error::InvalidComment(_) => Some(blank_comments(text)).filter(|blank| blank != text),
         _ => None,
     }
+}
+
+/// The text with `__` for each `::` in the names of its elements.
+fn plain_names(text: &str) -> String {
+    let mut pieces = text.split('<');
+    let mut plain = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        let end = piece.find(|c: char| c.is_whitespace() || c == '>').unwrap_or(piece.len());
+        let (name, rest) = piece.split_at(end);
+        plain.push('<');
+        plain.push_str(&name.replace("::", "__"));
+        plain.push_str(rest);
+    }
+    plain
 }
 
 /// The text with nothing but space and ends of lines in its comments.
