@@ -4,7 +4,6 @@
 use std::time::Duration;
 
 use skein_mav::{Severity, Text};
-use skein_wire::event;
 
 use crate::report::Report;
 
@@ -77,19 +76,6 @@ impl AutopilotWords {
             let text = "further lines, which stand in its agent's log".to_owned();
             Report::AutopilotSays { text: Text { severity: Severity::Notice, text }, times }
         })
-    }
-}
-
-/// A severity in the words of events.
-pub fn severity(severity: Severity) -> event::Severity {
-    match severity {
-        Severity::Emergency => event::Severity::Emergency,
-        Severity::Alert => event::Severity::Alert,
-        Severity::Critical => event::Severity::Critical,
-        Severity::Error => event::Severity::Error,
-        Severity::Warning => event::Severity::Warning,
-        Severity::Notice => event::Severity::Notice,
-        Severity::Info | Severity::Debug => event::Severity::Info,
     }
 }
 

@@ -5,15 +5,15 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use skein_bp::Event;
 use skein_dbp::NodeName;
-use skein_mav::{FlightMode, Text};
+use skein_mav::{FlightMode, Severity, Text};
 use skein_wire::event::{
-    Airborne, Arrived, AutopilotSays, BatteryChanged, BatteryCritical, BatteryLow, Clear, CommandFailed,
-    Cornered, FenceBreached, FoundAirborne, InTheWay, Landed, Leave, OrderTaken, OutOfTheWay, PathBlocked,
-    PilotTook, PlaceFree, PlaceTaken, Planned, PositionDoubted, PositionTrusted, Ready, Refuge, Right, Slept,
-    SourceFound, SourceLost, Stuck, TooClose, Unplannable, Unready, WayBack, What, ZoneNews, ZoneState,
+    self, Airborne, Arrived, AutopilotSays, BatteryChanged, BatteryCritical, BatteryLow, Clear,
+    CommandFailed, Cornered, FenceBreached, FoundAirborne, InTheWay, Landed, Leave, OrderTaken, OutOfTheWay,
+    PathBlocked, PilotTook, PlaceFree, PlaceTaken, Planned, PositionDoubted, PositionTrusted, Ready, Refuge,
+    Right, Slept, SourceFound, SourceLost, Stuck, TooClose, Unplannable, Unready, WayBack, What, ZoneNews,
+    ZoneState,
 };
 
-use crate::autopilot_words;
 use crate::energy::Changed;
 use crate::me::Me;
 use crate::positioning::SourceNews;
@@ -170,11 +170,9 @@ impl Report {
             Self::PlaceFree => me.event(PlaceFree),
             Self::Refuge(at) => me.event(Refuge { x: at.x, y: at.y, z: at.z }),
             Self::PathBlocked => me.event(PathBlocked),
-            Self::AutopilotSays { text: Text { severity, text }, times } => me.event(AutopilotSays {
-                severity: autopilot_words::severity(severity),
-                text: text.into(),
-                times,
-            }),
+            Self::AutopilotSays { text: Text { severity, text }, times } => {
+                me.event(AutopilotSays { severity: in_words(severity), text: text.into(), times })
+            }
             Self::WayBack { to, why } => me.event(WayBack { x: to.x, y: to.y, z: to.z, why: why.into() }),
             Self::Stuck => me.event(Stuck),
             Self::Passage(stretch) => match stretch.passage() {
@@ -192,4 +190,17 @@ impl Report {
 /// A share of 0 to 1 in whole per cents.
 fn percent(share: f64) -> i64 {
     (share * 100.0).round() as i64
+}
+
+/// A severity in the words of events.
+fn in_words(severity: Severity) -> event::Severity {
+    match severity {
+        Severity::Emergency => event::Severity::Emergency,
+        Severity::Alert => event::Severity::Alert,
+        Severity::Critical => event::Severity::Critical,
+        Severity::Error => event::Severity::Error,
+        Severity::Warning => event::Severity::Warning,
+        Severity::Notice => event::Severity::Notice,
+        Severity::Info | Severity::Debug => event::Severity::Info,
+    }
 }
