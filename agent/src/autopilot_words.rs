@@ -28,7 +28,7 @@ pub struct AutopilotWords {
 #[derive(Debug)]
 struct Line {
     text: Text,
-    /// How often it came since it was told.
+    /// Times that it came since it was told.
     times: i64,
     told_at: Option<Duration>,
 }

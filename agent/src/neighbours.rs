@@ -234,7 +234,7 @@ impl Neighbours {
         self.around.clear();
     }
 
-    /// How many other vehicles are remembered.
+    /// Number of other vehicles that are remembered.
     pub fn remembered(&self) -> usize {
         self.last.len()
     }

@@ -23,7 +23,7 @@ use super::{
     progress::{Around, Felt, Leave, Progress},
     steering::{Lead, Steering},
     surroundings::Surroundings,
-    way_back::Tidings,
+    way_back::WayBackNews,
     way_of_others::{WayOfOthers, goes_first},
 };
 use crate::{
@@ -60,7 +60,7 @@ pub struct Guidance {
     /// The way to a refuge, and when it was found, while the vehicle makes way.
     aside: Option<(Following, Duration)>,
     pub steering: Steering,
-    back: Tidings,
+    back: WayBackNews,
 }
 
 impl Guidance {
@@ -80,7 +80,7 @@ impl Guidance {
             way_of_others: WayOfOthers::new(envelope.separation_m, &passages),
             aside: None,
             steering: Steering::new(envelope, follower, repulsion, filter),
-            back: Tidings::default(),
+            back: WayBackNews::default(),
         }
     }
 

@@ -10,9 +10,9 @@ use skein_planning::{Path, Region, map::ClearanceMap};
 use super::perception::FAR_CORNER;
 use crate::{config::Fence, report::Report};
 
-/// Who is further outside than this, m, goes back before anything else: no path is followed from so far away.
+/// Further outside than this, m, a vehicle goes back before anything else: no path is followed from so far away.
 const LEFT_M: f64 = 2.0;
-/// Who is less outside than this, m, is back.
+/// Less outside than this, m, it is back.
 const BACK_M: f64 = 0.3;
 /// The turns from the straight way at which another way in is looked for, degrees to both sides.
 const TURNS_DEG: [f64; 5] = [15.0, 30.0, 45.0, 60.0, 75.0];
@@ -118,15 +118,15 @@ impl Space {
     }
 }
 
-/// What is told of a vehicle on its way back.
+/// News of a vehicle on its way back, told where they change.
 #[derive(Debug, Default)]
-pub struct Tidings {
+pub struct WayBackNews {
     /// Where it goes, as was told last, and whether it is held up.
     told: Option<(Vector3<f64>, bool)>,
     stands_since: Option<Duration>,
 }
 
-impl Tidings {
+impl WayBackNews {
     /// There is nothing more to tell.
     pub fn forget(&mut self) {
         *self = Self::default();
@@ -212,10 +212,10 @@ mod tests {
     #[test]
     fn it_is_told_once_where_it_goes_and_again_when_it_is_held_up() {
         let (space, _) = space();
-        let mut tidings = Tidings::default();
+        let mut news = WayBackNews::default();
         let (place, end) = (Vector3::new(20.0, 0.0, 4.0), Vector3::new(11.5, 0.0, 4.0));
         let mut look = |ms, speed_m_s| {
-            let report = tidings.look(Duration::from_millis(ms), (&place, speed_m_s), end, &space, true)?;
+            let report = news.look(Duration::from_millis(ms), (&place, speed_m_s), end, &space, true)?;
             let Report::WayBack { why, .. } = report else { return None };
             Some(why)
         };

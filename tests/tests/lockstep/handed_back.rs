@@ -15,7 +15,7 @@ use skein_wire::{Order, Who};
 const FIELD: &str = "time_limit_s = 300.0\n[bounds]\nmin_m = [-10.0, -10.0, -1.0]\nmax_m = [70.0, 10.0, 60.0]\n\
     [[vehicle]]\nstart_m = [0.0, 0.0]\nwaypoints_m = [[60.0, 0.0, 3.0]]\n";
 
-/// What a pilot's station says to this vehicle.
+/// The bytes of what a pilot's station says to this vehicle.
 fn station(message: impl FnOnce(&mut FrameWriter)) -> Vec<u8> {
     let mut writer = FrameWriter::new(Address { system_id: 255, component_id: 190 });
     message(&mut writer);

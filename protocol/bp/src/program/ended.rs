@@ -14,7 +14,7 @@ pub(super) struct Ended {
 }
 
 impl Ended {
-    /// How many names are known.
+    /// Number of names that are known.
     pub(super) fn len(&self) -> usize {
         self.seen.len()
     }
